@@ -1,0 +1,5 @@
+"""Run the program with ``python -m study_app``."""
+
+from study_app.cli import main
+
+main()

@@ -1,0 +1,1 @@
+"""Understanding results folders; never a live session."""

@@ -1,0 +1,85 @@
+"""The exceptions a user may meet; every message names the thing, the value, the permitted and what to do.
+
+::
+
+    StudyError                 anything the user can mend: one line, exit code 2, no traceback
+    ├── ProtocolError          a protocol or scene file that cannot be used; lists every problem
+    ├── DeviceError            what the participant feels with
+    │   ├── DeviceNotFound     asked for, but not there or not known
+    │   └── DeviceLost         was there, and stopped answering
+    ├── ServoFault             the servo stopped itself; the force is zero
+    ├── SessionError           an event that the session cannot take in its present state
+    ├── StoreError             results that cannot be written or read
+    ├── AnalysisError          results that cannot be evaluated
+    └── DisplayError           no screen to open a window on
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+class StudyError(Exception):
+    """A failure that the user can understand and mend."""
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """One thing wrong with a file.
+
+    ``place`` is a dotted path ("blocks.2.order"), ``line`` the line in the file (1-based) or None, ``message`` the
+    sentence, ``hint`` what to do (may be empty).
+    """
+
+    place: str
+    message: str
+    line: int | None = None
+    hint: str = ""
+
+    def __str__(self) -> str:
+        where = f"line {self.line}: " if self.line is not None else ""
+        hint = f" ({self.hint})" if self.hint else ""
+        return f"{where}{self.place}: {self.message}{hint}"
+
+
+class ProtocolError(StudyError):
+    """A protocol, scene or motion file that cannot be used, with every problem found in it."""
+
+    def __init__(self, source: str, problems: tuple[Problem, ...]) -> None:
+        self.source = source
+        self.problems = problems
+        listed = "\n".join(f"  {problem}" for problem in problems)
+        count = "1 problem" if len(problems) == 1 else f"{len(problems)} problems"
+        super().__init__(f"{source}: {count}\n{listed}")
+
+
+class DeviceError(StudyError):
+    """The device cannot be used."""
+
+
+class DeviceNotFound(DeviceError):
+    """No such device, or none connected."""
+
+
+class DeviceLost(DeviceError):
+    """The device stopped answering while in use."""
+
+
+class ServoFault(StudyError):
+    """The servo stopped itself and sends zero force."""
+
+
+class SessionError(StudyError):
+    """The session cannot take this event in its present state; nothing was changed."""
+
+
+class StoreError(StudyError):
+    """Results cannot be written or read; nothing was half-written."""
+
+
+class AnalysisError(StudyError):
+    """Results cannot be evaluated."""
+
+
+class DisplayError(StudyError):
+    """A window cannot be opened here."""

@@ -1,0 +1,1 @@
+"""The force model under test: references, cost, stability."""

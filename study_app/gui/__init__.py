@@ -1,0 +1,1 @@
+"""Drawing it: windows for operator and participant."""

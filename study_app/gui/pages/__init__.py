@@ -1,0 +1,1 @@
+"""The participant's pages: one widget for each kind of page value."""

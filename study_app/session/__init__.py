@@ -1,0 +1,1 @@
+"""Running a study without Qt: events in, pages and commands out."""

@@ -1,0 +1,130 @@
+"""What can happen in a session. The machine takes these; nothing else moves it.
+
+``at_s`` is seconds on the session's monotonic clock (0 = the session's clock origin).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal, TypeAlias
+
+
+@dataclass(frozen=True, slots=True)
+class Begin:
+    """Everything is open; show the first page."""
+
+    at_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Continue:
+    """The participant goes on from a text page, or ends an exploration after its least time."""
+
+    at_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class TaskDone:
+    """The task of the running trial is over; ``summary`` is what its trial row records (see ``store.columns``)."""
+
+    at_s: float
+    outcome: Literal["complete", "timeout"]
+    summary: dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class ItemShown:
+    """A statement became visible to the participant."""
+
+    at_s: float
+    item: str
+
+
+@dataclass(frozen=True, slots=True)
+class Chosen:
+    """The participant chose ``value`` (1 to 7, or None for "cannot judge") for ``item``; may come again."""
+
+    at_s: float
+    item: str
+    value: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class Submitted:
+    """The participant confirms the questionnaire."""
+
+    at_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class PauseAsked:
+    """Esc, or the operator's pause."""
+
+    at_s: float
+    by: Literal["participant", "operator"]
+
+
+@dataclass(frozen=True, slots=True)
+class ResumeAsked:
+    """Go on from the pause; a trial that was under way starts again."""
+
+    at_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class ForceStopped:
+    """The force was switched off (the servo already sends zero); the session pauses."""
+
+    at_s: float
+    by: Literal["participant", "operator", "device"]
+
+
+@dataclass(frozen=True, slots=True)
+class Note:
+    """The operator's note, or a mark (empty text allowed) at a moment."""
+
+    at_s: float
+    kind: Literal["note", "mark"]
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class RepeatAsked:
+    """The operator wants the running trial again, with a reason."""
+
+    at_s: float
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class EndAsked:
+    """The operator (or the participant through the operator) ends the session early."""
+
+    at_s: float
+    status: Literal["withdrawn", "aborted"]
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Broke:
+    """Device or servo failed; ``what`` is for the operator and the journal, not for the participant."""
+
+    at_s: float
+    what: str
+
+
+Event: TypeAlias = (
+    Begin
+    | Continue
+    | TaskDone
+    | ItemShown
+    | Chosen
+    | Submitted
+    | PauseAsked
+    | ResumeAsked
+    | ForceStopped
+    | Note
+    | RepeatAsked
+    | EndAsked
+    | Broke
+)

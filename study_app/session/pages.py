@@ -1,0 +1,96 @@
+"""What the participant sees at one moment, as values: a machine makes them, a widget draws them.
+
+Texts are already in the participant's language. Lengths are metres in the hand frame, times seconds.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+from study_app.protocol.model import Explore, Reach
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """Where we are: part ``part`` of ``parts``; within it setting ``index`` of ``of`` under a neutral label."""
+
+    part: int
+    parts: int
+    label: str
+    index: int
+    of: int
+
+
+@dataclass(frozen=True, slots=True)
+class TextPage:
+    """A text to read and a button to go on: consent, instructions, announcements, breaks, the debrief."""
+
+    id: str
+    kind: Literal["consent", "instructions", "break", "debrief"]
+    title: str
+    paragraphs: tuple[str, ...]
+    button: str
+    progress: Progress | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class TaskPage:
+    """The tank: move the ball; what is drawn is ``delay_s`` old. Never print or log ``delay_s``: it is blinded."""
+
+    trial: int
+    instruction: str
+    task: Explore | Reach
+    delay_s: float
+    workspace_m: tuple[float, float, float]
+    body_radius_m: float
+    progress: Progress | None
+
+
+@dataclass(frozen=True, slots=True)
+class ItemView:
+    """One statement of a questionnaire as shown: ``number`` counts from 1 in the order of presentation."""
+
+    id: str
+    number: int
+    text: str
+    required: bool
+
+
+@dataclass(frozen=True, slots=True)
+class QuestionnairePage:
+    """The statements of one setting; ``labels`` name the points of the scale, lowest first."""
+
+    trial: int
+    title: str
+    intro: str
+    items: tuple[ItemView, ...]
+    labels: tuple[str, ...]
+    cannot_judge: str | None
+    progress: Progress | None
+
+
+@dataclass(frozen=True, slots=True)
+class PausePage:
+    """The session waits; ``force_off`` says that the force was stopped and fades in only when asked for."""
+
+    force_off: bool
+
+
+@dataclass(frozen=True, slots=True)
+class TroublePage:
+    """Something broke and the operator is called: a calm sentence, no reason that could unsettle or unblind."""
+
+    title: str
+    paragraph: str
+
+
+@dataclass(frozen=True, slots=True)
+class EndPage:
+    """The session is over, one way or another."""
+
+    title: str
+    paragraph: str
+
+
+Page: TypeAlias = TextPage | TaskPage | QuestionnairePage | PausePage | TroublePage | EndPage

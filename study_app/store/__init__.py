@@ -1,0 +1,1 @@
+"""Keeping what happened: journal, receipt, derived tables, sealed conditions."""
