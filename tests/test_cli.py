@@ -1,0 +1,91 @@
+"""The commands: what they print, and the one line and exit code a user gets for bad input."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+
+def liquid_study(*words: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "study_app", *words], cwd=cwd, capture_output=True, text=True, check=False
+    )
+
+
+def assert_one_line(finished: subprocess.CompletedProcess[str], *parts: str) -> None:
+    assert finished.returncode == 2
+    assert finished.stdout == ""
+    lines = finished.stderr.splitlines()
+    assert len(lines) == 1, finished.stderr
+    for part in parts:
+        assert part in lines[0]
+
+
+def test_help_names_every_command(tmp_path: Path) -> None:
+    finished = liquid_study("--help", cwd=tmp_path)
+    assert finished.returncode == 0
+    for command in ("check", "simulate", "run", "rehearse", "export", "plot", "unblind"):
+        assert f"\n  {command} " in finished.stdout
+
+
+def test_help_loads_neither_qt_nor_the_compiler(tmp_path: Path) -> None:
+    program = (
+        "import sys; sys.argv=['liquid-study','--help']\n"
+        "from study_app.cli import main\n"
+        "try: main()\n"
+        "except SystemExit: pass\n"
+        "print(sorted({'PySide6','numba','pandas','matplotlib','numpy','pydantic'} & set(sys.modules)))"
+    )
+    finished = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert finished.stdout.splitlines()[-1] == "[]"
+
+
+def test_unknown_command_is_one_line(tmp_path: Path) -> None:
+    assert_one_line(liquid_study("rehears", cwd=tmp_path), "rehears", "rehearse")
+
+
+def test_unknown_protocol_names_the_shipped_ones(tmp_path: Path) -> None:
+    finished = liquid_study("check", "rek2042", cwd=tmp_path)
+    assert finished.returncode == 2
+    assert "rek2042" in finished.stderr
+    assert "rek2024" in finished.stderr
+
+
+def test_check_far_from_the_checkout_tells_the_study_in_words(tmp_path: Path) -> None:
+    finished = liquid_study("check", "rek2024", cwd=tmp_path)
+    assert finished.returncode == 0, finished.stderr
+    assert "62" in finished.stdout
+    assert "8 N" in finished.stdout
+
+
+@pytest.mark.parametrize(
+    ("words", "parts"),
+    [
+        (("--participant", "P-1"), ("P-1", "letters and digits")),
+        (("--participant", "P001", "--device", "falkon"), ("falkon", "mouse", "scripted")),
+        (("--participant", "P001", "--language", "xx"), ("xx", "en", "nl")),
+    ],
+)
+def test_run_refuses_what_it_cannot_use(tmp_path: Path, words: tuple[str, ...], parts: tuple[str, ...]) -> None:
+    results = tmp_path / "results"
+    assert_one_line(liquid_study("run", "rek2024", *words, "--results", str(results), cwd=tmp_path), *parts)
+    assert not results.exists()
+
+
+def test_simulate_names_the_bad_row_and_writes_nothing(tmp_path: Path) -> None:
+    (tmp_path / "path.csv").write_text("t_s,x_m,y_m,z_m\n0,0,0,0\n0.001,0,zero,0\n", encoding="utf-8")
+    words = ("--scene", "rek2024", "--liquid", "water", "--path", "path.csv", "--out", "out.csv")
+    finished = liquid_study("simulate", *words, cwd=tmp_path)
+    assert finished.returncode == 2
+    assert "row 2" in finished.stderr or "line 3" in finished.stderr
+    assert "zero" in finished.stderr
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["path.csv"]
+
+
+def test_simulate_names_the_unknown_parameter(tmp_path: Path) -> None:
+    words = ("--scene", "rek2024", "--liquid", "water", "--path", "circle", "--out", "out.csv")
+    assert_one_line(
+        liquid_study("simulate", *words, "--set", "densitee_kg_m3=1", cwd=tmp_path), "densitee_kg_m3", "density_kg_m3"
+    )
+    assert list(tmp_path.iterdir()) == []
