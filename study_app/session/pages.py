@@ -5,7 +5,7 @@ Texts are already in the participant's language. Lengths are metres in the hand 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
 from study_app.protocol.model import Explore, Reach
@@ -36,12 +36,15 @@ class TextPage:
 
 @dataclass(frozen=True, slots=True)
 class TaskPage:
-    """The tank: move the ball; what is drawn is ``delay_s`` old. Never print or log ``delay_s``: it is blinded."""
+    """The tank: move the ball; what is drawn is ``delay_s`` old. Never print or log ``delay_s``: it is blinded.
+
+    ``workspace_m`` holds the full sizes of the tank along x, y, z, centred on the device's middle.
+    """
 
     trial: int
     instruction: str
     task: Explore | Reach
-    delay_s: float
+    delay_s: float = field(repr=False)
     workspace_m: tuple[float, float, float]
     body_radius_m: float
     progress: Progress | None
@@ -59,7 +62,10 @@ class ItemView:
 
 @dataclass(frozen=True, slots=True)
 class QuestionnairePage:
-    """The statements of one setting; ``labels`` name the points of the scale, lowest first."""
+    """The statements of one setting; ``labels`` name the points of the scale, lowest first.
+
+    ``chosen`` holds (item id, value) of the choices already made, when the page comes back after a pause.
+    """
 
     trial: int
     title: str
@@ -68,6 +74,7 @@ class QuestionnairePage:
     labels: tuple[str, ...]
     cannot_judge: str | None
     progress: Progress | None
+    chosen: tuple[tuple[str, int | None], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
