@@ -1,0 +1,294 @@
+"""A study as a frozen, validated value; field names are the keys of the TOML file.
+
+Each class is one table of the file. What a single table can decide by itself is checked here; what needs two tables
+(references, languages, targets inside the workspace) is in ``checks``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, Self, TypeAlias, TypeVar
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+from pydantic_core import PydanticCustomError
+
+from study_app.haptics.scene import Body, Ewma, Knee, Liquid, Scene
+from study_app.protocol.tasks import Explore, Reach, Task
+from study_app.protocol.texts import Id, Language, Localised, text_in
+
+__all__ = [
+    "Block",
+    "Condition",
+    "DeviceNeeds",
+    "Explore",
+    "Item",
+    "Limits",
+    "PageText",
+    "Protocol",
+    "Questionnaire",
+    "Reach",
+    "Scale",
+    "SceneDefaults",
+    "StudyHead",
+]
+
+MAX_FORCE_N = 8.0
+POINTS = 7
+
+
+class Table(BaseModel):
+    """A table of the file: unknown keys are errors, values never change."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class StudyHead(Table):
+    """Which study this is."""
+
+    name: str = Field(pattern=r"^[a-z][a-z0-9]*$", max_length=40, description="Short name, used in folders and files.")
+    title: Localised = Field(description="Title as people read it.")
+    description: str = Field(default="", description="What the study asks, for those who find its results.")
+    version: str = Field(
+        pattern=r"^[0-9A-Za-z.+-]+$", description="Version of this protocol; raise it with every change."
+    )
+    languages: tuple[Language, ...] = Field(
+        min_length=1, description="Languages every text exists in; the first is preset."
+    )
+
+
+class DeviceNeeds(Table):
+    """What the study asks of whichever device is used."""
+
+    rate_hz: float = Field(default=1000, ge=250, le=4000, description="Rate of the servo [Hz].")
+    force_limit_n: float = Field(
+        default=MAX_FORCE_N, gt=0, le=MAX_FORCE_N, description="Largest force on the hand [N]."
+    )
+    workspace_mm: tuple[float, float, float] = Field(
+        description="Full sizes of the drawn tank in x, y, z, hand frame, centred on the device's middle [mm]."
+    )
+
+    @property
+    def workspace_m(self) -> tuple[float, float, float]:
+        """Full sizes of the tank, hand frame [m]."""
+        x, y, z = self.workspace_mm
+        return (x / 1000, y / 1000, z / 1000)
+
+    @model_validator(mode="after")
+    def _workspace_has_room(self) -> Self:
+        if not all(10 <= size <= 1000 for size in self.workspace_mm):
+            raise PydanticCustomError("range", "every size must be from 10 to 1000 mm", {"place": "workspace_mm"})
+        return self
+
+
+class SceneDefaults(Table):
+    """What all conditions share of the scene: everything but the liquids."""
+
+    scale: float = Field(default=10, ge=0.01, le=100, description="Scene metres per hand metre.")
+    origin_m: tuple[float, float, float] = Field(
+        default=(0, 0, 0), description="Scene point under the hand's zero [m]."
+    )
+    body: Body = Field(default_factory=Body, description="The ball that is felt.")
+    velocity: Ewma = Field(default_factory=Ewma, description="How velocity is estimated from positions.")
+    knee: Knee = Field(default_factory=Knee, description="How high speeds are lowered.")
+
+
+class Condition(Table):
+    """A named combination of what is felt (one liquid, or several with regions) and how late it is seen."""
+
+    liquid: Id | None = Field(default=None, description="The liquid; or give liquids.")
+    liquids: tuple[Id, ...] = Field(default=(), description="Several liquids; where they overlap the last one counts.")
+    delay_ms: float = Field(default=0, ge=0, le=1000, description="Delay of everything drawn in the tank [ms].")
+
+    @property
+    def liquid_ids(self) -> tuple[str, ...]:
+        """The liquids of the scene, in order."""
+        return self.liquids if self.liquid is None else (self.liquid,)
+
+    @model_validator(mode="after")
+    def _liquid_one_way(self) -> Self:
+        if (self.liquid is None) == (not self.liquids):
+            raise PydanticCustomError("one_of", "give either liquid or liquids, one of the two", {"place": "liquid"})
+        return self
+
+
+class Scale(Table):
+    """The seven points of an answer, lowest first."""
+
+    labels: dict[Language, Annotated[tuple[str, ...], Field(min_length=POINTS, max_length=POINTS)]] = Field(
+        description="Per language the names of the seven points, lowest first."
+    )
+    cannot_judge: Localised | None = Field(
+        default=None, description="Label of an answer off the scale; left out: none."
+    )
+
+
+class Item(Table):
+    """One statement."""
+
+    id: Id = Field(description="Name of the item in every table; never change it once data exist.")
+    text: Localised = Field(description="The statement as the participant reads it.")
+    short: Localised = Field(description="One to three words for figures and tables.")
+    required: bool = Field(default=True, description="Whether the participant can go on without an answer.")
+
+
+class Questionnaire(Table):
+    """The statements that are answered after a trial."""
+
+    title: Localised | None = Field(default=None, description="Heading; left out: the name of the setting.")
+    intro: Localised = Field(description="The question above the statements.")
+    scale: Id = Field(description="The scale of all items.")
+    item_order: Literal["fixed", "shuffled"] = Field(default="fixed", description="As written, or anew in every trial.")
+    items: tuple[Item, ...] = Field(min_length=1, description="The statements.")
+
+    def item(self, item_id: str) -> Item:
+        """Return the item of that id (KeyError if there is none)."""
+        for item in self.items:
+            if item.id == item_id:
+                return item
+        raise KeyError(item_id)
+
+
+class PageText(Table):
+    """A page to read."""
+
+    kind: Literal["consent", "instructions", "break", "debrief"]
+    title: Localised = Field(description="Heading of the page.")
+    body: Localised = Field(description="The text; a blank line begins a paragraph.")
+    button: Localised | None = Field(default=None, description="Words on the button; left out: Continue.")
+
+
+class Block(Table):
+    """Trials that share a task and a questionnaire.
+
+    A condition of a main block is shown under a code, L1 … Ln with ``code_prefix`` L; which condition a code stands for
+    is drawn by ``schedule.draw_key``. Practice and baseline are announced for what they are, and have one condition.
+    """
+
+    id: Id = Field(description="The name of the block's table.")
+    phase: Literal["main", "practice", "baseline"] = Field(default="main", description="Only main trials are analysed.")
+    part: int | None = Field(default=None, ge=1, le=20, description="Part of the study that the block belongs to.")
+    title: Localised = Field(description="Name of the block.")
+    setting_label: Localised = Field(description="Neutral name of its trials; a number follows: Liquid setting 1.")
+    code_prefix: str | None = Field(default=None, pattern=r"^[A-Z]$", description="Letter of the block's codes.")
+    conditions: tuple[Id, ...] = Field(min_length=1, description="What is presented.")
+    order: Literal["fixed", "shuffled"] = Field(default="fixed", description="As written, or anew per participant.")
+    repetitions: int = Field(default=1, ge=1, le=100, description="How often each condition comes.")
+    task: Id = Field(description="What the participant does.")
+    questionnaire: Id | None = Field(default=None, description="What is answered after each trial; left out: nothing.")
+
+    @model_validator(mode="after")
+    def _codes_where_blinded(self) -> Self:
+        if self.phase == "main":
+            if self.code_prefix is None:
+                raise PydanticCustomError("codes", "a main block needs a code_prefix, a capital letter", {})
+            if self.part is None:
+                raise PydanticCustomError("part", "a main block needs a part: 1, 2, …", {})
+        elif self.code_prefix is not None:
+            raise PydanticCustomError(
+                "codes",
+                "a {phase} block is not blinded and has no code_prefix",
+                {"phase": self.phase, "place": "code_prefix"},
+            )
+        elif len(self.conditions) > 1:
+            raise PydanticCustomError(
+                "codes",
+                "a {phase} block has one condition, this one {count}: use one block for each",
+                {"phase": self.phase, "count": len(self.conditions), "place": "conditions"},
+            )
+        return self
+
+
+class Limits(Table):
+    """What a trial may show at most and still be valid."""
+
+    lateness_ms: float = Field(default=2, gt=0, description="99th percentile of the lateness of ticks [ms].")
+    worst_gap_ms: float = Field(default=20, gt=0, description="Longest time between two ticks [ms].")
+    delay_error_ms: float = Field(default=25, gt=0, description="95th percentile of achieved − requested delay [ms].")
+
+
+T = TypeVar("T")
+
+
+def _named(tables: Any) -> Any:
+    """Give each table its name as ``id``, so that it can be used without the dictionary that held it."""
+    if not isinstance(tables, Mapping):
+        return tables
+    return {name: {"id": name, **table} if isinstance(table, Mapping) else table for name, table in tables.items()}
+
+
+Named: TypeAlias = Annotated[dict[Id, T], BeforeValidator(_named)]
+
+
+class Protocol(Table):
+    """The whole file."""
+
+    format: Literal[1] = Field(description="Version of this file format.")
+    study: StudyHead
+    device: DeviceNeeds
+    scene: SceneDefaults = Field(default_factory=SceneDefaults)
+    liquids: Named[Liquid] = Field(min_length=1)
+    conditions: dict[Id, Condition] = Field(min_length=1)
+    tasks: dict[Id, Task] = Field(min_length=1)
+    scales: dict[Id, Scale] = Field(default_factory=dict)
+    questionnaires: dict[Id, Questionnaire] = Field(default_factory=dict)
+    pages: dict[Id, PageText] = Field(default_factory=dict)
+    blocks: Named[Block] = Field(min_length=1)
+    sequence: tuple[Id, ...] = Field(min_length=1, description="Pages and blocks in the order of the session.")
+    limits: Limits = Field(default_factory=Limits)
+
+    def text(self, value: str | dict[str, str], language: str) -> str:
+        """Return a localised text in one of the study's languages."""
+        return text_in(value, language)
+
+    def paragraphs(self, value: str | dict[str, str], language: str) -> tuple[str, ...]:
+        """Return the paragraphs of a localised text."""
+        return tuple(text_in(value, language).split("\n\n"))
+
+    def labels(self, scale_id: str, language: str) -> tuple[str, ...]:
+        """Return the names of the seven points, lowest first."""
+        return self.scales[scale_id].labels[language]
+
+    @property
+    def main_blocks(self) -> tuple[Block, ...]:
+        """The blocks that are analysed, in the order of the session."""
+        return tuple(block for block in self.blocks_in_order if block.phase == "main")
+
+    @property
+    def blocks_in_order(self) -> tuple[Block, ...]:
+        """All blocks in the order of the session."""
+        return tuple(self.blocks[step] for step in self.sequence if step in self.blocks)
+
+    @property
+    def parts(self) -> int:
+        """How many parts the study has."""
+        return max(block.part or 0 for block in self.blocks.values())
+
+    def questionnaire_of(self, block_id: str) -> Questionnaire | None:
+        """Return what is answered after each trial of a block."""
+        name = self.blocks[block_id].questionnaire
+        return None if name is None else self.questionnaires[name]
+
+    def scene_for(self, condition_id: str) -> Scene:
+        """Return what is felt in a condition."""
+        return Scene(
+            scale=self.scene.scale,
+            origin_m=self.scene.origin_m,
+            rate_hz=self.device.rate_hz,
+            body=self.scene.body,
+            liquids=tuple(self.liquids[name] for name in self.conditions[condition_id].liquid_ids),
+            velocity=self.scene.velocity,
+            knee=self.scene.knee,
+            force_limit_n=self.device.force_limit_n,
+        )
+
+    def delay_s(self, condition_id: str) -> float:
+        """Return by how much everything drawn in the tank is late [s]."""
+        return self.conditions[condition_id].delay_ms / 1000
+
+    def responses_per_participant(self) -> int:
+        """Return how many answers a complete session holds, practice included if it asks anything."""
+        return sum(
+            len(block.conditions) * block.repetitions * len(self.questionnaires[block.questionnaire].items)
+            for block in self.blocks.values()
+            if block.questionnaire is not None
+        )
