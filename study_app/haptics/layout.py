@@ -6,9 +6,11 @@ have attributes. Positions and forces are float64; unless a name says otherwise,
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
+
+Record: TypeAlias = Any  # one row of a recarray: fields as attributes, compiled or not
 
 # Limiters that acted in a tick, as bits of Sample.limiters.
 LIMITER_SLOPE = 1 << 0
@@ -53,6 +55,168 @@ READING = np.dtype(
     [
         ("position_m", np.float64, (3,)),  # hand frame, after the driver's mapping
         ("buttons", np.int64),
+    ],
+    align=True,
+)
+
+
+# What follows is the memory of one scene ("model", haptics.pack) and of the safety layer, in the scene frame unless
+# said otherwise. The fields of an effect sit in a record of their own, untouched where the effect is not asked for.
+
+# Effects a liquid asks for, as bits of Liquid.effects.
+EFFECT_DRAG = 1 << 0
+EFFECT_WAKE = 1 << 1
+
+REGION_EVERYWHERE = 0
+REGION_BOX = 1
+REGION_CYLINDER = 2
+
+ESTIMATOR_EWMA = 0
+ESTIMATOR_GIVEN = 1
+
+KNEE_NONE = 0
+KNEE_SQRT = 1
+KNEE_SQUARE = 2
+
+PARAMETERS = np.dtype(
+    [
+        ("scale", np.float64),  # scene metres a hand metre
+        ("origin_m", np.float64, (3,)),  # where the hand's origin is
+        ("period_s", np.float64),  # nominal time between ticks
+        ("liquids", np.int64),  # how many of the liquids' rows count
+        ("estimator", np.int64),  # ESTIMATOR_*
+        (
+            "log_keep_per_s",
+            np.float64,
+        ),  # ln(1 - α) a second: the share of the old velocity kept after t is exp of it · t
+        ("knee_law", np.int64),  # KNEE_*
+        ("knee_threshold_mps", np.float64),
+        ("slope_limit_nspm", np.float64),  # greatest |drag| / |relative velocity| [N·s/m, scene]
+        ("force_limit_n", np.float64),
+    ],
+    align=True,
+)
+
+REGION = np.dtype(
+    [
+        ("kind", np.int64),  # REGION_*
+        ("centre_m", np.float64, (3,)),
+        ("half_m", np.float64, (3,)),  # half extents; of a cylinder: radius, half height, radius
+    ],
+    align=True,
+)
+
+DRAG = np.dtype([("factor_kg_m", np.float64)], align=True)  # ½ ρ C_d A
+
+WAKE = np.dtype(
+    [
+        ("row", np.int64),  # its first row in the model's elements and segments
+        ("length", np.int64),  # N, in elements at the scene's rate: the rows it owns
+        ("scaling", np.float64),  # S, likewise
+        ("exponent", np.float64),  # y
+        ("breaking_cosine", np.float64),  # cos β
+        ("breaking_span_m", np.float64),
+        ("log_decay_per_s", np.float64),  # ln λ a second
+        ("resolution_m", np.float64),
+        ("vertical", np.float64),  # 1 where vertical motion enters the tail, else 0
+    ],
+    align=True,
+)
+
+LIQUID = np.dtype([("effects", np.int64), ("region", REGION), ("drag", DRAG), ("wake", WAKE)], align=True)
+
+STATE = np.dtype(
+    [
+        ("tracking", np.int64),  # 1 once a position was accepted
+        ("placed", np.int64),  # 1 once the body was found inside or outside of each liquid
+        ("rejected", np.int64),  # samples refused in a row
+        ("accepted_ns", np.int64),  # when the last accepted sample was taken
+        ("hand_m", np.float64, (3,)),  # the last accepted position, hand frame
+        ("position_m", np.float64, (3,)),  # the same in the scene
+        ("previous_m", np.float64, (3,)),  # the one before
+        ("estimate_mps", np.float64, (3,)),  # the estimator's own velocity, before the knee
+        ("velocity_mps", np.float64, (3,)),  # after the knee
+        ("wake_mps", np.float64, (3,)),  # of the last listed liquid that acts, as used by drag
+        ("force_n", np.float64, (3,)),  # sum of the effects
+    ],
+    align=True,
+)
+
+DRAG_STATE = np.dtype(
+    [
+        ("relative_mps", np.float64, (3,)),  # w: the body's velocity relative to the liquid at its place
+        ("force_n", np.float64, (3,)),
+    ],
+    align=True,
+)
+
+WAKE_STATE = np.dtype(
+    [
+        ("stored", np.int64),  # elements stored since it was empty: the number of the next one
+        ("held", np.int64),  # how many of them are still in the list
+        ("first_segment", np.int64),  # number of the oldest segment
+        ("last_segment", np.int64),  # number of the newest, to which elements are added
+        ("reference", np.int64),  # number of the element the next one is compared with
+        ("scanned", np.int64),  # number of the first element not yet considered as reference
+        ("evicted", np.int64),  # moving elements that fell off since the last renewal
+        ("arc_m", np.float64),  # a: path travelled in this liquid
+        ("stored_at_m", np.float64, (3,)),  # where the body was when an element was last stored
+        ("scale", np.float64),  # speeds and sums are stored divided by this common decay
+        ("interior_mps", np.float64, (3,)),  # Σ direction · sum over segments between oldest and newest
+        ("interior_carry_mps", np.float64, (3,)),  # its rounding error
+        ("speed_mps", np.float64),  # Σ|e|
+        ("speed_carry_mps", np.float64),
+        ("square_m2ps2", np.float64),  # Σ|e|²
+        ("square_carry_m2ps2", np.float64),
+    ],
+    align=True,
+)
+
+LIQUID_STATE = np.dtype(
+    [
+        ("inside", np.int64),  # 1 while the body is within the region (with hysteresis)
+        ("share", np.float64),  # φ: 0 outside, 1 inside
+        ("flow_mps", np.float64, (3,)),  # velocity of the liquid at the body
+        ("drag", DRAG_STATE),
+        ("wake", WAKE_STATE),
+    ],
+    align=True,
+)
+
+ELEMENT = np.dtype(
+    [
+        ("velocity_mps", np.float64, (3,)),  # e, divided by the wake's scale
+        ("speed_mps", np.float64),  # |e|, likewise
+        ("arc_m", np.float64),  # a when it was stored
+        ("moving", np.int64),  # 0 for a zero element
+    ],
+    align=True,
+)
+
+SEGMENT = np.dtype(
+    [
+        ("direction", np.float64, (3,)),  # unit vector of its newest element
+        ("speed_mps", np.float64),  # Σ|e| of its elements, divided by the wake's scale
+        ("speed_carry_mps", np.float64),  # the rounding error of that sum
+        ("count", np.int64),  # its elements still in the list
+    ],
+    align=True,
+)
+
+# Survives a change of scene; owned by whoever sends the force. The host may write stop, fault and device_limit_n.
+SAFETY = np.dtype(
+    [
+        ("stop", np.int64),  # nonzero: zero force at once; back to 0: the force fades in as at the start
+        ("fault", np.int64),  # STATUS_* that stopped the force for good, until the host clears it
+        ("withheld", np.int64),  # LIMITER_* bits for which the force is fading out
+        ("started", np.int64),  # 1 after the first turn
+        ("turn_ns", np.int64),  # time of the last turn
+        ("usable_ns", np.int64),  # time of the last sample that was accepted
+        ("turn_s", np.float64),  # time since the turn before
+        ("fade", np.float64),  # share of the force that is sent, 0 … 1
+        ("fade_s", np.float64),  # how long a fade from 0 to 1 takes at present
+        ("device_limit_n", np.float64),  # the device's own force limit
+        ("sent_n", np.float64, (3,)),  # the force of the last turn
     ],
     align=True,
 )

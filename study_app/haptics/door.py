@@ -1,0 +1,96 @@
+"""Which samples enter the model, and how much time has passed: nothing doubtful gets further than here."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from study_app.haptics.compiled import kernel
+from study_app.haptics.layout import LIMITER_GLITCH, LIMITER_STALE, STATUS_OK, STATUS_STALE_FAULT, Record
+from study_app.haptics.vector import copy, distance
+
+SHORTEST_S = 0.2e-3
+LONGEST_S = 20e-3
+FASTEST_HAND_MPS = 10.0
+REFUSALS_IN_A_ROW = 5
+STALE_NS = 5_000_000
+FAULT_NS = 50_000_000
+
+
+@kernel
+def clamp(interval_s: float) -> float:
+    """Return a time between samples as the model takes it [s], whatever the clock did."""
+    return min(max(interval_s, SHORTEST_S), LONGEST_S)
+
+
+@kernel
+def admit(parameters: Record, state: Record, safety: Record, sample: Record) -> float:
+    """Take the sample's position into the scene and return Δt [s], or 0 where there is nothing to take.
+
+    Δt is the time since the last accepted sample, so that the next one covers any gap; the first takes the nominal
+    period. A position that is not finite, or that a hand of 10 m/s could not have reached within Δt, is refused; after
+    five refusals in a row estimator and wakes have lost the body, and the next finite position is a new beginning.
+    """
+    if sample.fresh == 0:
+        return 0.0
+    interval_s: float = parameters.period_s
+    if state.tracking:
+        interval_s = clamp((sample.time_ns - state.accepted_ns) * 1e-9)
+    if not _plausible(parameters, state, sample, interval_s):
+        sample.limiters |= LIMITER_GLITCH
+        state.rejected += 1
+        if state.rejected == REFUSALS_IN_A_ROW:
+            state.tracking = 0
+            safety.withheld |= LIMITER_GLITCH
+        return 0.0
+    hand_m = sample.position_m
+    copy(hand_m, state.hand_m)
+    place(state, *_in_scene(parameters, hand_m))
+    state.rejected = 0
+    state.accepted_ns = sample.time_ns
+    safety.usable_ns = sample.time_ns
+    return interval_s
+
+
+@kernel
+def place(state: Record, x_m: float, y_m: float, z_m: float) -> None:
+    """Put the body at a place of the scene; at a beginning it has always been there."""
+    copy(state.position_m, state.previous_m)
+    state.position_m[0] = x_m
+    state.position_m[1] = y_m
+    state.position_m[2] = z_m
+    if state.tracking == 0:
+        copy(state.position_m, state.previous_m)
+
+
+@kernel
+def _in_scene(parameters: Record, hand_m: Any) -> tuple[float, float, float]:
+    scale, origin_m = parameters.scale, parameters.origin_m
+    return scale * hand_m[0] + origin_m[0], scale * hand_m[1] + origin_m[1], scale * hand_m[2] + origin_m[2]
+
+
+@kernel
+def _plausible(parameters: Record, state: Record, sample: Record, interval_s: float) -> bool:
+    """Return whether the position is finite, in the scene too, and within reach of the last accepted one."""
+    x_m, y_m, z_m = _in_scene(parameters, sample.position_m)
+    if not (math.isfinite(x_m) and math.isfinite(y_m) and math.isfinite(z_m)):
+        return False
+    return state.tracking == 0 or distance(sample.position_m, state.hand_m) <= FASTEST_HAND_MPS * interval_s
+
+
+@kernel
+def watch(safety: Record, sample: Record) -> None:
+    """Say how long the turn is, and let the force go when no usable sample came: 5 ms fade, 50 ms zero and fault."""
+    if safety.started == 0:
+        safety.started = 1
+        safety.turn_ns = sample.time_ns
+        safety.usable_ns = sample.time_ns
+    safety.turn_s = min(max((sample.time_ns - safety.turn_ns) * 1e-9, 0.0), LONGEST_S)
+    safety.turn_ns = sample.time_ns
+    age_ns = sample.time_ns - safety.usable_ns
+    if age_ns == 0:
+        safety.withheld = 0
+    elif age_ns > STALE_NS:
+        safety.withheld |= LIMITER_STALE
+    if age_ns >= FAULT_NS and safety.fault == STATUS_OK:
+        safety.fault = STATUS_STALE_FAULT

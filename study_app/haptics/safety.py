@@ -1,0 +1,169 @@
+"""What is sent to the hand: always the last step of a turn, in the hand frame [N].
+
+Order: slope limit on drag, finite, norm, fade, slew; a force stop or a fault goes past all of them to zero.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from study_app.errors import StudyError
+from study_app.haptics.compiled import kernel
+from study_app.haptics.layout import (
+    EFFECT_DRAG,
+    LIMITER_FADE,
+    LIMITER_NON_FINITE,
+    LIMITER_NORM,
+    LIMITER_SLEW,
+    LIMITER_SLOPE,
+    LIMITER_STOP,
+    SAFETY,
+    STATUS_NON_FINITE,
+    Record,
+    records,
+)
+from study_app.haptics.vector import clear, copy, distance, is_finite, norm
+
+START_FADE_S = 0.5
+SCENE_FADE_S = 0.05
+FADE_OUT_S = 0.045
+SLEW_N = 0.5
+
+# Greatest damping a free 0.1 kg handle bears [N·s/m at the hand], over tick period [s] and delay [ticks].
+SLOPE_LIMITS = (
+    (0.5e-3, 4, 40.0),
+    (1e-3, 1, 60.0),
+    (1e-3, 2, 40.0),
+    (1e-3, 4, 20.0),
+    (2e-3, 1, 30.0),
+    (2e-3, 2, 20.0),
+    (2e-3, 4, 10.0),
+    (4e-3, 1, 15.0),
+    (4e-3, 2, 10.0),
+    (4e-3, 4, 6.0),
+)
+
+
+def new_safety(device_limit_n: float = math.inf) -> Any:
+    """Return one SAFETY record, shape (1,), for a servo that is about to start: no force yet, 500 ms to full force."""
+    safety = records(SAFETY, 1)
+    safety[0].fade_s = START_FADE_S
+    safety[0].device_limit_n = device_limit_n
+    return safety
+
+
+@kernel
+def begin_scene(safety: Record) -> None:
+    """Let the force of another scene fade in; a start fade that is not over begins again."""
+    safety.fade = 0.0
+
+
+@kernel
+def guard(model: Any, safety: Record, sample: Record) -> None:
+    """Turn the force of the effects into the force to be sent, ``sample.device_force_n``."""
+    parameters, state = model.parameters[0], model.state[0]
+    force_n = sample.device_force_n
+    copy(state.force_n, force_n)
+    _limit_slope(model, sample)
+    if not is_finite(force_n):
+        sample.limiters |= LIMITER_NON_FINITE
+        sample.status = STATUS_NON_FINITE
+        clear(force_n)
+    limit_n = min(parameters.force_limit_n, safety.device_limit_n)
+    _limit_norm(force_n, limit_n, sample)
+    _fade(force_n, safety, sample)
+    _limit_slew(force_n, safety, sample)
+    _limit_norm(force_n, limit_n, sample)
+    if safety.stop != 0 or safety.fault != 0:
+        _let_go(force_n, safety, sample)
+    copy(force_n, safety.sent_n)
+
+
+@kernel
+def _limit_slope(model: Any, sample: Record) -> None:
+    """Shorten each drag to F·min(1, B|w|/|F|): a secant a sampled damper of the hand's mass stays stable under.
+
+    Where the body passes between liquids they share the limit B, so that their sum keeps it.
+    """
+    parameters = model.parameters[0]
+    shares = 0.0
+    for i in range(parameters.liquids):
+        shares += model.liquid_states[i].share
+    for i in range(parameters.liquids):
+        local = model.liquid_states[i]
+        if model.liquids[i].effects & EFFECT_DRAG and local.share > 0.0:
+            drag_n = norm(local.drag.force_n)
+            most_n = parameters.slope_limit_nspm * norm(local.drag.relative_mps) * local.share / shares
+            if drag_n > most_n:
+                sample.limiters |= LIMITER_SLOPE
+                excess = 1.0 - most_n / drag_n
+                for axis in range(3):
+                    sample.device_force_n[axis] -= excess * local.drag.force_n[axis]
+
+
+@kernel
+def _limit_norm(force_n: Any, limit_n: float, sample: Record) -> None:
+    """Shorten the force to the limit, keeping its direction."""
+    size_n = norm(force_n)
+    if size_n > limit_n:
+        sample.limiters |= LIMITER_NORM
+        for axis in range(3):
+            force_n[axis] *= limit_n / size_n
+
+
+@kernel
+def _fade(force_n: Any, safety: Record, sample: Record) -> None:
+    """Weaken the force while it fades in (start 500 ms, scene 50 ms) or out (no usable sample)."""
+    if safety.withheld:
+        sample.limiters |= safety.withheld
+        safety.fade = max(safety.fade - safety.turn_s / FADE_OUT_S, 0.0)
+    else:
+        safety.fade = min(safety.fade + safety.turn_s / safety.fade_s, 1.0)
+    if safety.fade < 1.0:
+        sample.limiters |= LIMITER_FADE
+        for axis in range(3):
+            force_n[axis] *= safety.fade
+    else:
+        safety.fade_s = SCENE_FADE_S
+
+
+@kernel
+def _limit_slew(force_n: Any, safety: Record, sample: Record) -> None:
+    """Let the force move by at most 0.5 N from the one sent before."""
+    step_n = distance(force_n, safety.sent_n)
+    if step_n > SLEW_N:
+        sample.limiters |= LIMITER_SLEW
+        for axis in range(3):
+            force_n[axis] = safety.sent_n[axis] + (force_n[axis] - safety.sent_n[axis]) * SLEW_N / step_n
+
+
+@kernel
+def _let_go(force_n: Any, safety: Record, sample: Record) -> None:
+    """Zero force now; when let on again, the force fades in as at the start."""
+    if safety.stop != 0:
+        sample.limiters |= LIMITER_STOP
+    if safety.fault != 0:
+        sample.status = safety.fault
+    safety.fade = 0.0
+    safety.fade_s = START_FADE_S
+    clear(force_n)
+
+
+def slope_limit(period_s: float, delay_ticks: int) -> float:
+    """Return the greatest damping at the hand [N·s/m] for a tick period [s] and a delay of the loop [ticks].
+
+    The best of the table's entries that are no faster and no less delayed: between two, the worse one counts.
+
+    Raises
+    ------
+    StudyError
+        A loop slower or more delayed than any entry.
+    """
+    known = [limit for period, delay, limit in SLOPE_LIMITS if period >= period_s * (1 - 1e-9) and delay >= delay_ticks]
+    if not known:
+        raise StudyError(
+            f"no stable force is known for {1 / period_s:g} ticks a second with {delay_ticks} ticks of delay: "
+            "run at 250 Hz or more, with a delay of 4 ticks at most"
+        )
+    return max(known)

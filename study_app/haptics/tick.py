@@ -1,0 +1,82 @@
+"""One turn of the servo, read from top to bottom.
+
+The lines of `respond` are the pipeline; the bits of a liquid's ``effects`` say which of them run. Nothing here
+allocates, raises or waits; the servo, a rehearsal and `offline.simulate` run the same code.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from study_app.haptics.compiled import kernel
+from study_app.haptics.door import admit, watch
+from study_app.haptics.effects.drag import resist
+from study_app.haptics.effects.segments import empty
+from study_app.haptics.effects.wake import flow, follow
+from study_app.haptics.layout import EFFECT_DRAG, EFFECT_WAKE, STATUS_OK, Record
+from study_app.haptics.region import share_out
+from study_app.haptics.safety import guard
+from study_app.haptics.vector import clear, copy
+from study_app.haptics.velocity import estimate, forget
+
+
+@kernel
+def tick(model: Any, safety: Record, sample: Record) -> None:
+    """Take one reading and say what force to send.
+
+    The caller fills ``sample.time_ns``, ``position_m`` (hand frame) and ``fresh``; velocity, wake, forces, limiters and
+    status are filled here. Without a new usable sample the model rests as it is; safety goes on.
+    """
+    sample.limiters = 0
+    sample.status = STATUS_OK
+    interval_s = admit(model.parameters[0], model.state[0], safety, sample)
+    watch(safety, sample)
+    if interval_s > 0.0:
+        respond(model, interval_s)
+    report(model.state[0], sample)
+    guard(model, safety, sample)
+
+
+@kernel
+def respond(model: Any, interval_s: float) -> None:
+    """Let the liquids respond to the place the body has reached, Δt after the one before.
+
+    Every effect is evaluated before the wake takes this tick in: the first tick of a motion meets a liquid at rest.
+    """
+    parameters, state = model.parameters[0], model.state[0]
+    if state.tracking == 0:
+        begin(model)
+    estimate(parameters, state, interval_s)
+    share_out(model, interval_s)
+
+    clear(state.force_n)
+    clear(state.wake_mps)
+    for i in range(parameters.liquids):
+        liquid, local = model.liquids[i], model.liquid_states[i]
+        if local.share > 0.0:
+            clear(local.flow_mps)
+            if liquid.effects & EFFECT_WAKE:
+                flow(liquid, local, model.segments)
+            copy(local.flow_mps, state.wake_mps)
+            if liquid.effects & EFFECT_DRAG:
+                resist(liquid, local, state)
+        if liquid.effects & EFFECT_WAKE:
+            follow(liquid, local, state, model.elements, model.segments, interval_s)
+
+
+@kernel
+def begin(model: Any) -> None:
+    """Forget the motion so far: all that is known of the body is where it is."""
+    forget(model.parameters[0], model.state[0])
+    for i in range(model.parameters[0].liquids):
+        if model.liquids[i].effects & EFFECT_WAKE:
+            empty(model.liquids[i].wake, model.liquid_states[i].wake, model.segments)
+    model.state[0].tracking = 1
+
+
+@kernel
+def report(state: Record, sample: Record) -> None:
+    """Write what the liquids did into the sample."""
+    copy(state.velocity_mps, sample.velocity_mps)
+    copy(state.wake_mps, sample.wake_mps)
+    copy(state.force_n, sample.force_n)
