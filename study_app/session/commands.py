@@ -1,0 +1,82 @@
+"""What the machine wants done. The runner carries commands out in the order given; nothing else acts.
+
+The order of every list: safety of the hand first (``StopForce``, ``StopTrial``, ``Rest``), then what must be on disk
+(``Write``, ``WriteTables``), then what the participant feels and sees (``FadeIn``, ``StartTrial``, ``ShowPage``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal, TypeAlias
+
+from study_app.protocol.model import Explore, Reach
+from study_app.session.pages import Page
+
+Status: TypeAlias = Literal["completed", "withdrawn", "aborted", "broken"]
+
+
+@dataclass(frozen=True, slots=True)
+class ShowPage:
+    """Put a page before the participant."""
+
+    page: Page
+
+
+@dataclass(frozen=True, slots=True)
+class StartTrial:
+    """Load the scene of ``condition`` and follow the task. Neither condition nor delay is ever printed or logged."""
+
+    trial: int
+    attempt: int
+    task: Explore | Reach
+    condition: str = field(repr=False)
+    delay_s: float = field(repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class StopTrial:
+    """Follow the task no longer; what was measured until now stays until the next trial starts."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rest:
+    """Take the liquid away: the force fades to zero."""
+
+
+@dataclass(frozen=True, slots=True)
+class StopForce:
+    """Zero force with the next tick, and until ``FadeIn``."""
+
+
+@dataclass(frozen=True, slots=True)
+class FadeIn:
+    """Let the force come back gently."""
+
+
+@dataclass(frozen=True, slots=True)
+class Write:
+    """Put one line into the journal, on the disk before the next command.
+
+    With ``measured`` the runner adds what it measured of the trial that was stopped (``fields`` win).
+    """
+
+    event: str
+    fields: Mapping[str, Any]
+    measured: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class WriteTables:
+    """Bring the tables up to date with the journal."""
+
+
+@dataclass(frozen=True, slots=True)
+class Finish:
+    """Close the session: last line, tables, receipt."""
+
+    status: Status
+    reason: str = ""
+
+
+Command: TypeAlias = ShowPage | StartTrial | StopTrial | Rest | StopForce | FadeIn | Write | WriteTables | Finish

@@ -1,0 +1,110 @@
+"""Pages made of a session's state: the protocol's texts and the interface's words, in the participant's language."""
+
+from __future__ import annotations
+
+from study_app.protocol.schedule import PageStep
+from study_app.protocol.words import Words, words
+from study_app.session.pages import (
+    EndPage,
+    ItemView,
+    Page,
+    PausePage,
+    Progress,
+    QuestionnairePage,
+    TaskPage,
+    TextPage,
+    TroublePage,
+)
+from study_app.session.state import Phase, SessionState
+
+
+def page(state: SessionState) -> Page:
+    """Return what the participant sees in any phase but the one before the first page."""
+    match state.phase:
+        case Phase.TASK:
+            return _task_page(state)
+        case Phase.ANSWERING:
+            return _questionnaire_page(state)
+        case Phase.PAUSED:
+            return PausePage(force_off=state.force_off)
+        case Phase.TROUBLE:
+            return TroublePage(_words(state).trouble_title, _words(state).trouble_body)
+        case Phase.COMPLETE:
+            return EndPage(_words(state).end_title, _words(state).end_body)
+        case Phase.ENDED:
+            return EndPage(_words(state).ended_early_title, _words(state).ended_early_body)
+        case _:
+            return _text_page(state)
+
+
+def _words(state: SessionState) -> Words:
+    return words(state.plan.language)
+
+
+def _text(state: SessionState, value: str | dict[str, str]) -> str:
+    return state.plan.protocol.text(value, state.plan.language)
+
+
+def _text_page(state: SessionState) -> TextPage:
+    protocol, language = state.plan.protocol, state.plan.language
+    step = state.step
+    if not isinstance(step, PageStep):
+        raise TypeError(f"step {state.index} is no page to read")
+    text = protocol.pages[step.page_id]
+    return TextPage(
+        id=step.page_id,
+        kind=text.kind,
+        title=_text(state, text.title),
+        paragraphs=protocol.paragraphs(text.body, language),
+        button=_words(state).continue_ if text.button is None else _text(state, text.button),
+    )
+
+
+def _task_page(state: SessionState) -> TaskPage:
+    protocol, trial = state.plan.protocol, state.trial
+    task = protocol.tasks[protocol.blocks[trial.block].task]
+    return TaskPage(
+        trial=trial.number,
+        instruction=_text(state, task.instruction),
+        task=task,
+        delay_s=protocol.delay_s(state.plan.condition(trial)),
+        workspace_m=protocol.device.workspace_m,
+        body_radius_m=protocol.scene.body.diameter_m / 2 / protocol.scene.scale,
+        progress=_progress(state),
+    )
+
+
+def _questionnaire_page(state: SessionState) -> QuestionnairePage:
+    protocol, language, trial = state.plan.protocol, state.plan.language, state.trial
+    questionnaire = state.questionnaire
+    if questionnaire is None:
+        raise TypeError(f"block {trial.block} has no questionnaire")
+    scale = protocol.scales[questionnaire.scale]
+    items = [questionnaire.item(item) for item in trial.items]
+    label = trial.label(protocol, language)
+    return QuestionnairePage(
+        trial=trial.number,
+        title=label if questionnaire.title is None else _text(state, questionnaire.title),
+        intro=_text(state, questionnaire.intro),
+        items=tuple(
+            ItemView(item.id, number, _text(state, item.text), item.required) for number, item in enumerate(items, 1)
+        ),
+        labels=scale.labels[language],
+        cannot_judge=None if scale.cannot_judge is None else _text(state, scale.cannot_judge),
+        progress=_progress(state),
+        chosen=tuple((item, answer.value) for item, answer in state.answers.items() if answer.given),
+    )
+
+
+def _progress(state: SessionState) -> Progress | None:
+    """Return where the trial is among its part's; None outside the parts, as in a practice."""
+    protocol, trial = state.plan.protocol, state.trial
+    if trial.part is None:
+        return None
+    return Progress(
+        part=trial.part,
+        parts=protocol.parts,
+        label=trial.label(protocol, state.plan.language),
+        index=trial.index,
+        of=trial.of,
+    )

@@ -1,0 +1,251 @@
+"""What each row of the machine's table does: a state and an event in, the next state and the commands out. Pure."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, TypeAlias
+
+from study_app.errors import SessionError
+from study_app.protocol.model import POINTS
+from study_app.protocol.schedule import PageStep
+from study_app.session import compose
+from study_app.session.commands import (
+    Command,
+    FadeIn,
+    Finish,
+    Rest,
+    ShowPage,
+    StartTrial,
+    StopForce,
+    StopTrial,
+    Write,
+    WriteTables,
+)
+from study_app.session.events import (
+    Begin,
+    Broke,
+    Chosen,
+    Continue,
+    EndAsked,
+    ForceStopped,
+    ItemShown,
+    Note,
+    PauseAsked,
+    RepeatAsked,
+    ResumeAsked,
+    Submitted,
+    TaskDone,
+)
+from study_app.session.state import Answer, Phase, SessionState
+
+Commands: TypeAlias = tuple[Command, ...]
+Result: TypeAlias = tuple[SessionState, Commands]
+
+
+def begin(state: SessionState, _event: Begin) -> Result:
+    """Go to the first step."""
+    return _enter(state, 0)
+
+
+def read_on(state: SessionState, _event: Continue) -> Result:
+    """Leave a page that was read."""
+    step = state.step
+    left = (Write("page_left", {"page": step.page_id}),) if isinstance(step, PageStep) else ()
+    return _enter(state, state.index + 1, left)
+
+
+def end_task(state: SessionState, event: TaskDone) -> Result:
+    """Take the liquid away, keep what was measured, and ask or go on."""
+    ended = Write("trial_ended", {**_which(state), "outcome": event.outcome, **event.summary})
+    done: Commands = (StopTrial(), Rest(), ended)
+    if state.questionnaire is None:
+        return _enter(state, state.index + 1, done)
+    asking = replace(state, phase=Phase.ANSWERING, answers={})
+    return asking, (*done, WriteTables(), _show(asking))
+
+
+def show_item(state: SessionState, event: ItemShown) -> Result:
+    """Keep when a statement was first shown."""
+    _check_item(state, event.item)
+    answer = state.answers.get(event.item, Answer())
+    if answer.onset_s is None:
+        answer = replace(answer, onset_s=event.at_s)
+    written = Write("item_shown", {"trial": state.trial.number, "item": event.item})
+    return _with_answer(state, event.item, answer), (written,)
+
+
+def choose(state: SessionState, event: Chosen) -> Result:
+    """Keep a choice; the last one counts."""
+    _check_item(state, event.item)
+    _check_value(state, event.value)
+    answer = state.answers.get(event.item, Answer())
+    if not answer.given:
+        answer = replace(answer, first_s=event.at_s, last_s=event.at_s, value=event.value)
+    elif answer.value != event.value:
+        answer = replace(answer, last_s=event.at_s, value=event.value, changes=answer.changes + 1)
+    written = Write("choice", {"trial": state.trial.number, "item": event.item, "value": event.value})
+    return _with_answer(state, event.item, answer), (written,)
+
+
+def submit(state: SessionState, _event: Submitted) -> Result:
+    """Keep the responses and go on, if every required statement has its answer."""
+    if missing := _missing(state):
+        listed = ", ".join(map(str, missing))
+        raise SessionError(f"not every required statement is answered: answer {listed} first")
+    return _enter(state, state.index + 1, (Write("responses", {**_which(state), "items": _responses(state)}),))
+
+
+def pause(state: SessionState, event: PauseAsked) -> Result:
+    """Show the pause; a task under way is over as an attempt."""
+    paused = replace(state, phase=Phase.PAUSED, interrupted=state.phase)
+    return paused, (*_break_off(state), Write("paused", {"by": event.by}), WriteTables(), _show(paused))
+
+
+def stay(state: SessionState, _event: PauseAsked) -> Result:
+    """Do nothing."""
+    return state, ()
+
+
+def resume(state: SessionState, event: ResumeAsked) -> Result:
+    """Go back to what was interrupted, with the force if it was off."""
+    back: Commands = (Write("resumed", {}),)
+    if state.force_off:
+        back = (*back, Write("force_restored", {}), FadeIn())
+    state = replace(state, phase=state.interrupted or Phase.READING, interrupted=None, force_off=False)
+    if state.phase is Phase.TASK:
+        return _start_trial(replace(state, attempt=state.attempt + 1), back)
+    return state, (*back, _show(state))
+
+
+def stop_force(state: SessionState, event: ForceStopped) -> Result:
+    """Switch the force off and pause."""
+    stopped = Write("force_stopped", {"by": event.by})
+    if state.phase is Phase.PAUSED:
+        paused = replace(state, force_off=True)
+        return paused, (StopForce(), stopped, _show(paused))
+    paused = replace(state, phase=Phase.PAUSED, interrupted=state.phase, force_off=True)
+    pausing = (Write("paused", {"by": event.by}), WriteTables(), _show(paused))
+    return paused, (StopForce(), *_break_off(state), stopped, *pausing)
+
+
+def stop_force_again(state: SessionState, event: ForceStopped) -> Result:
+    """Switch off a force that is off already, and say who wanted so."""
+    return state, (StopForce(), Write("force_stopped", {"by": event.by}))
+
+
+def stop_force_after_end(state: SessionState, _event: ForceStopped) -> Result:
+    """Switch the force off; the journal is closed."""
+    return state, (StopForce(),)
+
+
+def repeat(state: SessionState, event: RepeatAsked) -> Result:
+    """Present the trial again, keeping the attempt that was."""
+    if not event.reason.strip():
+        raise SessionError("a trial is repeated for a reason: write one")
+    asked = Write("repeat", {"trial": state.trial.number, "reason": event.reason})
+    return _start_trial(replace(state, attempt=state.attempt + 1), (*_break_off(state), asked))
+
+
+def note(state: SessionState, event: Note) -> Result:
+    """Keep what the operator noted."""
+    return state, (Write("note", {"kind": event.kind, "text": event.text}), WriteTables())
+
+
+def end(state: SessionState, event: EndAsked) -> Result:
+    """End early; a session in trouble that nobody withdrew from counts as broken."""
+    broken = state.phase is Phase.TROUBLE and event.status == "aborted"
+    ended = replace(state, phase=Phase.ENDED, interrupted=None)
+    finish = Finish("broken" if broken else event.status, event.reason)
+    return ended, (*_break_off(state), finish, _show(ended))
+
+
+def call_operator(state: SessionState, event: Broke) -> Result:
+    """Keep the force off and everything on the disk, and wait for the operator."""
+    trouble = replace(state, phase=Phase.TROUBLE, interrupted=None, force_off=True)
+    written = (Write("broke", {"what": event.what}), WriteTables())
+    return trouble, (StopForce(), *_break_off(state), *written, _show(trouble))
+
+
+def _enter(state: SessionState, index: int, done: Commands = ()) -> Result:
+    """Go to the step at ``index``; ``done`` comes first and finishes the step before."""
+    state = replace(state, index=index, attempt=1, answers={})
+    step = state.step
+    if step is None:
+        state = replace(state, phase=Phase.COMPLETE)
+        return state, (*done, Finish("completed"), _show(state))
+    if not isinstance(step, PageStep):
+        return _start_trial(state, done)
+    state = replace(state, phase=Phase.READING)
+    return state, (*done, Write("page_shown", {"page": step.page_id}), WriteTables(), _show(state))
+
+
+def _start_trial(state: SessionState, done: Commands) -> Result:
+    state = replace(state, phase=Phase.TASK, answers={})
+    trial, protocol = state.trial, state.plan.protocol
+    condition = state.plan.condition(trial)
+    told = {name: getattr(trial, name) for name in ("block", "phase", "part", "index", "of", "code")}
+    start = StartTrial(
+        trial=trial.number,
+        attempt=state.attempt,
+        task=protocol.tasks[protocol.blocks[trial.block].task],
+        condition=condition,
+        delay_s=protocol.delay_s(condition),
+    )
+    written = Write("trial_started", {**_which(state), **told})
+    return state, (*done, written, WriteTables(), start, _show(state))
+
+
+def _break_off(state: SessionState) -> Commands:
+    """End a task that is under way, with what was measured of it until now."""
+    if state.phase is not Phase.TASK:
+        return ()
+    return (StopTrial(), Rest(), Write("trial_ended", {**_which(state), "outcome": "interrupted"}, measured=True))
+
+
+def _which(state: SessionState) -> dict[str, Any]:
+    return {"trial": state.trial.number, "attempt": state.attempt}
+
+
+def _show(state: SessionState) -> ShowPage:
+    return ShowPage(compose.page(state))
+
+
+def _with_answer(state: SessionState, item: str, answer: Answer) -> SessionState:
+    return replace(state, answers={**state.answers, item: answer})
+
+
+def _check_item(state: SessionState, item: str) -> None:
+    if item not in state.trial.items:
+        listed = ", ".join(state.trial.items)
+        raise SessionError(f"item {item!r} is not on this page: its items are {listed}")
+
+
+def _check_value(state: SessionState, value: int | None) -> None:
+    questionnaire = state.questionnaire
+    scale = None if questionnaire is None else state.plan.protocol.scales[questionnaire.scale]
+    if value is None and (scale is None or scale.cannot_judge is None):
+        raise SessionError("this questionnaire has no answer off the scale: choose one of its points")
+    if value is not None and not 1 <= value <= POINTS:
+        raise SessionError(f"answer {value} is not on the scale: choose 1 to {POINTS}")
+
+
+def _missing(state: SessionState) -> list[int]:
+    """Return the numbers of the required statements without an answer."""
+    questionnaire = state.questionnaire
+    return [
+        number
+        for number, item in enumerate(state.trial.items, start=1)
+        if questionnaire is not None
+        and questionnaire.item(item).required
+        and not state.answers.get(item, Answer()).given
+    ]
+
+
+def _responses(state: SessionState) -> list[dict[str, Any]]:
+    """Return every statement in the order shown; one that was left out has no ``first_s``."""
+    rows = []
+    for number, item in enumerate(state.trial.items, start=1):
+        answer = state.answers.get(item, Answer())
+        times = {"onset_s": answer.onset_s, "first_s": answer.first_s, "last_s": answer.last_s}
+        rows.append({"item": item, "number": number, "value": answer.value, **times, "changes": answer.changes})
+    return rows

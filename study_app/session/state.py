@@ -1,0 +1,104 @@
+"""Where a session is: one frozen value, changed only by ``machine.advance``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+
+from study_app.errors import SessionError
+from study_app.protocol.model import Protocol, Questionnaire
+from study_app.protocol.schedule import Schedule, Step, Trial
+
+
+class Phase(Enum):
+    """What the participant is doing."""
+
+    OPENING = "opening"
+    READING = "reading"
+    TASK = "task"
+    ANSWERING = "answering"
+    PAUSED = "paused"
+    TROUBLE = "trouble"
+    COMPLETE = "complete"
+    ENDED = "ended"
+
+
+FINAL = frozenset({Phase.COMPLETE, Phase.ENDED})
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What stays the same through a session; ``key`` (block → code → condition) is blinded and never printed."""
+
+    protocol: Protocol = field(repr=False)
+    schedule: Schedule
+    key: Mapping[str, Mapping[str, str]] = field(repr=False)
+    language: str
+
+    def condition(self, trial: Trial) -> str:
+        """Return the condition behind a trial's code."""
+        return self.key[trial.block][trial.code]
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """How one statement was answered; times are seconds on the session's clock.
+
+    ``first_s`` is None until the first choice; ``value`` None then means "cannot judge". ``last_s`` is the last time
+    the value changed, ``changes`` how often it did after the first choice.
+    """
+
+    onset_s: float | None = None
+    first_s: float | None = None
+    last_s: float | None = None
+    changes: int = 0
+    value: int | None = None
+
+    @property
+    def given(self) -> bool:
+        """Whether anything was chosen."""
+        return self.first_s is not None
+
+
+@dataclass(frozen=True, slots=True)
+class SessionState:
+    """The session at one moment.
+
+    ``index`` counts the schedule's steps (−1 before the first, their number after the last), ``attempt`` the
+    presentations of the present trial from 1. ``answers`` holds the statements of the present questionnaire that were
+    shown or answered. ``interrupted`` is the phase that a pause goes back to. ``force_off`` says that the force was
+    stopped and has not been faded in again.
+    """
+
+    plan: Plan = field(repr=False)
+    phase: Phase = Phase.OPENING
+    index: int = -1
+    attempt: int = 1
+    answers: Mapping[str, Answer] = field(default_factory=dict)
+    interrupted: Phase | None = None
+    force_off: bool = False
+
+    @property
+    def step(self) -> Step | None:
+        """The step under way; None before the first and after the last."""
+        steps = self.plan.schedule.steps
+        return steps[self.index] if 0 <= self.index < len(steps) else None
+
+    @property
+    def trial(self) -> Trial:
+        """The trial under way.
+
+        Raises
+        ------
+        SessionError
+            No trial is under way.
+        """
+        if isinstance(step := self.step, Trial):
+            return step
+        raise SessionError("no trial is under way: wait for the next one")
+
+    @property
+    def questionnaire(self) -> Questionnaire | None:
+        """What is answered after the trial under way."""
+        return self.plan.protocol.questionnaire_of(self.trial.block)

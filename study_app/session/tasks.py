@@ -1,0 +1,215 @@
+"""What the participant does in the tank, decided on the device's clock and drawn later.
+
+A tracker eats samples and knows two things: whether the task is over, and what it looked like at any moment since it
+began. Whoever draws asks for (now − delay), so that lit target, dwell arc and count are as old as the proxy; whoever
+decides never waits for the screen.
+
+The task begins with the first sample fed. A target is entered by the first sample whose proxy centre lies within its
+radius (border included), and is reached by the first sample at which the proxy has been inside without a break for the
+dwell time. Leaving starts the dwell anew. The next target lights up with the sample that reached the one before, and is
+entered by a later sample at the earliest.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from dataclasses import dataclass
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study_app.protocol.model import Explore, Reach
+
+Outcome: TypeAlias = Literal["complete", "timeout"]
+
+_NS = 1_000_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class TaskView:
+    """What is to be drawn of a task at one moment.
+
+    ``lit`` is the index of the lit target or None, ``reached`` how many were reached and ``of`` how many there are to
+    reach (None where time ends the task), ``dwell`` the closed share of the ring in 0 … 1, ``elapsed_s`` the time since
+    the task began.
+    """
+
+    lit: int | None
+    reached: int
+    of: int | None
+    dwell: float
+    elapsed_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class TargetReached:
+    """Target ``target`` (index into the task's list) was reached ``t_task_s`` after the task began."""
+
+    target: int
+    t_task_s: float
+
+
+class Tracker:
+    """Follows one task through the samples of its trial; ``track(task)`` makes the right one.
+
+    ``outcome`` and ``end_ns`` (time of the sample that ended the task) are None while it goes on.
+    """
+
+    def __init__(self, limit_s: float, at_limit: Outcome) -> None:
+        self.outcome: Outcome | None = None
+        self.end_ns: int | None = None
+        self._limit_ns = _nanoseconds(limit_s)
+        self._at_limit = at_limit
+        self._start_ns: int | None = None
+        self._newest_ns = 0
+
+    @property
+    def done(self) -> bool:
+        """Whether the task is over."""
+        return self.outcome is not None
+
+    def feed(self, samples: Any) -> list[TargetReached]:
+        """Take the next samples, in order (fields ``time_ns`` and ``position_m``); say which targets were reached."""
+        if self.done or len(samples) == 0:
+            return []
+        times: NDArray[np.int64] = samples["time_ns"]
+        if self._start_ns is None:
+            self._start_ns = self._newest_ns = int(times[0])
+        limit_ns = self._start_ns + self._limit_ns
+        kept = int(np.searchsorted(times, limit_ns)) + 1
+        times = times[:kept]
+        reached = self._follow(times, samples["position_m"][:kept])
+        if not self.done:
+            self._newest_ns = int(times[-1])
+            if self._newest_ns >= limit_ns:
+                self._finish(self._at_limit, self._newest_ns)
+        return reached
+
+    def leave(self) -> bool:
+        """End the task because the participant wants to go on; say whether it may end so already."""
+        return False
+
+    def at(self, time_ns: int) -> TaskView:
+        """Return what the task looked like at ``time_ns``; before it began as at its beginning."""
+        start_ns = self._start_ns
+        if start_ns is None:
+            return self._view(0, 0)
+        time_ns = min(max(time_ns, start_ns), self._newest_ns)
+        return self._view(time_ns, time_ns - start_ns)
+
+    def now(self) -> TaskView:
+        """Return what the task looks like at the newest sample: to decide by, never for the participant."""
+        return self.at(self._newest_ns)
+
+    def summary(self) -> dict[str, Any]:
+        """Return the task's part of the trial row: duration [s] up to now, targets reached and asked for."""
+        duration_ns = 0 if self._start_ns is None else self._newest_ns - self._start_ns
+        return {"duration_s": duration_ns / _NS, "targets_reached": None, "targets": None}
+
+    def _follow(self, _times: NDArray[np.int64], _positions: NDArray[np.float64]) -> list[TargetReached]:
+        return []
+
+    def _view(self, _time_ns: int, elapsed_ns: int) -> TaskView:
+        return TaskView(lit=None, reached=0, of=None, dwell=0.0, elapsed_s=elapsed_ns / _NS)
+
+    def _finish(self, outcome: Outcome, end_ns: int) -> None:
+        self.outcome, self.end_ns, self._newest_ns = outcome, end_ns, end_ns
+
+
+class ExploreTracker(Tracker):
+    """Free exploration: the participant may go on after the least time and must after the longest."""
+
+    def __init__(self, task: Explore) -> None:
+        super().__init__(task.max_s, "complete")
+        self._least_ns = _nanoseconds(task.min_s)
+
+    def leave(self) -> bool:
+        """End the exploration if it has had its least time."""
+        if self.done or self._start_ns is None or self._newest_ns - self._start_ns < self._least_ns:
+            return False
+        self._finish("complete", self._newest_ns)
+        return True
+
+
+@dataclass(frozen=True, slots=True)
+class _Mark:
+    """From one moment on: how many were reached, which target is lit, since when the proxy is inside it [ns]."""
+
+    reached: int
+    lit: int | None
+    entered_ns: int | None = None
+
+
+class ReachTracker(Tracker):
+    """Reaching: the lit target alternates through the list until enough were reached or the time is over."""
+
+    def __init__(self, task: Reach) -> None:
+        if task.duration_s is None:
+            super().__init__(task.timeout_s, "timeout")
+        else:
+            super().__init__(task.duration_s, "complete")
+        self._targets_m = np.asarray(task.targets_m, np.float64)
+        self._radius_m = task.radius_m
+        self._dwell_ns = _nanoseconds(task.dwell_s)
+        self._count = task.count
+        self._marks = [_Mark(reached=0, lit=0)]
+        self._mark_times = [0]
+
+    def summary(self) -> dict[str, Any]:
+        """Return the task's part of the trial row."""
+        return super().summary() | {"targets_reached": self._marks[-1].reached, "targets": self._count}
+
+    def _view(self, time_ns: int, elapsed_ns: int) -> TaskView:
+        mark = self._marks[max(bisect_right(self._mark_times, time_ns) - 1, 0)]
+        dwell = 0.0
+        if mark.entered_ns is not None and self._dwell_ns:
+            dwell = min((time_ns - mark.entered_ns) / self._dwell_ns, 1.0)
+        return TaskView(mark.lit, mark.reached, self._count, dwell, elapsed_ns / _NS)
+
+    def _follow(self, times: NDArray[np.int64], positions: NDArray[np.float64]) -> list[TargetReached]:
+        """Walk from change to change; ``times`` (n,) [ns], ``positions`` (n, 3) [m]."""
+        reached: list[TargetReached] = []
+        first = 0
+        while first < len(times) and (lit := self._marks[-1].lit) is not None:
+            offset = positions[first:] - self._targets_m[lit]
+            inside = np.einsum("ij,ij->i", offset, offset) <= self._radius_m**2
+            entered_ns = self._marks[-1].entered_ns
+            if entered_ns is None:
+                if not inside.any():
+                    break
+                before = int(inside.argmax())
+                first, inside = first + before, inside[before:]
+                entered_ns = int(times[first])
+                self._mark(entered_ns, entered_ns)
+            left = len(times) if inside.all() else first + int(inside.argmin())
+            held = first + int(np.searchsorted(times[first:], entered_ns + self._dwell_ns))
+            if held < left:
+                reached.append(self._reach(int(times[held]), lit))
+            elif left < len(times):
+                self._mark(int(times[left]), None)
+            first = min(held, left) + 1
+        return reached
+
+    def _mark(self, time_ns: int, entered_ns: int | None) -> None:
+        before = self._marks[-1]
+        self._mark_times.append(time_ns)
+        self._marks.append(_Mark(before.reached, before.lit, entered_ns))
+
+    def _reach(self, time_ns: int, lit: int) -> TargetReached:
+        reached = self._marks[-1].reached + 1
+        enough = reached == self._count
+        self._mark_times.append(time_ns)
+        self._marks.append(_Mark(reached, None if enough else reached % len(self._targets_m)))
+        if enough:
+            self._finish("complete", time_ns)
+        return TargetReached(lit, (time_ns - (self._start_ns or 0)) / _NS)
+
+
+def track(task: Explore | Reach) -> Tracker:
+    """Return a tracker at the beginning of ``task``."""
+    return ReachTracker(task) if isinstance(task, Reach) else ExploreTracker(task)
+
+
+def _nanoseconds(seconds: float) -> int:
+    return round(seconds * _NS)

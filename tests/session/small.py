@@ -1,0 +1,148 @@
+"""A small study with everything a session can meet, and the steps to walk through it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from study_app.haptics.layout import SAMPLE
+from study_app.protocol.model import Protocol
+from study_app.protocol.schedule import build_schedule, draw_key, stream
+from study_app.session.events import Begin, Chosen, Continue, ItemShown, Submitted, TaskDone
+from study_app.session.machine import advance, open_session
+from study_app.session.state import Phase, SessionState
+
+# Numbers that occur nowhere by chance, so that a leak can be searched for.
+ODD_DELAY_MS = 137.0
+ODD_DENSITY = 1013.7
+
+SCALE = [f"point {number}" for number in range(1, 8)]
+
+
+def _item(name: str, *, required: bool = True) -> dict[str, Any]:
+    return {"id": name, "text": f"Statement {name}.", "short": name, "required": required}
+
+
+def _block(**keys: Any) -> dict[str, Any]:
+    return {"title": "Block", "setting_label": "Setting", "task": "explore", **keys}
+
+
+TABLES: dict[str, Any] = {
+    "format": 1,
+    "study": {"name": "small", "title": "Small", "version": "1", "languages": ["en"]},
+    "device": {"workspace_mm": [100, 60, 60]},
+    "liquids": {"thin": {"density_kg_m3": ODD_DENSITY}, "thick": {"density_kg_m3": 1450.3}},
+    "conditions": {
+        "is_thin": {"liquid": "thin"},
+        "is_thick": {"liquid": "thick"},
+        "on_time": {"liquid": "thin", "delay_ms": 0},
+        "is_late": {"liquid": "thin", "delay_ms": ODD_DELAY_MS},
+    },
+    "tasks": {
+        "explore": {"kind": "explore", "min_s": 1, "max_s": 3, "instruction": "Explore."},
+        "reach": {
+            "kind": "reach",
+            "targets_mm": [[-20, 0, 0], [20, 0, 0]],
+            "radius_mm": 5,
+            "dwell_s": 0.25,
+            "count": 2,
+            "timeout_s": 10,
+            "instruction": "Reach.",
+        },
+        "warm_up": {
+            "kind": "reach",
+            "targets_mm": [[-20, 0, 0], [20, 0, 0]],
+            "radius_mm": 5,
+            "dwell_s": 0.25,
+            "duration_s": 2,
+            "instruction": "Reach.",
+        },
+    },
+    "scales": {
+        "judged": {"labels": {"en": SCALE}, "cannot_judge": "Cannot judge"},
+        "plain": {"labels": {"en": SCALE}},
+    },
+    "questionnaires": {
+        "feel": {
+            "intro": "How was it?",
+            "scale": "judged",
+            "items": [_item("liquid"), _item("strong"), _item("spare", required=False)],
+        },
+        "see": {"title": "What you saw", "intro": "How was it?", "scale": "plain", "items": [_item("different")]},
+    },
+    "pages": {
+        "welcome": {"kind": "consent", "title": "Welcome", "body": "One.\n\nTwo.", "button": "I agree"},
+        "thanks": {"kind": "debrief", "title": "Thanks", "body": "Bye."},
+    },
+    "blocks": {
+        "practice": _block(phase="practice", conditions=["is_thick"]),
+        "feeling": _block(
+            part=1, code_prefix="L", conditions=["is_thin", "is_thick"], order="shuffled", questionnaire="feel"
+        ),
+        "baseline": _block(phase="baseline", part=2, conditions=["on_time"], task="warm_up"),
+        "seeing": _block(
+            part=2,
+            code_prefix="D",
+            conditions=["on_time", "is_late"],
+            order="shuffled",
+            task="reach",
+            questionnaire="see",
+        ),
+    },
+    "sequence": ["welcome", "practice", "feeling", "baseline", "seeing", "thanks"],
+}
+
+RESPONSES = 2 * 3 + 2 * 1
+
+
+def protocol() -> Protocol:
+    """Return the study as a value."""
+    return Protocol.model_validate(TABLES)
+
+
+def opened(seed: int = 1) -> SessionState:
+    """Return a session before its first event."""
+    study = protocol()
+    return open_session(study, build_schedule(study, "P001", seed), draw_key(study, stream(seed, "key").random), "en")
+
+
+def next_event(state: SessionState, at_s: float) -> Any:
+    """Return an event that brings a session without incidents one step further."""
+    match state.phase:
+        case Phase.OPENING:
+            return Begin(at_s)
+        case Phase.READING:
+            return Continue(at_s)
+        case Phase.TASK:
+            return TaskDone(at_s, "complete", {"duration_s": 1.5})
+        case Phase.ANSWERING:
+            unseen = [item for item in state.trial.items if item not in state.answers]
+            if unseen:
+                return ItemShown(at_s, unseen[0])
+            open_ = [item for item in state.trial.items if not state.answers[item].given]
+            return Chosen(at_s, open_[0], 4) if open_ else Submitted(at_s)
+        case _:
+            raise AssertionError(state.phase)
+
+
+def walk(state: SessionState, until: Phase, *, times: int = 1, at_s: float = 0.0) -> SessionState:
+    """Walk on without incidents until ``until`` was entered ``times`` times."""
+    while times:
+        before = state.phase, state.index
+        state, _ = advance(state, next_event(state, at_s))
+        at_s += 1.0
+        times -= state.phase is until and (state.phase, state.index) != before
+    return state
+
+
+def samples(times_s: Any, positions_m: Any, **fields: Any) -> Any:
+    """Return telemetry: times (n,) [s], positions (n, 3) [m]; other fields as given."""
+    times_s = np.asarray(times_s, np.float64)
+    made = np.zeros(len(times_s), SAMPLE).view(np.recarray)
+    made.time_ns = np.round(times_s * 1e9).astype(np.int64)
+    made.position_m = positions_m
+    made.fresh = 1
+    for name, value in fields.items():
+        made[name] = value
+    return made

@@ -1,0 +1,475 @@
+"""The machine: walked row by row, refused where there is no row, and driven at random."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, get_args
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from study_app.errors import SessionError
+from study_app.protocol.model import Protocol
+from study_app.protocol.schedule import Trial, build_schedule
+from study_app.session.commands import (
+    FadeIn,
+    Finish,
+    Rest,
+    ShowPage,
+    StartTrial,
+    StopForce,
+    StopTrial,
+    Write,
+    WriteTables,
+)
+from study_app.session.events import (
+    Begin,
+    Broke,
+    Chosen,
+    Continue,
+    EndAsked,
+    Event,
+    ForceStopped,
+    ItemShown,
+    Note,
+    PauseAsked,
+    RepeatAsked,
+    ResumeAsked,
+    Submitted,
+    TaskDone,
+)
+from study_app.session.machine import TRANSITIONS, advance, open_session
+from study_app.session.pages import EndPage, PausePage, QuestionnairePage, TaskPage, TextPage, TroublePage
+from study_app.session.state import FINAL, Phase, SessionState
+from tests.session import small
+
+EVENTS = get_args(Event)
+
+
+def state_in(phase: Phase) -> SessionState:
+    """Return a session in that phase, in its first main trial where there is one."""
+    if phase is Phase.OPENING:
+        return small.opened()
+    if phase is Phase.COMPLETE:
+        return small.walk(small.opened(), Phase.COMPLETE)
+    answering = small.walk(small.opened(), Phase.ANSWERING)
+    match phase:
+        case Phase.READING:
+            return small.walk(small.opened(), Phase.READING)
+        case Phase.TASK:
+            return small.walk(small.opened(), Phase.TASK, times=2)
+        case Phase.ANSWERING:
+            for item in answering.trial.items:
+                answering, _ = advance(answering, Chosen(9.0, item, 5))
+            return answering
+        case Phase.PAUSED:
+            return advance(answering, PauseAsked(9.0, "operator"))[0]
+        case Phase.TROUBLE:
+            return advance(answering, Broke(9.0, "cable"))[0]
+        case _:
+            return advance(answering, EndAsked(9.0, "withdrawn", ""))[0]
+
+
+def event_of(kind: type[Any]) -> Any:
+    """Return an event of that kind that says nothing impossible."""
+    more: dict[type[Any], tuple[Any, ...]] = {
+        TaskDone: ("complete", {"duration_s": 2.0}),
+        ItemShown: ("liquid",),
+        Chosen: ("liquid", 3),
+        PauseAsked: ("participant",),
+        ForceStopped: ("device",),
+        Note: ("note", "spilled, coffee"),
+        RepeatAsked: ("a call",),
+        EndAsked: ("aborted", "fire drill"),
+        Broke: ("no sample for 50 ms",),
+    }
+    return kind(50.0, *more.get(kind, ()))
+
+
+def written(commands: tuple[Any, ...]) -> list[str]:
+    return [command.event for command in commands if isinstance(command, Write)]
+
+
+def shown(commands: tuple[Any, ...]) -> Any:
+    return next((command.page for command in commands if isinstance(command, ShowPage)), None)
+
+
+@pytest.mark.parametrize("kind", EVENTS, ids=lambda kind: kind.__name__)
+@pytest.mark.parametrize("phase", Phase, ids=lambda phase: phase.value)
+def test_every_pair_is_a_row_of_the_table_or_is_refused_and_changes_nothing(phase: Phase, kind: type[Any]) -> None:
+    state = state_in(phase)
+    before = replace(state)
+    if (phase, kind) in TRANSITIONS:
+        advance(state, event_of(kind))
+    else:
+        with pytest.raises(SessionError, match=rf"{kind.__name__} cannot happen while {phase.value}"):
+            advance(state, event_of(kind))
+    assert state == before
+
+
+def test_every_row_of_the_table_is_for_an_event_and_a_phase_that_exist() -> None:
+    assert all(phase in Phase and kind in EVENTS for phase, kind in TRANSITIONS)
+    assert len(TRANSITIONS) == len(set(TRANSITIONS))
+
+
+def test_a_session_goes_through_its_schedule_and_ends_complete() -> None:
+    state, pages, trials = small.opened(), [], []
+    while state.phase not in FINAL:
+        state, commands = advance(state, small.next_event(state, 1.0))
+        page = shown(commands)
+        if page is not None:
+            pages.append(page)
+        trials += [command.fields for command in commands if isinstance(command, Write) and "of" in command.fields]
+    assert state.phase is Phase.COMPLETE
+    assert [type(page) for page in pages] == [
+        TextPage,
+        TaskPage,  # practice: no questionnaire
+        *[TaskPage, QuestionnairePage] * 2,
+        TaskPage,  # baseline: no questionnaire
+        *[TaskPage, QuestionnairePage] * 2,
+        TextPage,
+        EndPage,
+    ]
+    schedule = state.plan.schedule
+    assert [trial["code"] for trial in trials] == [trial.code for trial in schedule.trials]
+    assert [trial["trial"] for trial in trials] == [1, 2, 3, 4, 5, 6]
+    assert trials[1] == {
+        "trial": 2,
+        "attempt": 1,
+        "block": "feeling",
+        "phase": "main",
+        "part": 1,
+        "index": 1,
+        "of": 2,
+        "code": schedule.trials[1].code,
+    }
+
+
+def test_a_page_to_read_holds_the_protocols_texts_and_the_interfaces_word_where_it_has_none() -> None:
+    _, commands = advance(small.opened(), Begin(0.0))
+    page = shown(commands)
+    assert (page.id, page.kind, page.title, page.paragraphs) == ("welcome", "consent", "Welcome", ("One.", "Two."))
+    assert page.button == "I agree"
+    state = small.walk(small.opened(), Phase.READING, times=2)
+    assert shown(advance(advance(state, PauseAsked(1.0, "operator"))[0], ResumeAsked(2.0))[1]).button == "Continue"
+
+
+def test_leaving_a_page_is_written_and_so_is_the_next() -> None:
+    _, commands = advance(state_in(Phase.READING), Continue(3.0))
+    assert commands[0] == Write("page_left", {"page": "welcome"})
+    assert written(commands) == ["page_left", "trial_started"]
+
+
+def test_a_trial_starts_its_scene_and_task_before_it_is_shown() -> None:
+    state, commands = advance(state_in(Phase.READING), Continue(3.0))
+    assert [type(command) for command in commands] == [Write, Write, WriteTables, StartTrial, ShowPage]
+    start, page = commands[-2], shown(commands)
+    assert (start.trial, start.attempt, start.condition) == (1, 1, "is_thick")
+    assert page.task == start.task == state.plan.protocol.tasks["explore"]
+    assert page.workspace_m == (0.1, 0.06, 0.06)
+    assert page.body_radius_m == pytest.approx(0.0034)
+    assert page.progress is None  # practice is in no part
+
+
+def test_the_scene_of_a_trial_is_the_one_behind_its_code() -> None:
+    state = state_in(Phase.TASK)
+    paused, _ = advance(state, PauseAsked(1.0, "operator"))
+    _, commands = advance(paused, ResumeAsked(2.0))
+    (start,) = [command for command in commands if isinstance(command, StartTrial)]
+    assert start.condition == state.plan.key["feeling"][state.trial.code]
+
+
+def test_the_page_of_a_delayed_trial_asks_for_that_delay() -> None:
+    state, pages = small.opened(), []
+    while state.phase not in FINAL:
+        state, commands = advance(state, small.next_event(state, 1.0))
+        if isinstance(shown(commands), TaskPage):
+            pages.append((state.trial, shown(commands)))
+    delays = {trial.code: page.delay_s for trial, page in pages if trial.block == "seeing"}
+    key = small.opened().plan.key["seeing"]
+    late = small.ODD_DELAY_MS / 1000
+    assert delays == {code: late if condition == "is_late" else 0.0 for code, condition in key.items()}
+
+
+def test_progress_names_part_setting_and_place_by_neutral_words() -> None:
+    _, commands = advance(small.walk(small.opened(), Phase.TASK, times=2), event_of(TaskDone))
+    progress = shown(commands).progress
+    assert (progress.part, progress.parts, progress.label, progress.index, progress.of) == (1, 2, "Setting 1", 1, 2)
+
+
+def test_the_end_of_a_task_takes_the_liquid_away_first_and_keeps_what_was_measured() -> None:
+    state, commands = advance(state_in(Phase.TASK), TaskDone(9.0, "timeout", {"duration_s": 3.0}))
+    assert commands[:2] == (StopTrial(), Rest())
+    assert commands[2].fields == {"trial": 2, "attempt": 1, "outcome": "timeout", "duration_s": 3.0}
+    assert state.phase is Phase.ANSWERING
+
+
+def test_a_questionnaire_holds_the_statements_in_the_order_of_the_trial() -> None:
+    _, commands = advance(state_in(Phase.TASK), event_of(TaskDone))
+    page = shown(commands)
+    assert [(item.id, item.number, item.required) for item in page.items] == [
+        ("liquid", 1, True),
+        ("strong", 2, True),
+        ("spare", 3, False),
+    ]
+    assert (page.title, page.labels, page.cannot_judge) == ("Setting 1", tuple(small.SCALE), "Cannot judge")
+
+
+def test_times_and_changes_of_an_answer_are_kept() -> None:
+    state = small.walk(small.opened(), Phase.ANSWERING)
+    for event in (
+        ItemShown(10.0, "liquid"),
+        ItemShown(11.0, "liquid"),  # again after a pause: the first counts
+        Chosen(12.0, "liquid", 3),
+        Chosen(13.0, "liquid", 3),  # the same again is no change
+        Chosen(14.0, "liquid", None),
+        Chosen(15.0, "liquid", 6),
+        Chosen(16.0, "strong", None),
+    ):
+        state, commands = advance(state, event)
+        assert len(commands) == 1
+        assert isinstance(commands[0], Write)
+    _, commands = advance(state, Submitted(20.0))
+    first, second, third = commands[0].fields["items"]
+    assert first == {
+        "item": "liquid",
+        "number": 1,
+        "value": 6,
+        "onset_s": 10.0,
+        "first_s": 12.0,
+        "last_s": 15.0,
+        "changes": 2,
+    }
+    assert (second["value"], second["first_s"], second["onset_s"]) == (None, 16.0, None)  # cannot judge
+    assert (third["value"], third["first_s"], third["changes"]) == (None, None, 0)  # left out
+
+
+def test_a_questionnaire_with_a_required_statement_open_is_refused_by_its_number() -> None:
+    state, _ = advance(small.walk(small.opened(), Phase.ANSWERING), Chosen(1.0, "liquid", 1))
+    with pytest.raises(SessionError, match="answer 2 first"):
+        advance(state, Submitted(2.0))
+
+
+@pytest.mark.parametrize("value", [0, 8, -1])
+def test_a_value_off_the_scale_is_refused(value: int) -> None:
+    with pytest.raises(SessionError, match="choose 1 to 7"):
+        advance(state_in(Phase.ANSWERING), Chosen(1.0, "liquid", value))
+
+
+def test_cannot_judge_is_refused_where_the_scale_has_no_such_answer() -> None:
+    state = small.walk(small.opened(), Phase.ANSWERING, times=3)
+    assert state.trial.block == "seeing"
+    with pytest.raises(SessionError, match="no answer off the scale"):
+        advance(state, Chosen(1.0, "different", None))
+
+
+@pytest.mark.parametrize("event", [ItemShown(1.0, "different"), Chosen(1.0, "different", 1)])
+def test_an_item_of_another_page_is_refused(event: Any) -> None:
+    with pytest.raises(SessionError, match="its items are liquid, strong, spare"):
+        advance(state_in(Phase.ANSWERING), event)
+
+
+def test_a_pause_during_a_task_ends_the_attempt_and_the_trial_starts_again() -> None:
+    paused, commands = advance(state_in(Phase.TASK), PauseAsked(5.0, "participant"))
+    assert commands[:2] == (StopTrial(), Rest())
+    assert commands[2] == Write("trial_ended", {"trial": 2, "attempt": 1, "outcome": "interrupted"}, measured=True)
+    assert shown(commands) == PausePage(force_off=False)
+    again, commands = advance(paused, ResumeAsked(9.0))
+    assert written(commands) == ["resumed", "trial_started"]
+    assert (again.phase, again.trial.number, again.attempt) == (Phase.TASK, 2, 2)
+    assert not any(isinstance(command, FadeIn) for command in commands)
+
+
+def test_a_pause_while_answering_goes_back_to_the_same_page_with_every_choice() -> None:
+    answering = state_in(Phase.ANSWERING)
+    paused, _ = advance(answering, PauseAsked(5.0, "operator"))
+    back, commands = advance(paused, ResumeAsked(9.0))
+    assert back == answering
+    assert dict(shown(commands).chosen) == {"liquid": 5, "strong": 5, "spare": 5}
+
+
+def test_a_second_pause_at_once_changes_nothing() -> None:
+    paused = state_in(Phase.PAUSED)
+    assert advance(paused, PauseAsked(6.0, "participant")) == (paused, ())
+
+
+@pytest.mark.parametrize("phase", [Phase.READING, Phase.TASK, Phase.ANSWERING, Phase.PAUSED])
+def test_a_force_stop_is_the_first_command_and_resuming_fades_the_force_in(phase: Phase) -> None:
+    stopped, commands = advance(state_in(phase), ForceStopped(5.0, "participant"))
+    assert commands[0] == StopForce()
+    assert stopped.phase is Phase.PAUSED
+    assert shown(commands) == PausePage(force_off=True)
+    resumed, commands = advance(stopped, ResumeAsked(6.0))
+    assert FadeIn() in commands
+    assert written(commands)[:2] == ["resumed", "force_restored"]
+    assert not resumed.force_off
+
+
+def test_the_force_fades_in_before_a_trial_starts_again() -> None:
+    stopped, _ = advance(state_in(Phase.TASK), ForceStopped(5.0, "device"))
+    _, commands = advance(stopped, ResumeAsked(6.0))
+    order = [type(command) for command in commands]
+    assert order.index(FadeIn) < order.index(StartTrial)
+
+
+@pytest.mark.parametrize("phase", [Phase.TROUBLE, *FINAL])
+def test_the_force_can_be_stopped_where_nothing_goes_on(phase: Phase) -> None:
+    state = state_in(phase)
+    after, commands = advance(state, ForceStopped(5.0, "operator"))
+    assert after == state
+    assert commands[0] == StopForce()
+
+
+def test_a_repeat_keeps_the_attempt_that_was_and_its_reason() -> None:
+    again, commands = advance(state_in(Phase.TASK), RepeatAsked(5.0, "phone rang"))
+    assert written(commands) == ["trial_ended", "repeat", "trial_started"]
+    assert commands[3].fields == {"trial": 2, "reason": "phone rang"}
+    assert again.attempt == 2
+
+
+def test_a_repeat_while_answering_forgets_the_choices_but_not_the_measured_attempt() -> None:
+    again, commands = advance(state_in(Phase.ANSWERING), RepeatAsked(5.0, "phone rang"))
+    assert written(commands) == ["repeat", "trial_started"]
+    assert (again.phase, again.answers, again.attempt) == (Phase.TASK, {}, 2)
+
+
+def test_the_next_trial_begins_with_its_first_attempt() -> None:
+    again, _ = advance(state_in(Phase.TASK), RepeatAsked(5.0, "phone rang"))
+    assert small.walk(again, Phase.TASK).attempt == 1
+
+
+def test_a_repeat_without_a_reason_is_refused() -> None:
+    with pytest.raises(SessionError, match="write one"):
+        advance(state_in(Phase.TASK), RepeatAsked(5.0, "  "))
+
+
+@pytest.mark.parametrize("status", ["withdrawn", "aborted"])
+def test_an_early_end_closes_the_session_before_it_says_so(status: Any) -> None:
+    ended, commands = advance(state_in(Phase.TASK), EndAsked(5.0, status, "tired"))
+    assert commands[:2] == (StopTrial(), Rest())
+    assert commands[-2] == Finish(status, "tired")
+    assert isinstance(shown(commands), EndPage)
+    assert ended.phase is Phase.ENDED
+
+
+def test_an_early_end_and_a_complete_session_do_not_read_alike() -> None:
+    early = shown(advance(state_in(Phase.READING), EndAsked(5.0, "aborted", ""))[1])
+    last = small.walk(small.opened(), Phase.READING, times=2)
+    assert early != shown(advance(last, Continue(9.0))[1])
+
+
+def test_what_broke_is_for_the_journal_and_not_for_the_participant() -> None:
+    trouble, commands = advance(state_in(Phase.TASK), Broke(5.0, "no sample for 50 ms"))
+    assert commands[:3] == (StopForce(), StopTrial(), Rest())
+    assert written(commands) == ["trial_ended", "broke"]
+    page = shown(commands)
+    assert isinstance(page, TroublePage)
+    assert "50 ms" not in page.title + page.paragraph
+    assert trouble.phase is Phase.TROUBLE
+
+
+def test_a_session_that_broke_and_is_aborted_counts_as_broken() -> None:
+    _, commands = advance(state_in(Phase.TROUBLE), EndAsked(9.0, "aborted", "cable"))
+    assert Finish("broken", "cable") in commands
+    _, commands = advance(state_in(Phase.TROUBLE), EndAsked(9.0, "withdrawn", "enough"))
+    assert Finish("withdrawn", "enough") in commands
+
+
+def test_a_language_that_the_study_is_not_written_in_is_refused(protocol: Protocol) -> None:
+    with pytest.raises(SessionError, match="written in en"):
+        open_session(protocol, build_schedule(protocol, "P001", 1), {}, "nl")
+
+
+def test_nothing_that_is_printed_names_a_condition_a_liquid_or_a_delay() -> None:
+    state, printed = small.opened(), []
+    while state.phase not in FINAL:
+        state, commands = advance(state, small.next_event(state, 1.0))
+        page = shown(commands)
+        printed.append(f"{state!r} {commands!r} {page!r} {page}")
+        printed += [str(command.fields) for command in commands if isinstance(command, Write)]
+    text = " ".join(printed)
+    words = ["is_thin", "is_thick", "on_time", "is_late", "0.137", "137", "1013", "1450"]
+    assert [word for word in words if word in text] == []
+
+
+CHOICES = st.one_of(st.integers(1, 7), st.none())
+ANY_EVENT = st.one_of(
+    *(st.just(event_of(kind)) for kind in EVENTS if kind not in (Chosen, ItemShown, Broke, EndAsked)),
+    st.builds(Chosen, st.just(0.0), st.sampled_from(["liquid", "strong", "spare", "different"]), CHOICES),
+    st.builds(ItemShown, st.just(0.0), st.sampled_from(["liquid", "strong", "spare", "different"])),
+)
+INCIDENTS = st.one_of(ANY_EVENT, st.sampled_from([event_of(Broke), event_of(EndAsked)]))
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.lists(st.one_of(st.none(), st.none(), ANY_EVENT), max_size=120), st.lists(INCIDENTS, max_size=5))
+def test_whatever_happens_no_answer_is_lost_and_the_session_can_be_ended(events: list[Any], late: list[Any]) -> None:
+    """None stands for going on as if nothing had happened."""
+    state = small.opened()
+    latest: dict[tuple[int, int], dict[str, Any]] = {}
+    kept: dict[int, dict[str, Any]] = {}
+    disk: list[Any] = []
+    for drawn in [*events, *late]:
+        event = _going_on(state) if drawn is None else drawn
+        before = replace(state)
+        try:
+            after, commands = advance(state, event)
+        except SessionError:
+            assert state == before
+            continue
+        _check_order(commands)
+        disk += [command for command in commands if isinstance(command, Write)]
+        if isinstance(event, Chosen):
+            latest.setdefault((before.trial.number, before.attempt), {})[event.item] = event.value
+        if isinstance(event, Submitted):
+            kept[before.trial.number] = latest[before.trial.number, before.attempt]
+        state = after
+    confirmed = {write.fields["trial"]: write.fields["items"] for write in disk if write.event == "responses"}
+    assert {
+        trial: {row["item"]: row["value"] for row in rows if row["first_s"] is not None}
+        for trial, rows in confirmed.items()
+    } == kept
+    chosen = [write for write in disk if write.event == "choice"]
+    assert len(chosen) >= sum(len(answers) for answers in kept.values())
+    if state.phase not in FINAL:
+        state, commands = advance(state, EndAsked(999.0, "aborted", ""))
+        assert any(isinstance(command, Finish) for command in commands)
+    assert state.phase in FINAL
+
+
+def _going_on(state: SessionState) -> Any:
+    waiting = state.phase in {Phase.PAUSED, Phase.TROUBLE, *FINAL}
+    return ResumeAsked(1.0) if waiting else small.next_event(state, 1.0)
+
+
+def _check_order(commands: tuple[Any, ...]) -> None:
+    """Safety of the hand, then the disk, then what is felt and seen; nothing after the page."""
+    rank = {StopForce: 0, StopTrial: 0, Rest: 0, Write: 1, WriteTables: 1, FadeIn: 1, Finish: 1, StartTrial: 2}
+    ranks = [rank.get(type(command), 3) for command in commands]
+    assert ranks == sorted(ranks)
+    assert sum(isinstance(command, ShowPage) for command in commands) <= 1
+
+
+@given(st.integers(0, 2**32), st.data())
+@settings(max_examples=30, deadline=None)
+def test_every_trial_that_was_begun_is_ended_once_per_attempt(seed: int, data: st.DataObject) -> None:
+    state = small.opened(seed)
+    begun: list[tuple[int, int]] = []
+    ended: list[tuple[int, int]] = []
+    while state.phase not in FINAL:
+        if state.phase is Phase.PAUSED:
+            event: Any = ResumeAsked(1.0)
+        elif state.phase is Phase.TASK and data.draw(st.booleans()):
+            event = data.draw(st.sampled_from([event_of(PauseAsked), event_of(ForceStopped), event_of(RepeatAsked)]))
+        else:
+            event = small.next_event(state, 1.0)
+        state, commands = advance(state, event)
+        for command in commands:
+            if isinstance(command, Write) and command.event in {"trial_started", "trial_ended"}:
+                which = (command.fields["trial"], command.fields["attempt"])
+                (begun if command.event == "trial_started" else ended).append(which)
+    assert begun == ended
+    assert len(set(begun)) == len(begun)
+    steps = state.plan.schedule.steps
+    assert {trial for trial, _ in begun} == {step.number for step in steps if isinstance(step, Trial)}
