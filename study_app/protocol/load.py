@@ -1,38 +1,155 @@
-"""Files become protocols: by path, or by name from ./protocols and then from those that ship with the program."""
+"""A file becomes a validated protocol, or one ProtocolError that lists every problem with its line and a hint."""
 
 from __future__ import annotations
 
-import hashlib
+import re
 import tomllib
+from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
+from typing import Any, Literal, TypeVar
+
+from pydantic import BaseModel, Field, ValidationError
 
 from study_app.errors import Problem, ProtocolError
-from study_app.protocol.model import Protocol
+from study_app.haptics.scene import Liquid, Scene
+from study_app.protocol.checks import check
+from study_app.protocol.files import protocol_hash, shipped, source_bytes
+from study_app.protocol.model import Named, Protocol, SceneDefaults, Table
+from study_app.protocol.places import Places
+from study_app.protocol.problems import Fault, did_you_mean, faults_of
 
-_PACKAGE = Path(__file__).resolve().parent.parent
-_SHIPPED = (_PACKAGE / "protocols", _PACKAGE.parent / "protocols")
+__all__ = ["load", "load_scene", "parse", "protocol_hash", "schema", "shipped", "source_bytes"]
+
+M = TypeVar("M", bound=BaseModel)
 
 
-def _find(name_or_path: str | Path) -> Path:
-    path = Path(name_or_path)
-    if path.is_file():
-        return path
-    for folder in (Path("protocols"), *_SHIPPED):
-        if (found := folder / f"{path}.toml").is_file():
-            return found
-    raise ProtocolError(str(name_or_path), (Problem("file", "no such protocol"),))
+class SceneTable(SceneDefaults):
+    """The scene of a file that holds no study: rate and force limit stand here, there is no device table."""
+
+    rate_hz: float = Field(default=1000, ge=50, le=20_000, description="Nominal rate of ticks [Hz].")
+    force_limit_n: float = Field(default=8, gt=0, le=8, description="Largest force on the hand [N].")
+
+
+class SceneFile(Table):
+    """A file of liquids without a study."""
+
+    format: Literal[1] = 1
+    scene: SceneTable = SceneTable()
+    liquids: Named[Liquid] = Field(min_length=1)
 
 
 def load(name_or_path: str | Path) -> Protocol:
-    """Return the protocol."""
-    return Protocol.model_validate(tomllib.loads(_find(name_or_path).read_text(encoding="utf-8")))
+    """Return the protocol of a file, or of a name (see ``files.find``).
+
+    Raises
+    ------
+    ProtocolError
+        Every problem of the file, with line and hint.
+    """
+    return parse(source_bytes(name_or_path), str(name_or_path))
 
 
-def source_bytes(name_or_path: str | Path) -> bytes:
-    """Return the file as it is on disk."""
-    return _find(name_or_path).read_bytes()
+def parse(source: bytes, name: str) -> Protocol:
+    """Return the protocol written in ``source``; ``name`` is what messages call it.
+
+    Raises
+    ------
+    ProtocolError
+        Every problem of the text, with line and hint.
+    """
+    document, places = _document(source, name)
+    faults = _faults(Protocol, document)
+    if not _future_format(document):
+        faults += check(document, [fault.path for fault in faults])
+    _raise(name, faults, places)
+    return Protocol.model_validate(document, strict=True)
 
 
-def protocol_hash(source: bytes) -> str:
-    """Return the SHA-256 of a protocol's file, in hexadecimal."""
-    return hashlib.sha256(source).hexdigest()
+def load_scene(name_or_path: str | Path, liquid_id: str) -> Scene:
+    """Return the scene of one liquid of a protocol, or of a file with only ``[scene]`` and ``[liquids.*]``.
+
+    Raises
+    ------
+    ProtocolError
+        Every problem of the file, or a liquid that is not in it.
+    """
+    name = str(name_or_path)
+    source = source_bytes(name_or_path)
+    document, places = _document(source, name)
+    if not document.keys() & (Protocol.model_fields.keys() - SceneFile.model_fields.keys()):
+        _raise(name, _faults(SceneFile, document), places)
+        file = SceneFile.model_validate(document, strict=True)
+        table, liquids = file.scene, file.liquids
+    else:
+        protocol = parse(source, name)
+        device = protocol.device
+        table = SceneTable(**dict(protocol.scene), rate_hz=device.rate_hz, force_limit_n=device.force_limit_n)
+        liquids = protocol.liquids
+    if liquid_id not in liquids:
+        fault = Fault(("liquids",), f'there is no liquid "{liquid_id}"', did_you_mean(liquid_id, liquids))
+        _raise(name, [fault], places)
+    return Scene(**dict(table), liquids=(liquids[liquid_id],))
+
+
+@cache
+def schema(of: type[BaseModel] = Protocol) -> dict[str, Any]:
+    """Return the JSON Schema of a protocol file, for editors that complete and check while one writes."""
+    described = of.model_json_schema()
+    for table in ("Liquid", "Block"):  # their id is the name of their table
+        for part in described["$defs"].values():
+            if part.get("title") == table:
+                part["properties"].pop("id")
+                part["required"].remove("id")
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **described}
+
+
+def _document(source: bytes, name: str) -> tuple[dict[str, Any], Places]:
+    """Return the text's tables, arrays as tuples, and the lines they stand on."""
+    try:
+        text = source.decode("utf-8").replace("\r\n", "\n")
+    except UnicodeDecodeError as error:
+        line = source.count(b"\n", 0, error.start) + 1
+        raise ProtocolError(name, (Problem("file", "is not UTF-8 text", line, "save it as UTF-8"),)) from error
+    try:
+        document = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ProtocolError(name, (_broken(str(error), text),)) from error
+    return {key: _frozen(value) for key, value in document.items()}, Places(text)
+
+
+def _broken(message: str, text: str) -> Problem:
+    """Return the problem of a text that is not TOML: ``tomllib`` names the place in its message."""
+    sentence, place = re.sub(r" \(at .*\)$", "", message), re.search(r"\(at line (\d+), column (\d+)\)", message)
+    line, column = (int(place[1]), int(place[2])) if place else (text.count("\n") + 1, 1)
+    return Problem("file", f"not TOML at column {column}: {sentence}", line, "see toml.io for the notation")
+
+
+def _frozen(value: Any) -> Any:
+    if isinstance(value, list):
+        return tuple(_frozen(entry) for entry in value)
+    if isinstance(value, dict):
+        return {key: _frozen(entry) for key, entry in value.items()}
+    return value
+
+
+def _faults(model: type[M], document: Mapping[str, Any]) -> list[Fault]:
+    if _future_format(document):
+        return [Fault(("format",), f"is {document['format']}, this program reads format 1", "use a newer program")]
+    try:
+        model.model_validate(document, strict=True)
+    except ValidationError as error:
+        return faults_of(error, document, schema(model))
+    return []
+
+
+def _future_format(document: Mapping[str, Any]) -> bool:
+    """Whether the file is of a later format: then nothing else in it can be judged."""
+    stated = document.get("format")
+    return isinstance(stated, int) and stated > 1
+
+
+def _raise(name: str, faults: list[Fault], places: Places) -> None:
+    if faults:
+        problems = [fault.located(places) for fault in faults]
+        raise ProtocolError(name, tuple(sorted(problems, key=lambda problem: problem.line or 0)))

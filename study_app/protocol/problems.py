@@ -10,7 +10,8 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from study_app.errors import Problem
-from study_app.protocol.places import Path, Places
+from study_app.protocol.document import Path, has
+from study_app.protocol.places import Places
 
 Schema = Mapping[str, Any]
 
@@ -21,6 +22,7 @@ class Fault(NamedTuple):
     path: Path
     message: str
     hint: str = ""
+    counts_entries: bool = False
 
     def located(self, places: Places) -> Problem:
         """Return the problem with its line; in the place that people read, entries count from 1."""
@@ -79,7 +81,14 @@ def did_you_mean(word: str, permitted: Iterable[str]) -> str:
 
 def faults_of(error: ValidationError, document: Mapping[str, Any], schema: Schema) -> list[Fault]:
     """Return pydantic's findings about ``document``; ``schema`` is the JSON Schema of what it should be."""
-    return [_fault(details, document, schema) for details in error.errors(include_url=False)]
+    found = [_fault(details, document, schema) for details in error.errors(include_url=False)]
+    return [fault for fault in found if not (fault.counts_entries and _has_inner(fault, found))]
+
+
+def _has_inner(fault: Fault, found: Sequence[Fault]) -> bool:
+    """Return whether an entry of the array is broken: pydantic then counts the sound ones only."""
+    depth = len(fault.path)
+    return any(len(other.path) > depth and other.path[:depth] == fault.path for other in found)
 
 
 def _fault(details: ErrorDetails, document: Mapping[str, Any], schema: Schema) -> Fault:
@@ -97,7 +106,8 @@ def _fault(details: ErrorDetails, document: Mapping[str, Any], schema: Schema) -
     if kind == "union_tag_invalid":
         tags = str(context["expected_tags"]).replace("'", '"')
         return Fault((*path, _tag_key(context)), f'"{context["tag"]}" is not one of {tags}')
-    return Fault(path, *_sentence(kind, value, context, details["msg"]))
+    sentence, hint = _sentence(kind, value, context, details["msg"])
+    return Fault(path, sentence, hint, counts_entries=kind == "too_short")
 
 
 def _sentence(kind: str, value: Any, context: Mapping[str, Any], message: str) -> tuple[str, str]:
@@ -131,18 +141,12 @@ def _path_in(document: Any, loc: tuple[str | int, ...], *, keep_last: bool) -> P
     path: list[str | int] = []
     node = document
     for position, step in enumerate(loc):
-        if _has(node, step):
+        if has(node, step):
             node = node[step]
         elif not (keep_last and position == len(loc) - 1):
             continue
         path.append(step)
     return tuple(path)
-
-
-def _has(node: Any, step: str | int) -> bool:
-    if isinstance(step, int):
-        return isinstance(node, list | tuple) and step < len(node)
-    return isinstance(node, Mapping) and step in node
 
 
 def _keys_at(document: Any, path: Path, schema: Schema) -> set[str]:
@@ -165,8 +169,8 @@ def _children(node: Schema, step: str | int) -> Iterator[Schema]:
             yield node["items"]
     elif step in node.get("properties", {}):
         yield node["properties"][step]
-    elif isinstance(node.get("additionalProperties"), Mapping):
-        yield node["additionalProperties"]
+    else:
+        yield from node.get("patternProperties", {}).values()
 
 
 def _alternatives(node: Schema, schema: Schema, value: Any) -> Iterator[Schema]:

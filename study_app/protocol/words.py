@@ -74,7 +74,7 @@ class Words:
     window_title: str
     preparing: str
 
-    def list(self, entries: Sequence[str]) -> str:
+    def joined(self, entries: Sequence[str]) -> str:
         """Return "2", "2 and 5", "2, 5 and 8"."""
         if len(entries) < 2:
             return "".join(entries)
@@ -82,7 +82,7 @@ class Words:
 
     def missing(self, numbers: Sequence[int]) -> str:
         """Return the sentence that names the statements (by number, at least one) still without an answer."""
-        listed = self.list([str(number) for number in numbers])
+        listed = self.joined([str(number) for number in numbers])
         count = len(numbers)
         if count == 1:
             return self.one_missing.format(list=listed)

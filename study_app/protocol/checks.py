@@ -1,0 +1,133 @@
+"""What only sound tables together can show: targets inside the tank, practice apart, codes and parts in order.
+
+The checks work on a :class:`Draft` of every entry that is sound by itself, so that one broken table does not hide what
+is wrong between the others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict
+
+from study_app.haptics.scene import MAX_LIQUIDS
+from study_app.protocol.document import Path, names
+from study_app.protocol.model import Block, Condition, DeviceNeeds, Named, Reach
+from study_app.protocol.problems import Fault
+from study_app.protocol.references import items, languages, references, repeats, sequence
+from study_app.protocol.tasks import Task
+
+_TABLES = ("conditions", "tasks", "blocks")
+
+
+class Draft(BaseModel):
+    """The sound entries of a document; ``whole`` says that no block had to be left out."""
+
+    model_config = ConfigDict(frozen=True, extra="ignore")
+
+    device: DeviceNeeds | None = None
+    conditions: dict[str, Condition] = {}
+    tasks: dict[str, Task] = {}
+    blocks: Named[Block] = {}
+    sequence: tuple[str, ...] = ()
+    whole: bool = True
+
+    def liquids_of(self, block: Block) -> set[str]:
+        """Return the liquids that a block presents, as far as its conditions are sound."""
+        return {
+            liquid
+            for name in block.conditions
+            if name in self.conditions
+            for liquid in self.conditions[name].liquid_ids
+        }
+
+
+def draft(document: Mapping[str, Any], broken: Iterable[Path]) -> Draft:
+    """Return what of ``document`` is sound; ``broken`` are the paths of the problems already found."""
+    sound = {key: dict(value) if isinstance(value, Mapping) else value for key, value in document.items()}
+    for path in filter(None, broken):
+        section = str(path[0])
+        if section in _TABLES and len(path) > 1:
+            sound.get(section, {}).pop(path[1], None)
+        else:
+            sound.pop(section, None)
+    whole = len(names(document, "blocks")) == len(names(sound, "blocks"))
+    return Draft.model_validate({**sound, "whole": whole}, strict=True)
+
+
+def check(document: Mapping[str, Any], broken: Iterable[Path]) -> Iterator[Fault]:
+    """Yield every problem between the tables of ``document``, whose ``broken`` places are known already."""
+    for of_names in (references, sequence, repeats, items, languages):
+        yield from of_names(document)
+    parts = draft(document, broken)
+    for of_tables in (targets, crowded, practice, codes, counted_parts):
+        yield from of_tables(parts)
+
+
+def targets(parts: Draft) -> Iterator[Fault]:
+    """Check that every target lies inside the tank with its whole radius."""
+    if parts.device is None:
+        return
+    half = tuple(size / 2 for size in parts.device.workspace_mm)
+    for name, task in parts.tasks.items():
+        if not isinstance(task, Reach):
+            continue
+        for index, target in enumerate(task.targets_mm):
+            for axis, place, room in zip("xyz", target, half, strict=True):
+                if abs(place) + task.radius_mm > room:
+                    yield Fault(
+                        ("tasks", name, "targets_mm", index),
+                        f"{axis} = {place:g} mm with radius {task.radius_mm:g} mm leaves the tank",
+                        f"device.workspace_mm reaches to {room:g} mm on either side",
+                    )
+
+
+def crowded(parts: Draft) -> Iterator[Fault]:
+    """Check that no condition has more liquids than a scene holds."""
+    for name, condition in parts.conditions.items():
+        if len(condition.liquids) > MAX_LIQUIDS:
+            yield Fault(
+                ("conditions", name, "liquids"), f"has more than {MAX_LIQUIDS} liquids", "a scene holds no more"
+            )
+
+
+def practice(parts: Draft) -> Iterator[Fault]:
+    """Check that practice uses a liquid that no other block presents."""
+    judged = {
+        liquid: name
+        for name, block in parts.blocks.items()
+        if block.phase != "practice"
+        for liquid in parts.liquids_of(block)
+    }
+    for name, block in parts.blocks.items():
+        if block.phase == "practice":
+            for liquid in sorted(parts.liquids_of(block) & judged.keys()):
+                message = f'practice is in "{liquid}", which block "{judged[liquid]}" presents too'
+                yield Fault(("blocks", name, "conditions"), message, "practise in a liquid of its own")
+
+
+def codes(parts: Draft) -> Iterator[Fault]:
+    """Check that the codes of different blocks differ."""
+    owners: dict[str, str] = {}
+    for name, block in parts.blocks.items():
+        if block.code_prefix is not None and owners.setdefault(block.code_prefix, name) != name:
+            message = f'block "{owners[block.code_prefix]}" has the prefix "{block.code_prefix}" too'
+            yield Fault(("blocks", name, "code_prefix"), message, "choose another letter")
+
+
+def counted_parts(parts: Draft) -> Iterator[Fault]:
+    """Check that parts count 1, 2, … in the order of the sequence, and that something is analysed."""
+    if not (parts.whole and parts.blocks):
+        return
+    if all(block.phase != "main" for block in parts.blocks.values()):
+        yield Fault(("blocks",), "there is no main block", 'one needs phase = "main"')
+    latest = 0
+    for name in parts.sequence:
+        part = parts.blocks[name].part if name in parts.blocks else None
+        if part is None:
+            continue
+        if part not in {latest, latest + 1}:
+            expected = f"{latest} or {latest + 1}" if latest else "1"
+            yield Fault(("blocks", name, "part"), f"is {part}, must be {expected} at its place in sequence")
+        latest = max(latest, part)

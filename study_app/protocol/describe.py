@@ -1,0 +1,189 @@
+"""A protocol in words: what ``liquid-study check`` prints, for the author to compare with the intention."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+
+from study_app.protocol.model import Block, Explore, Protocol, Questionnaire
+from study_app.protocol.schedule import block_codes
+from study_app.protocol.tasks import Task
+
+READING_WORDS_PER_S = 3.0
+PAGE_S = 5.0
+ANSWER_S = 6.0
+MOVE_S = 1.5
+"""How long people take, for the expected duration [choice]: read (180 words a minute) and turn a page, answer one
+statement, move from one target to the next."""
+
+
+def describe(protocol: Protocol) -> str:
+    """Return the whole study in words, in its first language."""
+    language = protocol.study.languages[0]
+    sections = (
+        _head(protocol, language),
+        _titled("Session", _session(protocol, language)),
+        *(_block(protocol, block, language) for block in protocol.blocks_in_order),
+        _titled("Liquids", _liquids(protocol)),
+        _titled("Conditions", _conditions(protocol)),
+        *(_statements(protocol, name, language) for name in protocol.questionnaires),
+        _titled("A trial is valid up to", _limits(protocol)),
+    )
+    return "\n\n".join("\n".join(section) for section in sections) + "\n"
+
+
+def expected_duration_s(protocol: Protocol) -> float:
+    """Return how long a session will take [s], between the shortest and the longest it can be."""
+    language = protocol.study.languages[0]
+    return sum(
+        _reading_s(protocol, step, language) if step in protocol.pages else _block_s(protocol, protocol.blocks[step])
+        for step in protocol.sequence
+    )
+
+
+def _reading_s(protocol: Protocol, page_id: str, language: str) -> float:
+    body = protocol.text(protocol.pages[page_id].body, language)
+    return PAGE_S + len(body.split()) / READING_WORDS_PER_S
+
+
+def _block_s(protocol: Protocol, block: Block) -> float:
+    questionnaire = protocol.questionnaire_of(block.id)
+    answering = 0.0 if questionnaire is None else PAGE_S + ANSWER_S * len(questionnaire.items)
+    return _trials(block) * (_task_s(protocol.tasks[block.task]) + answering)
+
+
+def _task_s(task: Task) -> float:
+    if isinstance(task, Explore):
+        return (task.min_s + task.max_s) / 2
+    if task.count is not None:
+        return min(task.timeout_s, task.count * (task.dwell_s + MOVE_S))
+    return task.duration_s or 0.0
+
+
+def _trials(block: Block) -> int:
+    return len(block.conditions) * block.repetitions
+
+
+def _counted(count: int, noun: str) -> str:
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def _aligned(rows: Sequence[Sequence[str]]) -> Iterator[str]:
+    """Yield rows as lines whose columns begin under each other."""
+    widths = [max(len(cell) for cell in column) for column in zip(*rows, strict=True)]
+    for row in rows:
+        yield "  " + "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+
+
+def _titled(title: str, rows: Sequence[Sequence[str]]) -> Iterable[str]:
+    return (title, *_aligned(rows))
+
+
+def _head(protocol: Protocol, language: str) -> Iterable[str]:
+    study, device, scene = protocol.study, protocol.device, protocol.scene
+    sizes = " × ".join(f"{size:g}" for size in device.workspace_mm)
+    rows = [
+        ("Languages", ", ".join(study.languages)),
+        ("Parts", f"{protocol.parts}"),
+        ("Answers", f"{protocol.responses_per_participant()} per participant"),
+        ("Expected duration", f"about {expected_duration_s(protocol) / 60:.0f} min"),
+        ("Force limit", f"{device.force_limit_n:g} N"),
+        ("Servo", f"{device.rate_hz:g} Hz"),
+        ("Tank", f"{sizes} mm of the hand, drawn and felt {scene.scale:g} times as large"),
+        ("Ball", f"{scene.body.diameter_m * 1000:g} mm, {scene.body.diameter_m * 1000 / scene.scale:g} mm of the hand"),
+    ]
+    return (f"{protocol.text(study.title, language)} ({study.name}, version {study.version})", *_aligned(rows))
+
+
+def _session(protocol: Protocol, language: str) -> list[tuple[str, str, str]]:
+    rows: list[tuple[str, str, str]] = []
+    for number, step in enumerate(protocol.sequence, start=1):
+        if step in protocol.pages:
+            page = protocol.pages[step]
+            rows.append((f"{number:>2}", page.kind, protocol.text(page.title, language)))
+        else:
+            block = protocol.blocks[step]
+            title = protocol.text(block.title, language)
+            rows.append((f"{number:>2}", f"{block.phase} trials", f"{title}: {_counted(_trials(block), 'trial')}"))
+    return rows
+
+
+def _block(protocol: Protocol, block: Block, language: str) -> Iterable[str]:
+    part = "" if block.part is None else f"Part {block.part}: "
+    questionnaire = protocol.questionnaire_of(block.id)
+    rows = [
+        ("Trials", _presentation(block)),
+        ("Shown as", f"{protocol.text(block.setting_label, language)}{' 1, 2, …' if _trials(block) > 1 else ''}"),
+        ("Recorded as", ", ".join(block_codes(block))),
+        ("Conditions", ", ".join(block.conditions)),
+        ("Task", _task(protocol.tasks[block.task])),
+        ("Asked", "nothing" if questionnaire is None else _asked(questionnaire, str(block.questionnaire))),
+    ]
+    return _titled(f"{part}{protocol.text(block.title, language)} (block {block.id}, {block.phase})", rows)
+
+
+def _presentation(block: Block) -> str:
+    words = _counted(_trials(block), "trial")
+    if block.repetitions > 1:
+        words += f", every condition {block.repetitions} times"
+    if len(block.conditions) == 1:
+        return words
+    if block.order == "shuffled":
+        return f"{words}, another order for each participant"
+    return f"{words}, in the order written: who reads the protocol can tell the codes"
+
+
+def _task(task: Task) -> str:
+    if isinstance(task, Explore):
+        return f"explore for {task.min_s:g} to {task.max_s:g} s"
+    end = f"until {task.count} are reached" if task.count is not None else f"for {task.duration_s:g} s"
+    return (
+        f"reach for {len(task.targets_mm)} targets of {task.radius_mm:g} mm in turn, {task.dwell_s:g} s in each, "
+        f"{end}, at most {task.timeout_s:g} s"
+    )
+
+
+def _asked(questionnaire: Questionnaire, name: str) -> str:
+    order = "in the order written" if questionnaire.item_order == "fixed" else "in another order each time"
+    return f"{_counted(len(questionnaire.items), 'statement')} (questionnaire {name}), {order}"
+
+
+def _liquids(protocol: Protocol) -> list[tuple[str, ...]]:
+    rows: list[tuple[str, ...]] = [("", "density", "effects", "wake N", "S", "y", "")]
+    used = {liquid for condition in protocol.conditions.values() for liquid in condition.liquid_ids}
+    for name, liquid in protocol.liquids.items():
+        wake = liquid.wake if "wake" in liquid.effects else None
+        numbers = ("–", "–", "–") if wake is None else (f"{wake.length}", f"{wake.scaling:g}", f"{wake.exponent:g}")
+        unused = "" if name in used else "in no condition"
+        rows.append((name, f"{liquid.density_kg_m3:g} kg/m³", ", ".join(liquid.effects), *numbers, unused))
+    return rows
+
+
+def _conditions(protocol: Protocol) -> list[tuple[str, str, str]]:
+    return [
+        (name, " + ".join(condition.liquid_ids), f"seen {condition.delay_ms:g} ms late" if condition.delay_ms else "")
+        for name, condition in protocol.conditions.items()
+    ]
+
+
+def _statements(protocol: Protocol, name: str, language: str) -> Iterable[str]:
+    questionnaire = protocol.questionnaires[name]
+    scale = protocol.scales[questionnaire.scale]
+    labels = scale.labels[language]
+    off_scale = "" if scale.cannot_judge is None else f', or "{protocol.text(scale.cannot_judge, language)}"'
+    rows = [
+        (item.id, protocol.text(item.text, language), "" if item.required else "(may be left out)")
+        for item in questionnaire.items
+    ]
+    return (
+        f"Statements of {name}, from 1 ({labels[0]}) to {len(labels)} ({labels[-1]}){off_scale}",
+        *_aligned(rows),
+    )
+
+
+def _limits(protocol: Protocol) -> list[tuple[str, str]]:
+    limits = protocol.limits
+    return [
+        (f"{limits.lateness_ms:g} ms", "lateness of ticks (99th percentile)"),
+        (f"{limits.worst_gap_ms:g} ms", "between two ticks"),
+        (f"{limits.delay_error_ms:g} ms", "error of the delay (95th percentile)"),
+    ]

@@ -1,0 +1,39 @@
+"""Walking a document as ``tomllib`` reads it (arrays as tuples), whether it is a sound protocol or not."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any, TypeAlias
+
+Path: TypeAlias = tuple[str | int, ...]
+
+
+def has(node: Any, step: str | int) -> bool:
+    """Return whether ``node`` is a table with that key or an array with that index."""
+    if isinstance(step, int):
+        return isinstance(node, tuple) and step < len(node)
+    return isinstance(node, Mapping) and step in node
+
+
+def entries(document: Any, pattern: str) -> Iterator[tuple[Path, Any]]:
+    """Yield what is at the places of ``pattern`` with their paths: "blocks.*.conditions.*", where ``*`` is any."""
+    yield from _entries((), document, tuple(pattern.split(".")))
+
+
+def _entries(path: Path, node: Any, steps: tuple[str, ...]) -> Iterator[tuple[Path, Any]]:
+    if not steps:
+        yield path, node
+    elif steps[0] != "*":
+        if has(node, steps[0]):
+            yield from _entries((*path, steps[0]), node[steps[0]], steps[1:])
+    elif isinstance(node, Mapping):
+        for key, value in node.items():
+            yield from _entries((*path, key), value, steps[1:])
+    elif isinstance(node, tuple):
+        for index, value in enumerate(node):
+            yield from _entries((*path, index), value, steps[1:])
+
+
+def names(document: Any, section: str) -> tuple[str, ...]:
+    """Return the names of the tables of a section, sound or not."""
+    return tuple(str(path[1]) for path, _ in entries(document, f"{section}.*") if isinstance(path[1], str))
