@@ -1,0 +1,157 @@
+"""Writing that is whole or absent: a reader, or the next start after a power cut, never meets half a file."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import secrets
+import shutil
+import sys
+from pathlib import Path
+from typing import BinaryIO
+
+from study_app.errors import StoreError
+
+
+def write_file(path: Path, content: bytes) -> None:
+    """Put ``content`` at ``path``, replacing what was there in one step.
+
+    Written beside, flushed to the disk, renamed over the old file, and the folder's entry flushed. On any failure the
+    old file is untouched and nothing is left beside it.
+
+    Raises
+    ------
+    StoreError
+        The file cannot be written; names the file and the system's reason.
+    """
+    beside = _beside(path)
+    try:
+        _write_through(beside, content)
+        beside.replace(path)
+        sync_folder(path.parent)
+    except OSError as error:
+        raise cannot_write(path, error) from error
+    finally:
+        with contextlib.suppress(OSError):
+            beside.unlink(missing_ok=True)
+
+
+def create_folder(path: Path, files: dict[str, bytes]) -> bool:
+    """Create folder ``path`` holding ``files``, or return False where another program was first.
+
+    The folder is filled beside and renamed into place, which no system does over a folder that holds something: of
+    two programs exactly one succeeds, and the other finds every file whole.
+
+    Raises
+    ------
+    StoreError
+        The folder is neither there nor can be created.
+    """
+    beside = _beside(path)
+    try:
+        beside.mkdir()
+        for name, content in files.items():
+            _write_through(beside / name, content)
+        sync_folder(beside)
+        beside.rename(path)
+        sync_folder(path.parent)
+    except OSError as error:
+        if any((path / name).exists() for name in files):
+            return False
+        raise cannot_write(path, error) from error
+    finally:
+        shutil.rmtree(beside, ignore_errors=True)
+    return True
+
+
+def append_line(path: Path, line: bytes) -> None:
+    """Add ``line`` (which ends in a newline) to the end of ``path`` and flush it to the disk.
+
+    A torn line left by a power cut is closed with a newline first, so that it cannot swallow this one.
+
+    Raises
+    ------
+    StoreError
+        The file cannot be written; the part of the line that was, is taken back.
+    """
+    try:
+        with path.open("a+b", buffering=0) as file:
+            size = file.seek(0, os.SEEK_END)
+            try:
+                write_whole(file, line if _ends_whole(file, size) else b"\n" + line)
+                os.fsync(file.fileno())
+            except OSError:
+                file.truncate(size)
+                raise
+        sync_folder(path.parent)
+    except OSError as error:
+        raise cannot_write(path, error) from error
+
+
+def write_whole(file: BinaryIO, content: bytes) -> None:
+    """Write all of ``content`` to an unbuffered ``file``, however many writes the system makes of it."""
+    rest = memoryview(content)
+    while rest:
+        rest = rest[file.write(rest) :]
+
+
+def sync_folder(path: Path) -> None:
+    """Flush the folder's entries, so that a file created or renamed in it survives a power cut."""
+    if sys.platform == "win32":  # a folder cannot be opened there; the file system orders its own entries
+        return
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def cannot_write(path: Path, error: OSError) -> StoreError:
+    """Return the one-line error for ``path``: what, why, and what to do."""
+    return StoreError(
+        f"{path} cannot be written ({cause(error)}): free space, mend permissions, or choose another results folder"
+    )
+
+
+def is_there(path: Path) -> bool:
+    """Return whether anything is at ``path``.
+
+    Raises
+    ------
+    StoreError
+        The system does not let us look.
+    """
+    try:
+        path.stat()
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    except OSError as error:
+        raise cannot_read(path, error) from error
+    return True
+
+
+def cannot_read(path: Path, error: OSError) -> StoreError:
+    """Return the one-line error for ``path``: what, why, and what to do."""
+    return StoreError(f"{path} cannot be read ({cause(error)}): mend permissions, or restore it from a copy")
+
+
+def cause(error: OSError) -> str:
+    """Return the system's own word for ``error``, without the path (which the message names once)."""
+    return error.strerror or type(error).__name__
+
+
+def _beside(path: Path) -> Path:
+    return path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
+
+
+def _ends_whole(file: BinaryIO, size: int) -> bool:
+    if size == 0:
+        return True
+    file.seek(size - 1)
+    return file.read(1) == b"\n"
+
+
+def _write_through(path: Path, content: bytes) -> None:
+    with path.open("xb", buffering=0) as file:
+        write_whole(file, content)
+        os.fsync(file.fileno())

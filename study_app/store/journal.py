@@ -1,0 +1,215 @@
+"""The truth about a session: one event a line, on the disk before anything follows from it.
+
+Every line is a JSON object that explains itself: ``n`` counts from 1 without a gap, ``event`` is its name, ``t_s`` the
+seconds since the session's clock origin, ``at`` the same moment for people. All tables are derived from these lines
+alone. A line is whole when its newline is on the disk; a program killed while writing leaves at most one torn tail,
+which readers leave out and count.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+import os
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from pathlib import Path
+from types import TracebackType
+from typing import Any, BinaryIO, TypeAlias
+
+from study_app.errors import StoreError
+from study_app.store.atomic import cannot_read, cannot_write, sync_folder, write_whole
+
+Line: TypeAlias = dict[str, Any]
+
+
+class SessionClock:
+    """Seconds since one origin on a monotonic clock; the wall clock is read once, so setting it changes nothing.
+
+    Parameters
+    ----------
+    now_ns : callable
+        The monotonic clock [ns]: the servo's own, so that recordings and journal share an axis.
+    origin_at : datetime, optional
+        Wall time at the origin, with its zone; now by default.
+    """
+
+    def __init__(self, now_ns: Callable[[], int] = time.monotonic_ns, origin_at: datetime | None = None) -> None:
+        self._now_ns = now_ns
+        self.origin_ns = now_ns()
+        self.origin_at = origin_at if origin_at is not None else datetime.now().astimezone()
+
+    def seconds(self) -> float:
+        """Return the seconds since the origin."""
+        return (self._now_ns() - self.origin_ns) / 1e9
+
+    def at(self, seconds: float) -> str:
+        """Return the wall time of ``seconds`` as ISO 8601 with zone."""
+        return (self.origin_at + timedelta(seconds=seconds)).isoformat(timespec="milliseconds")
+
+
+class Journal:
+    """An open journal: ``append`` returns when the line is on the disk. One writer, one thread."""
+
+    def __init__(self, path: Path, file: BinaryIO, clock: SessionClock) -> None:
+        self.path = path
+        self.clock = clock
+        self._file = file
+        self._lines = 0
+        self._size = 0
+        self._torn = False
+
+    @classmethod
+    def create(cls, path: Path, clock: SessionClock | None = None) -> Journal:
+        """Create the file, which must not exist.
+
+        Raises
+        ------
+        StoreError
+            It exists already, or cannot be created.
+        """
+        try:
+            file = path.open("xb", buffering=0)
+            sync_folder(path.parent)
+        except FileExistsError as error:
+            raise StoreError(f"{path} exists already: a journal is never written over; use a new session") from error
+        except OSError as error:
+            raise cannot_write(path, error) from error
+        return cls(path, file, clock if clock is not None else SessionClock())
+
+    def append(self, event: str, *, t_s: float | None = None, **fields: Any) -> Line:
+        """Write one line and wait for the disk; return the line as a reader will see it.
+
+        ``t_s`` is when it happened, by default now. Infinite and undefined numbers become null, numpy numbers plain.
+
+        Raises
+        ------
+        StoreError
+            The line is not on the disk; the journal ends with its last whole line and can be appended to again.
+        """
+        if self._file.closed:
+            raise StoreError(f"{self.path} is closed: {event!r} came after the session's end and was not recorded")
+        moment = self.clock.seconds() if t_s is None else t_s
+        line = {
+            "n": self._lines + 1,
+            "event": event,
+            "t_s": round(moment, 6),
+            "at": self.clock.at(moment),
+            **{name: plain(value) for name, value in fields.items()},
+        }
+        text = json.dumps(line, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+        content = text.encode("utf-8", "backslashreplace") + b"\n"
+        try:
+            if self._torn:
+                self._take_back()
+            self._torn = True
+            write_whole(self._file, content)
+            os.fsync(self._file.fileno())
+        except OSError as error:
+            with contextlib.suppress(OSError):  # tried again before the next line
+                self._take_back()
+            raise cannot_write(self.path, error) from error
+        self._torn = False
+        self._size += len(content)
+        self._lines += 1
+        return line
+
+    def close(self) -> None:
+        """Close the file; every line is on the disk already."""
+        self._file.close()
+
+    def __enter__(self) -> Journal:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _take_back(self) -> None:
+        """Cut off what an interrupted write may have left after the last whole line."""
+        self._file.truncate(self._size)
+        self._file.seek(self._size)
+        self._torn = False
+
+
+@dataclass(frozen=True, slots=True)
+class Contents:
+    """What a journal holds: its whole lines, where they end, and what is wrong after them.
+
+    ``torn_bytes`` counts the torn tail of a program that was killed while writing; ``damage`` is the sentence about
+    anything worse (a broken line with whole ones after it, a number missing or doubled), else None.
+    """
+
+    lines: list[Line]
+    whole_bytes: int
+    torn_bytes: int = 0
+    damage: str | None = None
+
+
+def read(path: Path) -> list[Line]:
+    """Return the whole lines of the journal, in order; a torn tail is left out (`scan` reports it).
+
+    Raises
+    ------
+    StoreError
+        It cannot be read, or is damaged elsewhere than at its end.
+    """
+    contents = scan(path)
+    if contents.damage is not None:
+        raise StoreError(contents.damage)
+    return contents.lines
+
+
+def scan(path: Path) -> Contents:
+    """Read the journal to its last whole line and report what follows it.
+
+    Raises
+    ------
+    StoreError
+        It cannot be read.
+    """
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise cannot_read(path, error) from error
+    *pieces, tail = content.split(b"\n")
+    lines: list[Line] = []
+    whole_bytes = 0
+    for number, piece in enumerate(pieces, start=1):
+        line = _parse(piece)
+        if line is None:
+            if any(_parse(later) is not None for later in pieces[number:]):
+                damage = f"{path}, line {number}: damaged, though whole lines follow; restore it from a copy"
+                return Contents(lines, whole_bytes, damage=damage)
+            return Contents(lines, whole_bytes, torn_bytes=len(content) - whole_bytes)
+        if line.get("n") != number:
+            damage = f"{path}, line {number}: its n is {line.get('n')!r}: lines are missing or doubled; restore a copy"
+            return Contents(lines, whole_bytes, damage=damage)
+        lines.append(line)
+        whole_bytes += len(piece) + 1
+    return Contents(lines, whole_bytes, torn_bytes=len(tail))
+
+
+def plain(value: Any) -> Any:
+    """Return ``value`` as JSON has it: numpy numbers plain, tuples as lists, numbers that are none as None."""
+    if isinstance(value, dict):
+        return {str(name): plain(item) for name, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if hasattr(value, "tolist"):  # a numpy array or number
+        return plain(value.tolist())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def _parse(piece: bytes) -> Line | None:
+    try:
+        line = json.loads(piece)
+    except ValueError:
+        return None
+    return line if isinstance(line, dict) else None

@@ -1,0 +1,170 @@
+"""A small study whose conditions can be recognised anywhere, and a session that answers it."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from datetime import datetime, timedelta, timezone
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from study_app.haptics.layout import LIMITER_NAMES
+from study_app.protocol.model import Protocol
+from study_app.protocol.schedule import build_schedule
+from study_app.store.journal import SessionClock
+from study_app.store.session import SessionStore, begin
+
+SEVEN = ("Completely disagree", "Mostly", "Somewhat", "Neutral", "Somewhat agree", "Mostly agree", "Completely agree")
+
+SOURCE = b"[study]\nname = 'brackish'\n"
+
+
+def study_tables(**changes: Any) -> dict[str, Any]:
+    """A protocol file's tables; ids and numbers of the conditions occur nowhere else by chance."""
+    block = {"title": "Settings", "setting_label": "Setting", "task": "feel", "order": "shuffled"}
+    items = [{"id": name, "text": f"I think it is {name}.", "short": name} for name in ("wet", "calm", "near")]
+    tables: dict[str, Any] = {
+        "format": 1,
+        "study": {"name": "brackish", "title": "Brackish", "version": "1.0", "languages": ["en"]},
+        "device": {"workspace_mm": [100, 60, 60]},
+        "liquids": {
+            "quagmire": {"density_kg_m3": 1013.7},
+            "mildew": {
+                "density_kg_m3": 1391.3,
+                "effects": ["drag", "wake"],
+                "wake": {"length": 1717, "scaling": 1931, "decay": 0.99917},
+            },
+            "spare": {"density_kg_m3": 777.1},
+        },
+        "conditions": {
+            "feel_quagmire": {"liquid": "quagmire"},
+            "feel_mildew": {"liquid": "mildew"},
+            "see_prompt": {"liquid": "quagmire", "delay_ms": 0},
+            "see_tardy": {"liquid": "quagmire", "delay_ms": 137},
+            "learn": {"liquid": "spare"},
+        },
+        "tasks": {"feel": {"kind": "explore", "min_s": 0, "max_s": 9, "instruction": "Move the ball."}},
+        "scales": {"agreement": {"labels": {"en": SEVEN}, "cannot_judge": "Cannot judge"}},
+        "questionnaires": {"form": {"intro": "Agree?", "scale": "agreement", "item_order": "shuffled", "items": items}},
+        "pages": {"consent": {"kind": "consent", "title": "Consent", "body": "You may stop at any time."}},
+        "blocks": {
+            "practice": {**block, "phase": "practice", "order": "fixed", "conditions": ["learn"]},
+            "liquids": {
+                **block,
+                "part": 1,
+                "code_prefix": "L",
+                "conditions": ["feel_quagmire", "feel_mildew"],
+                "questionnaire": "form",
+            },
+            "delays": {
+                **block,
+                "part": 2,
+                "code_prefix": "D",
+                "conditions": ["see_prompt", "see_tardy"],
+                "questionnaire": "form",
+            },
+        },
+        "sequence": ["consent", "practice", "liquids", "delays"],
+    }
+    return tables | changes
+
+
+@pytest.fixture
+def tables_of_study() -> Callable[..., dict[str, Any]]:
+    return study_tables
+
+
+@pytest.fixture
+def protocol() -> Protocol:
+    return Protocol.model_validate(study_tables())
+
+
+@pytest.fixture
+def clock() -> SessionClock:
+    """A clock that moves a millisecond with each look at it."""
+    ticks = itertools.count(5_000_000_000, 1_000_000)
+    origin = datetime(2026, 3, 1, 10, 0, tzinfo=timezone(timedelta(hours=1)))
+    return SessionClock(lambda: next(ticks), origin)
+
+
+@pytest.fixture
+def start(tmp_path: Path, protocol: Protocol, clock: SessionClock) -> Callable[..., SessionStore]:
+    """Begin a session of P007 in tmp_path/study; any argument of ``begin`` can be given."""
+
+    def begun(participant: str = "P007", **given: Any) -> SessionStore:
+        arguments: dict[str, Any] = {
+            "results": tmp_path / "study",
+            "protocol": protocol,
+            "source": SOURCE,
+            "seed": 11,
+            "operator": "AB",
+            "language": "en",
+            "device": {"name": "scripted", "rate_hz": 1000},
+            "screens": {"participant": {"width": 1920, "height": 1080, "refresh_hz": 60.0}},
+            "simulated": False,
+            "clock": clock,
+        }
+        return begin(participant=participant, **(arguments | given))
+
+    return begun
+
+
+def summary_of_trial() -> dict[str, Any]:
+    return {
+        "duration_s": 9.0,
+        "targets_reached": None,
+        "targets": None,
+        "ticks": 9000,
+        "tick_rate_hz": 999.98,
+        "lateness_p99_ms": 0.125,
+        "worst_gap_ms": 1.5,
+        "overruns": 0,
+        "samples_dropped": 0,
+        "path_length_m": 1.25,
+        "mean_speed_mps": 0.1389,
+        "force_mean_n": 0.1 + 0.2,
+        "force_peak_n": 2.5,
+        **{f"limiter_{name}": 0 for name in LIMITER_NAMES},
+        "frames": 540,
+        "frames_late": 2,
+        "delay_error_mean_ms": 8.25,
+        "delay_error_p95_ms": 16.5,
+        "delay_error_max_ms": 17.0,
+    }
+
+
+@pytest.fixture
+def summary() -> dict[str, Any]:
+    return summary_of_trial()
+
+
+@pytest.fixture
+def attend(protocol: Protocol) -> Callable[[SessionStore], None]:
+    """Walk a session through its schedule as the session's machine journals it, up to the end."""
+
+    def attended(store: SessionStore) -> None:
+        for trial in build_schedule(protocol, "P007", 11).trials:
+            which = {"trial": trial.number, "attempt": 1}
+            told = {name: getattr(trial, name) for name in ("block", "phase", "part", "index", "of", "code")}
+            store.append("trial_started", **which, **told)
+            store.append("trial_ended", **which, outcome="complete", **summary_of_trial())
+            store.write_tables()
+            if trial.items:
+                items = [
+                    {
+                        "item": item,
+                        "number": number,
+                        "value": 1 + (trial.number + number) % 7,
+                        "onset_s": 1.5,
+                        "first_s": 2.25,
+                        "last_s": 2.25,
+                        "changes": 0,
+                    }
+                    for number, item in enumerate(trial.items, start=1)
+                ]
+                store.append("responses", **which, items=items)
+                store.write_tables()
+
+    return attended

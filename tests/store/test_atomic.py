@@ -1,0 +1,93 @@
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from study_app.errors import StoreError
+from study_app.store.atomic import append_line, create_folder, is_there, write_file
+
+resource = pytest.importorskip("resource", reason="limits of file size are set through the resource module")
+
+
+@contextmanager
+def files_up_to(size: int) -> Iterator[None]:
+    """Let the system refuse to write any file beyond ``size`` bytes, as a full disk does."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+def names_in(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir())
+
+
+def test_a_file_is_written_and_replaced_whole(tmp_path: Path) -> None:
+    path = tmp_path / "table.csv"
+    write_file(path, b"old\n")
+    write_file(path, b"new\n" * 100_000)
+    assert path.read_bytes() == b"new\n" * 100_000
+    assert names_in(tmp_path) == ["table.csv"]
+
+
+def test_a_write_that_fails_in_the_middle_leaves_the_old_file_and_nothing_beside(tmp_path: Path) -> None:
+    path = tmp_path / "table.csv"
+    write_file(path, b"old\n")
+    with files_up_to(1000), pytest.raises(StoreError, match=r"table\.csv cannot be written \(File too large\)"):
+        write_file(path, b"new\n" * 100_000)
+    assert path.read_bytes() == b"old\n"
+    assert names_in(tmp_path) == ["table.csv"]
+
+
+def test_a_rename_that_fails_leaves_nothing_beside(tmp_path: Path) -> None:
+    path = tmp_path / "table.csv"
+    (path / "held").mkdir(parents=True)
+    with pytest.raises(StoreError, match="Is a directory"):
+        write_file(path, b"new\n")
+    assert names_in(tmp_path) == ["table.csv"]
+
+
+def test_only_what_may_be_looked_for_is_there_or_not(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    assert is_there(tmp_path / "file")
+    assert not is_there(tmp_path / "none")
+    assert not is_there(tmp_path / "file" / "below")
+    with pytest.raises(StoreError, match=r"cannot be read \(File name too long\)"):
+        is_there(tmp_path / ("x" * 5000))
+
+
+def test_a_folder_is_created_once_with_all_its_files(tmp_path: Path) -> None:
+    path = tmp_path / "blinding"
+    assert create_folder(path, {"key": b"first", "other": b"too"})
+    assert not create_folder(path, {"key": b"second", "other": b"too"})
+    assert (path / "key").read_bytes() == b"first"
+    assert names_in(tmp_path) == ["blinding"]
+
+
+def test_a_folder_that_cannot_be_filled_is_not_created(tmp_path: Path) -> None:
+    with files_up_to(1000), pytest.raises(StoreError, match="blinding cannot be written"):
+        create_folder(tmp_path / "blinding", {"key": b"x" * 5000})
+    assert names_in(tmp_path) == []
+
+
+def test_lines_are_appended_after_a_torn_one_without_losing_either(tmp_path: Path) -> None:
+    path = tmp_path / "reveals.jsonl"
+    append_line(path, b"1\n")
+    with path.open("ab") as file:
+        file.write(b"tor")
+    append_line(path, b"2\n")
+    append_line(path, b"3\n")
+    assert path.read_bytes() == b"1\ntor\n2\n3\n"
+
+
+def test_a_line_that_does_not_fit_is_taken_back(tmp_path: Path) -> None:
+    path = tmp_path / "reveals.jsonl"
+    append_line(path, b"1\n")
+    with files_up_to(100), pytest.raises(StoreError, match=r"reveals\.jsonl cannot be written"):
+        append_line(path, b"x" * 5000 + b"\n")
+    assert path.read_bytes() == b"1\n"

@@ -1,0 +1,208 @@
+from __future__ import annotations
+
+import json
+import time
+from datetime import datetime, timedelta, timezone
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from study_app.errors import StoreError
+from study_app.store.journal import Journal, SessionClock, plain, read, scan
+
+resource = pytest.importorskip("resource", reason="limits of file size are set through the resource module")
+
+AWKWARD = 'comma, "quote",\nnew line\r\n\ttab 🌊 \u2028\x85 =SUM(A1)' + "é" * 10_000
+
+
+def three_answers(path: Path) -> Path:
+    with Journal.create(path) as journal:
+        journal.append("session_started", participant="P007")
+        for trial in (1, 2, 3):
+            journal.append("choice", trial=trial, item="calm", value=trial, text='naïve 🌊, "q"\n')
+    return path
+
+
+def test_a_line_explains_itself_and_is_returned_as_it_will_be_read(tmp_path: Path, clock: SessionClock) -> None:
+    path = tmp_path / "journal.jsonl"
+    with Journal.create(path, clock) as journal:
+        written = [
+            journal.append("page_shown", page="consent"),
+            journal.append("choice", t_s=12.3456789, item="calm", value=None),
+        ]
+    assert read(path) == written
+    assert written[1] == {
+        "n": 2,
+        "event": "choice",
+        "t_s": 12.345679,
+        "at": "2026-03-01T10:00:12.345+01:00",
+        "item": "calm",
+        "value": None,
+    }
+
+
+def test_a_line_is_on_the_disk_when_append_returns(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The file was flushed, whole, before the caller goes on."""
+    path = tmp_path / "journal.jsonl"
+    flushed: list[bytes] = []
+    with Journal.create(path) as journal:
+        monkeypatch.setattr("study_app.store.journal.os.fsync", lambda _: flushed.append(path.read_bytes()))
+        for count in (1, 2, 3):
+            journal.append("choice", value=count)
+            assert len(flushed) == count
+            assert flushed[-1] == path.read_bytes()
+    assert flushed[-1].count(b"\n") == 3
+
+
+def test_cut_at_any_byte_it_reads_to_the_last_whole_line(tmp_path: Path) -> None:
+    path = three_answers(tmp_path / "journal.jsonl")
+    content, lines = path.read_bytes(), read(path)
+    ends = [end + 1 for end, byte in enumerate(content) if byte == ord("\n")]
+    assert len(ends) == 4
+    cut = tmp_path / "cut.jsonl"
+    for size in range(len(content) + 1):
+        cut.write_bytes(content[:size])
+        whole = sum(end <= size for end in ends)
+        contents = scan(cut)
+        assert read(cut) == contents.lines == lines[:whole]
+        assert contents.whole_bytes == ([0, *ends])[whole]
+        assert contents.torn_bytes == size - contents.whole_bytes
+        assert contents.damage is None
+
+
+@pytest.mark.parametrize("tail", [b"\0" * 4096, b'{"n":5,"event"\n', b"\xff\xfe\n\0\0\n", b"[5]\n", b"7"])
+def test_what_a_power_cut_leaves_at_the_end_is_left_out_and_counted(tmp_path: Path, tail: bytes) -> None:
+    path = three_answers(tmp_path / "journal.jsonl")
+    with path.open("ab") as file:
+        file.write(tail)
+    contents = scan(path)
+    assert len(contents.lines) == 4
+    assert contents.torn_bytes == len(tail)
+    assert contents.damage is None
+
+
+def test_a_broken_line_before_whole_ones_is_damage_and_not_a_torn_tail(tmp_path: Path) -> None:
+    path = three_answers(tmp_path / "journal.jsonl")
+    lines = path.read_bytes().split(b"\n")
+    lines[1] = lines[1][:20]
+    path.write_bytes(b"\n".join(lines))
+    with pytest.raises(StoreError, match=r"journal\.jsonl, line 2: damaged, though whole lines follow"):
+        read(path)
+    assert len(scan(path).lines) == 1
+
+
+@pytest.mark.parametrize("order", [(0, 1, 3), (0, 1, 1, 2), (1, 2, 3)])
+def test_a_missing_or_doubled_line_is_damage(tmp_path: Path, order: tuple[int, ...]) -> None:
+    path = three_answers(tmp_path / "journal.jsonl")
+    lines = path.read_bytes().splitlines(keepends=True)
+    path.write_bytes(b"".join(lines[index] for index in order))
+    with pytest.raises(StoreError, match="lines are missing or doubled"):
+        read(path)
+
+
+def test_a_journal_that_is_not_there_is_named(tmp_path: Path) -> None:
+    with pytest.raises(StoreError, match=r"journal\.jsonl cannot be read \(No such file or directory\)"):
+        read(tmp_path / "journal.jsonl")
+
+
+def test_an_existing_journal_is_never_written_over(tmp_path: Path) -> None:
+    path = three_answers(tmp_path / "journal.jsonl")
+    before = path.read_bytes()
+    with pytest.raises(StoreError, match="exists already"):
+        Journal.create(path)
+    assert path.read_bytes() == before
+
+
+def test_a_folder_that_is_not_there_is_named(tmp_path: Path) -> None:
+    with pytest.raises(StoreError, match="cannot be written"):
+        Journal.create(tmp_path / "gone" / "journal.jsonl")
+
+
+@pytest.mark.parametrize("mended", [True, False], ids=["taken back at once", "taken back before the next line"])
+def test_after_a_full_disk_it_goes_on_where_it_was(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *, mended: bool
+) -> None:
+    path = tmp_path / "journal.jsonl"
+    journal = Journal.create(path)
+    first = journal.append("choice", value=1)
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (500, hard))
+    try:
+        with monkeypatch.context() as patched:
+            if not mended:
+                patched.setattr(journal, "_take_back", _refuse)
+            with pytest.raises(StoreError, match=r"journal\.jsonl cannot be written \(File too large\)"):
+                journal.append("note", text=AWKWARD)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert read(path) == [first]
+    assert (scan(path).torn_bytes == 0) == mended
+    second = journal.append("choice", value=2)
+    journal.close()
+    assert second["n"] == 2
+    assert read(path) == [first, second]
+
+
+def _refuse() -> None:
+    raise OSError(28, "No space left on device")
+
+
+def test_after_its_end_it_takes_nothing(tmp_path: Path) -> None:
+    journal = Journal.create(tmp_path / "journal.jsonl")
+    journal.close()
+    with pytest.raises(StoreError, match="'note' came after the session's end"):
+        journal.append("note", text="late")
+
+
+def test_setting_the_wall_clock_back_moves_no_time(tmp_path: Path) -> None:
+    """The wall clock is read once; a session's times come from the monotonic clock."""
+    now = [1_000]
+    origin = datetime(2026, 10, 25, 1, 59, 59, tzinfo=timezone(timedelta(hours=2)))
+    clock = SessionClock(lambda: now[0], origin)
+    with Journal.create(tmp_path / "journal.jsonl", clock) as journal:
+        now[0] += 2_500_000_000
+        line = journal.append("page_shown", page="consent")
+    assert line["t_s"] == 2.5
+    assert line["at"] == "2026-10-25T02:00:01.500+02:00"
+
+
+def test_the_clock_is_the_systems_by_default() -> None:
+    before = time.monotonic_ns()
+    clock = SessionClock()
+    assert before <= clock.origin_ns <= time.monotonic_ns()
+    assert clock.origin_at.utcoffset() is not None
+    assert clock.seconds() >= 0
+
+
+def test_numbers_become_plain_and_those_that_are_none_null() -> None:
+    mixed = {"a": np.int64(3), "b": np.float32(0.5), "c": float("nan"), "d": (np.inf, np.array([1.0, np.nan])), 5: True}
+    assert plain(mixed) == {"a": 3, "b": 0.5, "c": None, "d": [None, [1.0, None]], "5": True}
+    assert type(plain(np.bool_(True))) is bool
+
+
+json_values = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(), inner, max_size=3),
+    max_leaves=8,
+)
+
+
+@given(value=json_values)
+def test_any_value_comes_back(tmp_path_factory: pytest.TempPathFactory, value: Any) -> None:
+    path = tmp_path_factory.mktemp("journal") / "journal.jsonl"
+    with Journal.create(path) as journal:
+        journal.append("note", text=AWKWARD, value=value)
+        journal.append("note", text="")
+    assert [(line["text"], line.get("value")) for line in read(path)] == [(AWKWARD, value), ("", None)]
+    assert path.read_bytes().count(b"\n") == 2
+
+
+def test_half_a_surrogate_pair_is_kept_as_an_escape(tmp_path: Path) -> None:
+    path = tmp_path / "journal.jsonl"
+    with Journal.create(path) as journal:
+        journal.append("note", text="half \ud83c here")
+    assert json.loads(path.read_text(encoding="utf-8"))["text"] == "half \ud83c here"
