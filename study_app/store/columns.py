@@ -1,0 +1,271 @@
+"""The column dictionary: every column of every table, said once.
+
+Headers, ``dataset_description.json`` and every check of a finished folder are made from these lines. Columns of one
+name mean the same in every table.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal, TypeAlias
+
+from study_app.haptics.layout import LIMITER_NAMES
+
+Kind: TypeAlias = Literal["text", "integer", "number", "flag", "time"]
+
+MISSING = "n/a"
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """One column: its name, what its cells are, and what they mean.
+
+    ``kind``: flags are ``true`` or ``false``, times ISO 8601 with zone. ``levels`` are all permitted values where
+    these are few, each with its meaning. Where ``may_miss``, a cell can be ``n/a``.
+    """
+
+    name: str
+    kind: Kind
+    description: str
+    unit: str = ""
+    levels: tuple[tuple[str, str], ...] = ()
+    minimum: float | None = None
+    maximum: float | None = None
+    may_miss: bool = False
+
+
+_STUDY = Column("study", "text", "Short name of the study, from its protocol.")
+_PARTICIPANT = Column("participant", "text", "The participant's id: letters and digits, no name.")
+_SESSION = Column("session", "integer", "Number of the participant's session.", minimum=1, maximum=99)
+_SIMULATED = Column("simulated", "flag", "true where participant and device were simulated (a rehearsal).")
+_PILOT = Column("pilot", "flag", "true where the session was a pilot.")
+_TRIAL = Column("trial", "integer", "Number of the trial in the session, in the order of presentation.", minimum=1)
+_ATTEMPT = Column(
+    "attempt", "integer", "1, or higher where the trial was presented again; the highest counts.", minimum=1
+)
+_BLOCK = Column("block", "text", "Id of the block of trials.")
+_PHASE = Column(
+    "phase",
+    "text",
+    "What the trial is for; only main trials are analysed.",
+    levels=(
+        ("main", "counts"),
+        ("practice", "learning the task"),
+        ("baseline", "the undisturbed task that later statements compare with"),
+    ),
+)
+_PART = Column("part", "integer", "Part of the study as the participant is told it.", minimum=1, may_miss=True)
+_INDEX = Column("index", "integer", "Place of the trial in its block, from 1.", minimum=1)
+_CODE = Column("code", "text", "What was presented, as a code (L1, D3 ...) that the sealed key translates.")
+
+RESPONSES: tuple[Column, ...] = (
+    _STUDY,
+    _PARTICIPANT,
+    _SESSION,
+    _SIMULATED,
+    _PILOT,
+    _TRIAL,
+    _ATTEMPT,
+    _BLOCK,
+    _PHASE,
+    _PART,
+    _INDEX,
+    _CODE,
+    Column("item", "text", "Id of the statement; its words are in the session's receipt."),
+    Column("number", "integer", "Place of the statement on its page, from 1, as shown.", minimum=1),
+    Column(
+        "response",
+        "integer",
+        "The answer on the scale, from 1 (completely disagree) to 7 (completely agree).",
+        minimum=1,
+        maximum=7,
+        may_miss=True,
+    ),
+    Column("cannot_judge", "flag", "true where the participant chose the answer off the scale."),
+    Column("onset_s", "number", "When the statement was shown, on the session's clock.", "s", minimum=0, may_miss=True),
+    Column(
+        "first_choice_s",
+        "number",
+        "When an answer was first chosen, on the session's clock.",
+        "s",
+        minimum=0,
+        may_miss=True,
+    ),
+    Column(
+        "last_change_s",
+        "number",
+        "When the final answer was chosen, on the session's clock.",
+        "s",
+        minimum=0,
+        may_miss=True,
+    ),
+    Column("changes", "integer", "How often an answer already chosen was changed.", minimum=0),
+    Column("answered_at", "time", "When the page of statements was confirmed."),
+)
+
+
+def _measure(name: str, description: str, unit: str = "") -> Column:
+    return Column(name, "number", description, unit, minimum=0, may_miss=True)
+
+
+def _count(name: str, description: str) -> Column:
+    return Column(name, "integer", description, minimum=0, may_miss=True)
+
+
+_LIMITERS = {
+    "slope": "the slope limit bounded the change of force with speed",
+    "non_finite": "a force that is no number was replaced by zero",
+    "energy": "the energy account damped the force",
+    "norm": "the force was cut to the force limit",
+    "slew": "the change of force was slowed",
+    "fade": "the force was fading in or out",
+    "stale": "the device had no new sample in time",
+    "glitch": "a sample was refused as impossible",
+    "stop": "the force was stopped",
+}
+
+TRIALS: tuple[Column, ...] = (
+    _STUDY,
+    _PARTICIPANT,
+    _SESSION,
+    _SIMULATED,
+    _PILOT,
+    _TRIAL,
+    _ATTEMPT,
+    _BLOCK,
+    _PHASE,
+    _PART,
+    _INDEX,
+    Column("of", "integer", "Number of trials in the block.", minimum=1),
+    _CODE,
+    Column("trial_started_at", "time", "When the trial began."),
+    Column("trial_started_s", "number", "When the trial began, on the session's clock.", "s", minimum=0),
+    Column(
+        "outcome",
+        "text",
+        "How the trial ended; n/a while it runs.",
+        levels=(
+            ("complete", "the task was done"),
+            ("timeout", "the task's time ran out"),
+            ("interrupted", "stopped before its end: paused, repeated, broken off, or the program ended"),
+        ),
+        may_miss=True,
+    ),
+    _measure("duration_s", "From the trial's beginning to its end, on the device's clock.", "s"),
+    _count("targets_reached", "Targets reached."),
+    _count("targets", "Targets to be reached; n/a where the task has none or no fixed number."),
+    _count("ticks", "Turns of the servo during the trial."),
+    _measure("tick_rate_hz", "Rate of the servo, achieved.", "Hz"),
+    _measure("lateness_p99_ms", "Lateness of the servo's turns, 99th percentile.", "ms"),
+    _measure("worst_gap_ms", "Longest time between two turns of the servo.", "ms"),
+    _count("overruns", "Turns of the servo that did not fit their time."),
+    _count("samples_dropped", "Samples of the telemetry that were overwritten before they were read."),
+    _measure("path_length_m", "Length of the hand's path.", "m"),
+    _measure("mean_speed_mps", "Mean speed of the hand.", "m/s"),
+    _measure("force_mean_n", "Mean magnitude of the force sent to the device.", "N"),
+    _measure("force_peak_n", "Largest magnitude of the force sent to the device.", "N"),
+    *(_count(f"limiter_{name}", f"Turns of the servo in which {_LIMITERS[name]}.") for name in LIMITER_NAMES),
+    _count("frames", "Frames shown to the participant."),
+    _count("frames_late", "Frames shown later than the protocol's limit allows."),
+    Column("delay_error_mean_ms", "number", "Visual delay, achieved less requested: mean.", "ms", may_miss=True),
+    Column(
+        "delay_error_p95_ms", "number", "Visual delay, achieved less requested: 95th percentile.", "ms", may_miss=True
+    ),
+    Column("delay_error_max_ms", "number", "Visual delay, achieved less requested: largest.", "ms", may_miss=True),
+    Column(
+        "valid",
+        "flag",
+        "true where the trial kept the protocol's limits of lateness, gaps and delay error.",
+        may_miss=True,
+    ),
+    Column("marked", "flag", "true where the operator marked the trial."),
+    Column(
+        "notes",
+        "text",
+        "The operator's notes from this trial's beginning to the next one's, and why it was repeated, one a line.",
+        may_miss=True,
+    ),
+)
+
+PARTICIPANTS: tuple[Column, ...] = (
+    _STUDY,
+    _PARTICIPANT,
+    _SESSION,
+    _SIMULATED,
+    _PILOT,
+    Column(
+        "status",
+        "text",
+        "How the session ended.",
+        levels=(
+            ("complete", "it went to its last page"),
+            ("withdrawn", "the participant stopped"),
+            ("aborted", "the operator stopped it"),
+            ("broken", "the operator stopped it after device, servo or program had failed"),
+            ("damaged", "its journal is damaged: the row says what could be read"),
+            ("unfinished", "no end recorded: it runs still, or its program was ended from outside"),
+        ),
+    ),
+    Column("session_started_at", "time", "When the session began."),
+    Column("session_ended_at", "time", "When the session ended.", may_miss=True),
+    Column("device", "text", "The haptic device.", may_miss=True),
+    Column("language", "text", "Language of the participant's pages."),
+    Column("trials", "integer", "Main trials that ran to their end.", minimum=0),
+    Column("responses", "integer", "Answers on the scale given in main trials.", minimum=0),
+    Column(
+        "validity",
+        "text",
+        "Whether the session's main trials kept the protocol's limits; n/a before the first has ended.",
+        levels=(("valid", "all did"), ("invalid", "at least one did not")),
+        may_miss=True,
+    ),
+)
+
+TABLES: dict[str, tuple[Column, ...]] = {
+    "responses": RESPONSES,
+    "trials": TRIALS,
+    "participants": PARTICIPANTS,
+}
+
+
+def header(columns: tuple[Column, ...]) -> tuple[str, ...]:
+    """Return the column names in file order."""
+    return tuple(column.name for column in columns)
+
+
+def every_column() -> tuple[Column, ...]:
+    """Return each column of all tables once, in the order of first use."""
+    return tuple({column.name: column for columns in TABLES.values() for column in columns}.values())
+
+
+def variable(column: Column) -> dict[str, Any]:
+    """Return ``column`` as a schema.org PropertyValue for ``dataset_description.json``."""
+    meanings = "; ".join(f"{level}: {meaning}" for level, meaning in column.levels)
+    described: dict[str, Any] = {
+        "@type": "PropertyValue",
+        "name": column.name,
+        "description": f"{column.description} Levels: {meanings}." if meanings else column.description,
+        "valuePattern": _pattern(column),
+    }
+    if column.unit:
+        described["unitText"] = column.unit
+    if column.minimum is not None:
+        described["minValue"] = column.minimum
+    if column.maximum is not None:
+        described["maxValue"] = column.maximum
+    return described
+
+
+_PATTERNS: dict[Kind, str] = {
+    "text": r"[\s\S]*",
+    "integer": r"-?[0-9]+",
+    "number": r"-?[0-9]+(\.[0-9]+)?(e[+-]?[0-9]+)?",
+    "flag": "true|false",
+    "time": r"[0-9]{4}-[0-9]{2}-[0-9]{2}T[0-9]{2}:[0-9]{2}:[0-9]{2}\.[0-9]{3}[+-][0-9]{2}:[0-9]{2}",
+}
+
+
+def _pattern(column: Column) -> str:
+    """Return the regular expression of a whole cell."""
+    value = "|".join(level for level, _ in column.levels) if column.levels else _PATTERNS[column.kind]
+    return f"({value}|{MISSING})" if column.may_miss else f"({value})"

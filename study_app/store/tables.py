@@ -1,0 +1,177 @@
+"""Tables from journals: pure functions of the lines alone, so any table can be made again at any time.
+
+A row is a dictionary from column name to value; ``csv_bytes`` writes rows with the columns of ``columns.py``, in their
+order, the same bytes for the same rows on every machine.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, TypeAlias
+
+from study_app.errors import StoreError
+from study_app.store.columns import MISSING, RESPONSES, TRIALS, Column, header
+from study_app.store.journal import Line
+
+Row: TypeAlias = dict[str, Any]
+
+_SESSION_COLUMNS = ("study", "participant", "session", "simulated", "pilot")
+_TRIAL_COLUMNS = ("trial", "attempt", "block", "phase", "part", "index", "code")
+_DERIVED = ("trial_started_at", "trial_started_s", "outcome", "valid", "marked", "notes")
+_MEASURED = tuple(name for name in header(TRIALS) if name not in (*_SESSION_COLUMNS, *_TRIAL_COLUMNS, "of", *_DERIVED))
+
+# What is judged in a trial's row by which limit of the protocol.
+_JUDGED = (
+    ("lateness_p99_ms", "lateness_ms"),
+    ("worst_gap_ms", "worst_gap_ms"),
+    ("delay_error_p95_ms", "delay_error_ms"),
+)
+
+
+def responses(lines: Sequence[Line]) -> list[Row]:
+    """Return one row per response, in the order of confirmation."""
+    session = _session(lines)
+    started: dict[tuple[int, int], Line] = {}
+    rows: list[Row] = []
+    for line in lines:
+        if line["event"] == "trial_started":
+            started[line["trial"], line["attempt"]] = line
+        elif line["event"] == "responses":
+            trial = started[line["trial"], line["attempt"]]
+            rows += [_response(session, trial, answer, line["at"]) for answer in line["items"]]
+    return rows
+
+
+def trials(lines: Sequence[Line]) -> list[Row]:
+    """Return one row per presentation of a trial, in order; the running one has no outcome yet."""
+    session = _session(lines)
+    limits = lines[0].get("limits", {})
+    rows: list[Row] = []
+    for line in lines:
+        match line["event"]:
+            case "trial_started":
+                _interrupt(rows)
+                rows.append(_trial(session, line))
+            case "trial_ended":
+                row = _row_of(rows, line)
+                row |= {name: line.get(name) for name in _MEASURED}
+                row |= {"outcome": line["outcome"], "valid": _verdict(row, limits)}
+            case "session_ended":
+                _interrupt(rows)
+            case "note" if rows:
+                _note(rows[-1], line["text"], mark=line["kind"] == "mark")
+            case "repeat" if rows:
+                _note(rows[-1], f"repeated: {line['reason']}")
+    return rows
+
+
+def participant(lines: Sequence[Line]) -> Row:
+    """Return the session's row of the participants table."""
+    start = lines[0]
+    ends = [line for line in lines if line["event"] == "session_ended"]
+    main = [
+        row for row in latest(trials(lines)) if row["phase"] == "main" and row["outcome"] in ("complete", "timeout")
+    ]
+    answered = [row for row in latest(responses(lines)) if row["phase"] == "main" and row["response"] is not None]
+    verdicts = [row["valid"] for row in main if row["valid"] is not None]
+    return {
+        **_session(lines),
+        "status": ends[-1]["status"] if ends else "unfinished",
+        "session_started_at": start["at"],
+        "session_ended_at": ends[-1]["at"] if ends else None,
+        "device": start.get("device"),
+        "language": start["language"],
+        "trials": len(main),
+        "responses": len(answered),
+        "validity": None if not verdicts else "valid" if all(verdicts) else "invalid",
+    }
+
+
+def latest(rows: Iterable[Row]) -> list[Row]:
+    """Return the rows of each trial's last attempt, in order."""
+    rows = list(rows)
+    last: dict[int, int] = {}
+    for row in rows:
+        last[row["trial"]] = max(row["attempt"], last.get(row["trial"], 0))
+    return [row for row in rows if row["attempt"] == last[row["trial"]]]
+
+
+def csv_bytes(columns: Sequence[Column], rows: Iterable[Mapping[str, Any]]) -> bytes:
+    """Return the table as CSV: comma, UTF-8, RFC 4180 quoting, one line feed a record, ``n/a`` where nothing is known.
+
+    Numbers are written in full (the shortest text that reads back as the same number). A cell's text is never changed;
+    half a surrogate pair, which no file can hold, becomes a question mark.
+    """
+    names = header(tuple(columns))
+    records = [",".join(names), *(",".join(_cell(row[name]) for name in names) for row in rows)]
+    return "".join(f"{record}\n" for record in records).encode("utf-8", "replace")
+
+
+def _cell(value: Any) -> str:
+    if value is None or (isinstance(value, float) and not math.isfinite(value)):
+        return MISSING
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    text = repr(value) if isinstance(value, float) else str(value)
+    if any(sign in text for sign in ',"\r\n') or text != text.strip():
+        return '"' + text.replace('"', '""') + '"'
+    return text
+
+
+def _session(lines: Sequence[Line]) -> Row:
+    if not lines or lines[0]["event"] != "session_started":
+        raise StoreError("the journal does not begin with session_started: it is no journal of a session")
+    return {name: lines[0][name] for name in _SESSION_COLUMNS}
+
+
+def _response(session: Row, trial: Line, answer: Mapping[str, Any], answered_at: str) -> Row:
+    row: Row = {
+        **session,
+        **{name: trial[name] for name in _TRIAL_COLUMNS},
+        "item": answer["item"],
+        "number": answer["number"],
+        "response": answer["value"],
+        "cannot_judge": answer["value"] is None and answer["first_s"] is not None,
+        "onset_s": answer["onset_s"],
+        "first_choice_s": answer["first_s"],
+        "last_change_s": answer["last_s"],
+        "changes": answer["changes"],
+        "answered_at": answered_at,
+    }
+    return {name: row[name] for name in header(RESPONSES)}
+
+
+def _trial(session: Row, line: Line) -> Row:
+    row: Row = dict.fromkeys(header(TRIALS))
+    row |= session
+    row |= {name: line[name] for name in (*_TRIAL_COLUMNS, "of")}
+    row |= {"trial_started_at": line["at"], "trial_started_s": line["t_s"], "marked": False}
+    return row
+
+
+def _row_of(rows: list[Row], line: Line) -> Row:
+    for row in reversed(rows):
+        if (row["trial"], row["attempt"]) == (line["trial"], line["attempt"]):
+            return row
+    raise StoreError(f"the journal's line {line['n']} ends trial {line['trial']}, which never started")
+
+
+def _interrupt(rows: list[Row]) -> None:
+    """Say of a trial that was left without its end that it was interrupted."""
+    if rows and rows[-1]["outcome"] is None:
+        rows[-1]["outcome"] = "interrupted"
+
+
+def _note(row: Row, text: str, *, mark: bool = False) -> None:
+    row["marked"] = row["marked"] or mark
+    if text:
+        row["notes"] = text if row["notes"] is None else f"{row['notes']}\n{text}"
+
+
+def _verdict(row: Row, limits: Mapping[str, float]) -> bool | None:
+    """Return whether what was measured keeps the limits; None where nothing was measured."""
+    judged = [
+        abs(row[measure]) <= limits[limit] for measure, limit in _JUDGED if row[measure] is not None and limit in limits
+    ]
+    return all(judged) if judged else None
