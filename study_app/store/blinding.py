@@ -1,0 +1,226 @@
+"""Which code stands for which condition: drawn once per study, sealed, and opened only with a name and a reason.
+
+``blinding/key.sealed`` is base64 of a JSON object with the codes, the conditions' and liquids' tables and a 256-bit
+nonce. It is encoded, not encrypted: that stops accidental sight, and its SHA-256 in every receipt proves it unchanged.
+The nonce keeps the hash from telling the key, however few keys there are. A real study's key comes from the operating
+system's randomness, a rehearsal's from its seed, and a folder holds one or the other.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import secrets
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from datetime import datetime
+from pathlib import Path
+from typing import Any, Literal, TypeAlias
+
+from study_app.errors import StoreError
+from study_app.protocol.model import Protocol
+from study_app.protocol.schedule import block_codes, draw_key
+from study_app.store import receipt
+from study_app.store.atomic import append_line, cannot_read, create_folder, is_there
+from study_app.store.layout import StudyFolder
+
+Codes: TypeAlias = dict[str, dict[str, str]]
+
+_FORMAT = 1
+_NONCE_BYTES = 32
+
+
+@dataclass(frozen=True, slots=True)
+class Key:
+    """The opened key. Never print, log or show what it holds before it was revealed.
+
+    ``codes`` is block → code → condition id; ``tables`` holds the protocol's tables ``conditions`` and ``liquids``;
+    ``drawn`` says where its randomness came from; ``hash`` is the SHA-256 of the sealed file.
+    """
+
+    hash: str
+    drawn: Literal["system", "seed"]
+    codes: Codes = field(repr=False)
+    tables: dict[str, Any] = field(repr=False)
+    tables_hash: str = field(repr=False)
+
+    def condition(self, block: str, code: str) -> str:
+        """Return the id of the condition that ``code`` of ``block`` stands for."""
+        try:
+            return self.codes[block][code]
+        except KeyError:
+            raise StoreError(
+                f"the sealed key knows no code {code!r} of block {block!r}: it is of another study"
+            ) from None
+
+    def delay_ms(self, block: str, code: str) -> float:
+        """Return the visual delay that was asked for [ms]."""
+        return float(self.tables["conditions"][self.condition(block, code)]["delay_ms"])
+
+    def liquids(self, block: str, code: str) -> tuple[str, ...]:
+        """Return the ids of the liquids that were felt."""
+        condition = self.tables["conditions"][self.condition(block, code)]
+        return tuple(condition["liquids"]) if condition["liquid"] is None else (str(condition["liquid"]),)
+
+
+def open_or_draw_key(folder: Path, protocol: Protocol, random: Callable[[], float] | None = None) -> Key:
+    """Return the study's key; draw and seal it where there is none.
+
+    Of two programs that start at once one draws, and the other reads what the first drew.
+
+    Parameters
+    ----------
+    folder : Path
+        The study folder.
+    random : callable, optional
+        Uniform numbers in [0, 1): a seeded stream's for a rehearsal. By default the operating system's randomness.
+
+    Raises
+    ------
+    StoreError
+        The key is missing though sessions ran under it, unreadable, changed, of a rehearsal where this is none (or the
+        other way round), or of a protocol with other conditions.
+    """
+    study = StudyFolder(folder)
+    drawn: Literal["system", "seed"] = "system" if random is None else "seed"
+    if not is_there(study.key):
+        _refuse_if_lost(study)
+        content = _seal(protocol, drawn, random or secrets.SystemRandom().random)
+        create_folder(study.blinding, {study.key.name: content})
+    key = _verified_key(study)
+    if key.drawn != drawn:
+        kinds = {"system": "real sessions", "seed": "a rehearsal"}
+        raise StoreError(
+            f"{folder} holds {kinds[key.drawn]}: {kinds[drawn]} would mix with it; use another results folder"
+        )
+    if key.tables_hash != _tables_hash(protocol):
+        raise StoreError(
+            f"{study.key} was sealed for other conditions than this protocol's: run the changed protocol into another "
+            "results folder"
+        )
+    return key
+
+
+def reveal(folder: Path, by: str, reason: str) -> Codes:
+    """Record who opens the key and why, then return block → code → condition id.
+
+    Raises
+    ------
+    StoreError
+        ``by`` or ``reason`` is empty, or the key is missing, unreadable or not the one the sessions ran under.
+    """
+    for name, text in (("by", by), ("reason", reason)):
+        if not text.strip():
+            raise StoreError(f"--{name} is empty: opening the key is recorded with a name and a reason")
+    study = StudyFolder(folder)
+    key = _verified_key(study)
+    record = {
+        "at": datetime.now().astimezone().isoformat(timespec="seconds"),
+        "by": by.strip(),
+        "reason": reason.strip(),
+        "key_hash": key.hash,
+    }
+    line = json.dumps(record, ensure_ascii=False).encode("utf-8", "backslashreplace")
+    append_line(study.reveals, line + b"\n")
+    return key.codes
+
+
+def revealed(folder: Path) -> Codes | None:
+    """Return block → code → condition id if the key was revealed, else None."""
+    key = revealed_key(folder)
+    return None if key is None else key.codes
+
+
+def revealed_key(folder: Path) -> Key | None:
+    """Return the key with the conditions' tables if it was revealed, else None.
+
+    Raises
+    ------
+    StoreError
+        It was revealed, and is now missing, unreadable or changed.
+    """
+    study = StudyFolder(folder)
+    return _verified_key(study) if reveals(folder) else None
+
+
+def reveals(folder: Path) -> tuple[dict[str, str], ...]:
+    """Return the recorded reveals, first to last: ``at``, ``by``, ``reason``, ``key_hash``."""
+    try:
+        content = StudyFolder(folder).reveals.read_bytes()
+    except FileNotFoundError:
+        return ()
+    except OSError as error:
+        raise cannot_read(StudyFolder(folder).reveals, error) from error
+    found: list[dict[str, str]] = []
+    for line in content.split(b"\n"):
+        try:
+            record = json.loads(line)
+        except ValueError:  # a torn line, of a reveal that never returned
+            continue
+        found.append(record)
+    return tuple(found)
+
+
+def _seal(protocol: Protocol, drawn: str, random: Callable[[], float]) -> bytes:
+    content = {
+        "format": _FORMAT,
+        "drawn": drawn,
+        "nonce": bytes(int(random() * 256) for _ in range(_NONCE_BYTES)).hex(),
+        "codes": draw_key(protocol, random),
+        "tables": protocol.model_dump(mode="json", include={"conditions", "liquids"}),
+        "tables_hash": _tables_hash(protocol),
+    }
+    return base64.encodebytes(json.dumps(content, ensure_ascii=False).encode())
+
+
+def _tables_hash(protocol: Protocol) -> str:
+    """Return the hash of the conditions as their author wrote them (a later version's new defaults change nothing)."""
+    written = {
+        **protocol.model_dump(mode="json", include={"conditions", "liquids"}, exclude_unset=True),
+        "blocks": {name: [block_codes(block), block.conditions] for name, block in protocol.blocks.items()},
+    }
+    return hashlib.sha256(json.dumps(written, sort_keys=True).encode()).hexdigest()
+
+
+def _verified_key(study: StudyFolder) -> Key:
+    """Read the key and compare its hash with what every receipt published."""
+    key = _read(study.key)
+    for session in study.sessions():
+        if is_there(session.receipt) and receipt.read(session.receipt)["key_hash"] != key.hash:
+            raise StoreError(
+                f"{study.key} is not the key that {session.path} ran under (its SHA-256 differs from the receipt's): "
+                "restore it from a copy"
+            )
+    return key
+
+
+def _read(path: Path) -> Key:
+    try:
+        sealed = path.read_bytes()
+    except OSError as error:
+        raise cannot_read(path, error) from error
+    try:
+        content = json.loads(base64.b64decode(sealed, validate=False))
+        if content["format"] != _FORMAT:
+            raise StoreError(
+                f"{path} has format {content['format']!r}, this version reads {_FORMAT}: use a newer version"
+            )
+        return Key(
+            hash=hashlib.sha256(sealed).hexdigest(),
+            drawn=content["drawn"],
+            codes=content["codes"],
+            tables=content["tables"],
+            tables_hash=content["tables_hash"],
+        )
+    except (ValueError, KeyError, TypeError) as error:
+        raise StoreError(f"{path} is no sealed key any more: restore it from a copy") from error
+
+
+def _refuse_if_lost(study: StudyFolder) -> None:
+    under = [session for session in study.sessions() if is_there(session.receipt)]
+    if under and not is_there(study.key):  # asked again: another program may just have drawn it
+        raise StoreError(
+            f"{study.key} is missing, though {len(under)} sessions ran under it: restore it from a copy; without it no "
+            "code can be translated"
+        )

@@ -1,0 +1,182 @@
+"""Where everything lies: names and folders of a study's results, and which participant ids they can hold.
+
+::
+
+    results/<study>/
+      dataset_description.json  exclusions.csv
+      blinding/key.sealed  blinding/reveals.jsonl
+      data/
+        study-<study>_description-participants_data.csv
+        sub-P007/ses-01/
+          journal.jsonl  receipt.json
+          subject-P007_session-01_task-<study>_description-responses_data.csv
+          subject-P007_session-01_task-<study>_description-trials_data.csv
+          recordings/
+
+Names follow Psych-DS: key-value pairs whose values are letters and digits only.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from study_app.errors import StoreError
+from study_app.store.atomic import is_there
+
+MAX_ID_LENGTH = 32
+MAX_SESSION = 99
+RESERVED_IDS = ("pilot", "test")
+
+_ID = re.compile(r"[A-Za-z0-9]+")
+_NUMBERED = re.compile(r"P([0-9]+)")
+_SESSION_FOLDER = re.compile(r"ses-([0-9]{2})")
+
+
+@dataclass(frozen=True, slots=True)
+class SessionFolder:
+    """One participant's one session."""
+
+    path: Path
+    participant: str
+    number: int
+
+    @property
+    def journal(self) -> Path:
+        """What happened, line by line."""
+        return self.path / "journal.jsonl"
+
+    @property
+    def receipt(self) -> Path:
+        """What ran: protocol, seed, versions, device, hashes."""
+        return self.path / "receipt.json"
+
+    @property
+    def recordings(self) -> Path:
+        """Samples and frames of the trials."""
+        return self.path / "recordings"
+
+    def table(self, study: str, name: str) -> Path:
+        """Return the file of table ``name`` (responses or trials)."""
+        return self.path / (
+            f"subject-{self.participant}_session-{self.number:02d}_task-{study}_description-{name}_data.csv"
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class StudyFolder:
+    """The results of one study."""
+
+    path: Path
+
+    @property
+    def description(self) -> Path:
+        """The Psych-DS description of every column."""
+        return self.path / "dataset_description.json"
+
+    @property
+    def exclusions(self) -> Path:
+        """What is left out of the analysis, by whom and why."""
+        return self.path / "exclusions.csv"
+
+    @property
+    def blinding(self) -> Path:
+        """The folder of key and reveals."""
+        return self.path / "blinding"
+
+    @property
+    def key(self) -> Path:
+        """The sealed key: which code stands for which condition."""
+        return self.blinding / "key.sealed"
+
+    @property
+    def reveals(self) -> Path:
+        """Who opened the key, when and why."""
+        return self.blinding / "reveals.jsonl"
+
+    @property
+    def data(self) -> Path:
+        """The folder of all tables."""
+        return self.path / "data"
+
+    def participants(self, study: str) -> Path:
+        """Return the table of all sessions."""
+        return self.data / f"study-{study}_description-participants_data.csv"
+
+    def session(self, participant: str, number: int) -> SessionFolder:
+        """Return where that session lies or would lie."""
+        return SessionFolder(self.data / f"sub-{participant}" / f"ses-{number:02d}", participant, number)
+
+    def sessions(self) -> tuple[SessionFolder, ...]:
+        """Return the sessions that were begun, by participant and number."""
+        found = [
+            SessionFolder(path, path.parent.name.removeprefix("sub-"), int(match[1]))
+            for path in self.data.glob("sub-*/ses-*")
+            if (match := _SESSION_FOLDER.fullmatch(path.name))
+        ]
+        return tuple(sorted(found, key=lambda session: (session.participant, session.number)))
+
+    def ids(self) -> tuple[str, ...]:
+        """Return the participant ids that were used, sorted."""
+        return tuple(sorted({session.participant for session in self.sessions()}))
+
+
+def study_folder(results: Path, study: str, *, pilot: bool = False) -> StudyFolder:
+    """Return the folder of ``study`` under ``results``; pilot sessions have one of their own."""
+    return StudyFolder(results / (f"{study}-pilot" if pilot else study))
+
+
+def check_participant(participant: str, *, pilot: bool = False) -> None:
+    """Refuse an id that file names or analysts cannot take.
+
+    Raises
+    ------
+    StoreError
+        Names the id and what is permitted.
+    """
+    if not _ID.fullmatch(participant) or len(participant) > MAX_ID_LENGTH:
+        raise StoreError(
+            f"participant id {participant!r} cannot be used: only letters A-Z, a-z and digits 0-9 are permitted, "
+            f"at most {MAX_ID_LENGTH}, no dash, space or underscore; for example P007"
+        )
+    if not pilot and participant.lower() in RESERVED_IDS:
+        raise StoreError(
+            f"participant id {participant!r} is kept for pilot sessions, so that no trial run lands among the data: "
+            "use an id such as P007"
+        )
+
+
+def check_unused(folder: StudyFolder, participant: str, number: int) -> None:
+    """Refuse a session that exists, or an id that differs from a used one in nothing but capitals.
+
+    Raises
+    ------
+    StoreError
+        Names the three ways to go on. Nothing is touched.
+    """
+    if not 1 <= number <= MAX_SESSION:
+        raise StoreError(f"session number {number} cannot be used: it must be from 1 to {MAX_SESSION}")
+    for used in folder.ids():
+        if used != participant and used.lower() == participant.lower():
+            raise StoreError(
+                f"participant id {participant!r} differs from the used {used!r} in capitals alone: use {used!r} with a "
+                "new session number, or another id"
+            )
+    if is_there(folder.session(participant, number).path):
+        raise used_id(folder, participant, number)
+
+
+def used_id(folder: StudyFolder, participant: str, number: int) -> StoreError:
+    """Return the refusal of a used id, with the three ways to go on."""
+    free = max((session.number for session in folder.sessions() if session.participant == participant), default=number)
+    return StoreError(
+        f"participant {participant} already has session {number} in {folder.path}: use a new session number "
+        f"({free + 1}), resume that session, or use another id (next free: {suggest_id(folder)}); nothing was changed"
+    )
+
+
+def suggest_id(folder: StudyFolder) -> str:
+    """Return the next free id: P001, P002 ..."""
+    numbers = [int(match[1]) for used in folder.ids() if (match := _NUMBERED.fullmatch(used.upper()))]
+    return f"P{max(numbers, default=0) + 1:03d}"

@@ -1,0 +1,85 @@
+"""What ran, for those who read the results later: everything but what the conditions are.
+
+The receipt holds the protocol without its liquids, its conditions and the blocks' lists of conditions (which are sealed
+in the key), the SHA-256 of the whole protocol file and of the sealed key, the seed and what it seeds, versions, device,
+screens and the clock's origin. It is written before the first trial and once more, with the status, at the end.
+"""
+
+from __future__ import annotations
+
+import json
+import platform
+from collections.abc import Mapping
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import study_app
+from study_app.errors import StoreError
+from study_app.protocol.model import Protocol
+from study_app.protocol.schedule import block_codes
+from study_app.store.atomic import cannot_read, write_file
+from study_app.store.journal import plain
+
+GENERATOR = (
+    "random.Random (Mersenne Twister), one per named stream, seeded by SHA-256 of (seed, name); only .random() is "
+    "used, under Fisher-Yates in Durstenfeld's form"
+)
+UNFINISHED = "unfinished"
+
+_LIBRARIES = ("numpy", "numba", "pydantic", "PySide6-Essentials", "pyqtgraph")
+
+
+def without_conditions(protocol: Protocol) -> dict[str, Any]:
+    """Return the protocol as a JSON value without what blinding hides; blocks keep their codes, in code order."""
+    shown = protocol.model_dump(mode="json", exclude={"liquids": True, "conditions": True})
+    for name, block in protocol.blocks.items():
+        del shown["blocks"][name]["conditions"]
+        shown["blocks"][name]["codes"] = list(block_codes(block))
+    return shown
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of the program, of Python, of the system and of the libraries that shape a session."""
+    found = {
+        "liquid-study": study_app.__version__,
+        "python": platform.python_version(),
+        "system": f"{platform.system()} {platform.release()} {platform.machine()}",
+    }
+    for library in _LIBRARIES:
+        try:
+            found[library] = metadata.version(library)
+        except metadata.PackageNotFoundError:
+            found[library] = "not installed"
+    return found
+
+
+def write(path: Path, receipt: Mapping[str, Any]) -> None:
+    """Write the receipt in one step.
+
+    Raises
+    ------
+    StoreError
+        It cannot be written.
+    """
+    text = json.dumps(plain(dict(receipt)), indent=2, ensure_ascii=False, allow_nan=False)
+    write_file(path, f"{text}\n".encode("utf-8", "backslashreplace"))
+
+
+def read(path: Path) -> dict[str, Any]:
+    """Return the receipt.
+
+    Raises
+    ------
+    StoreError
+        It is missing or no receipt.
+    """
+    try:
+        receipt = json.loads(path.read_bytes())
+    except OSError as error:
+        raise cannot_read(path, error) from error
+    except ValueError as error:
+        raise StoreError(f"{path} is no receipt ({error}): restore it from a copy") from error
+    if not isinstance(receipt, dict) or "key_hash" not in receipt:
+        raise StoreError(f"{path} is no receipt (no key_hash): restore it from a copy")
+    return receipt

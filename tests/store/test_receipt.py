@@ -1,0 +1,52 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from study_app import __version__
+from study_app.errors import StoreError
+from study_app.protocol.model import Protocol
+from study_app.store.receipt import read, versions, without_conditions, write
+
+
+def test_the_protocol_is_kept_without_its_conditions(protocol: Protocol) -> None:
+    shown = without_conditions(protocol)
+    whole = protocol.model_dump(mode="json")
+    assert set(whole) - set(shown) == {"liquids", "conditions"}
+    assert shown["questionnaires"] == whole["questionnaires"]
+    assert shown["scales"] == whole["scales"]
+    assert shown["pages"] == whole["pages"]
+    assert shown["tasks"] == whole["tasks"]
+    assert shown["limits"] == whole["limits"]
+    assert shown["blocks"]["liquids"]["codes"] == ["L1", "L2"]
+    assert shown["blocks"]["practice"]["codes"] == ["practice"]
+    assert not any("conditions" in block for block in shown["blocks"].values())
+
+
+def test_versions_name_what_shapes_a_session() -> None:
+    found = versions()
+    assert found["liquid-study"] == __version__
+    assert {"python", "system", "numpy", "numba", "pydantic", "PySide6-Essentials"} < set(found)
+    assert all(found.values())
+
+
+def test_a_receipt_comes_back(tmp_path: Path) -> None:
+    path = tmp_path / "receipt.json"
+    write(path, {"key_hash": "ab", "device": {"name": "naïve 🌊", "rate_hz": float("nan")}})
+    assert read(path) == {"key_hash": "ab", "device": {"name": "naïve 🌊", "rate_hz": None}}
+    assert path.read_bytes().endswith(b"}\n")
+
+
+@pytest.mark.parametrize("content", [b"", b"{", b"[]", json.dumps({"format": 1}).encode(), b"\xff"])
+def test_what_is_no_receipt_is_named(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "receipt.json"
+    path.write_bytes(content)
+    with pytest.raises(StoreError, match=r"receipt\.json is no receipt"):
+        read(path)
+
+
+def test_a_missing_receipt_is_named(tmp_path: Path) -> None:
+    with pytest.raises(StoreError, match=r"receipt\.json cannot be read"):
+        read(tmp_path / "receipt.json")
