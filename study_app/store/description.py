@@ -1,0 +1,69 @@
+"""``dataset_description.json``: the Psych-DS description of a study folder, generated from the column dictionary.
+
+Psych-DS 1.5 wants every header of every table listed in ``variableMeasured``, and nothing else: the tables of a study
+folder are written whole, headers included, before this file.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from study_app.errors import StoreError
+from study_app.protocol.model import StudyHead
+from study_app.protocol.texts import text_in
+from study_app.store.atomic import cannot_read, is_there, write_file
+from study_app.store.columns import every_column, variable
+from study_app.store.layout import StudyFolder
+
+
+def description_bytes(study: StudyHead) -> bytes:
+    """Return the file for ``study``; the same bytes for the same study on every machine."""
+    title = text_in(study.title, study.languages[0])
+    content = {
+        "@context": "https://schema.org/",
+        "@type": "Dataset",
+        "name": study.name,
+        "alternateName": title,
+        "description": study.description or title,
+        "version": study.version,
+        "variableMeasured": [variable(column) for column in every_column()],
+    }
+    return (json.dumps(content, indent=2, ensure_ascii=False) + "\n").encode()
+
+
+def write_description(folder: StudyFolder, study: StudyHead) -> None:
+    """Write the description where it is missing or of an older version of the study."""
+    content = description_bytes(study)
+    if not is_there(folder.description) or _read(folder.description) != content:
+        write_file(folder.description, content)
+
+
+def described_study(folder: StudyFolder) -> str | None:
+    """Return the name of the study whose folder this is, or None where it is none yet.
+
+    Raises
+    ------
+    StoreError
+        The description is there and cannot be read.
+    """
+    if not is_there(folder.description):
+        return None
+    try:
+        return str(json.loads(_read(folder.description))["name"])
+    except (ValueError, KeyError, TypeError) as error:
+        raise StoreError(f"{folder.description} describes no study: is {folder.path} a results folder?") from error
+
+
+def check_study(folder: StudyFolder, study: str) -> None:
+    """Refuse a folder that holds another study."""
+    described = described_study(folder)
+    if described is not None and described != study:
+        raise StoreError(f"{folder.path} holds the study {described!r}, not {study!r}: use another results folder")
+
+
+def _read(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise cannot_read(path, error) from error

@@ -1,0 +1,89 @@
+"""How long an answer takes to the disk: ``python tests/benchmarks/store.py [FOLDER on the disk to measure]``."""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from study_app.haptics.layout import LIMITER_NAMES
+from study_app.protocol.load import load, source_bytes
+from study_app.protocol.schedule import build_schedule
+from study_app.store.session import SessionStore, begin
+
+LIMIT_MS = 5.0
+
+
+def measure(action: Callable[[int], None], times: int) -> np.ndarray:
+    """Return the duration of each call [ms], shape (times,)."""
+    durations = np.empty(times)
+    for number in range(times):
+        start = time.perf_counter_ns()
+        action(number)
+        durations[number] = (time.perf_counter_ns() - start) / 1e6
+    return durations
+
+
+def answer_all(store: SessionStore, seed: int) -> int:
+    """Journal a whole session of rek2024; return its number of responses."""
+    summary = {f"limiter_{name}": 12 for name in LIMITER_NAMES} | {"ticks": 60_000, "force_mean_n": 1.2345678}
+    count = 0
+    for trial in build_schedule(load("rek2024"), "P001", seed).trials:
+        which = {"trial": trial.number, "attempt": 1}
+        told = {name: getattr(trial, name) for name in ("block", "phase", "part", "index", "of", "code")}
+        store.append("trial_started", **which, **told)
+        for target in range(10):
+            store.append("target_reached", trial=trial.number, target=target, t_task_s=target / 3)
+        store.append("trial_ended", **which, outcome="complete", **summary)
+        items = []
+        for number, item in enumerate(trial.items, start=1):
+            store.append("item_shown", trial=trial.number, item=item)
+            store.append("choice", trial=trial.number, item=item, value=4)
+            times = {"onset_s": 1.234567, "first_s": 2.345678, "last_s": 3.456789}
+            items.append({"item": item, "number": number, "value": 4, **times, "changes": 0})
+        store.append("responses", **which, items=items)
+        count += len(items)
+    return count
+
+
+def main() -> None:
+    with tempfile.TemporaryDirectory(dir=sys.argv[1] if len(sys.argv) > 1 else None) as folder:
+        given = {"seed": 1, "operator": "", "language": "en", "screens": {}, "simulated": False}
+        protocol, source = load("rek2024"), source_bytes("rek2024")
+        stores: list[SessionStore] = []
+        begun = measure(
+            lambda n: stores.append(
+                begin(Path(folder), protocol, source, f"P{n:03d}", device={"name": "mouse"}, **given)  # type: ignore[arg-type]
+            ),
+            20,
+        )
+        store = stores[0]
+        responses = answer_all(store, 1)
+        store.write_tables()
+        print(f"session of {responses} responses; {folder}")
+        print(f"{'':34}{'p50':>9}{'p99':>9}{'worst':>9}   [ms]")
+
+        def answer(number: int) -> None:
+            store.append("choice", trial=12, item="different", value=1 + number % 7)
+
+        def tables(number: int) -> None:
+            store.append("note", kind="note", text=str(number % 7))
+            store.write_tables()
+
+        rows = {
+            f"append, to the disk (limit {LIMIT_MS:g})": measure(answer, 2000),
+            "append and both tables renewed": measure(tables, 200),
+            "begin": begun,
+            "finish": measure(lambda n: stores[n].finish("complete"), 20),
+        }
+        for name, durations in rows.items():
+            p50, p99 = np.percentile(durations, [50, 99])
+            print(f"{name:34}{p50:9.2f}{p99:9.2f}{durations.max():9.2f}")
+
+
+if __name__ == "__main__":
+    main()

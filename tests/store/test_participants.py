@@ -1,0 +1,80 @@
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from study_app.store import participants
+from study_app.store.layout import StudyFolder
+from study_app.store.session import SessionStore
+
+
+def table(folder: Path) -> list[dict[str, str]]:
+    path = StudyFolder(folder).participants("brackish")
+    return list(csv.DictReader(io.StringIO(path.read_text(encoding="utf-8"), newline="")))
+
+
+def test_every_session_has_its_row_and_its_status(
+    tmp_path: Path, start: Callable[..., SessionStore], attend: Callable[[SessionStore], None]
+) -> None:
+    store = start("P002")
+    attend(store)
+    store.finish("complete")
+    start("P001").finish("withdrawn", "tired")
+    start("P001", session=2).close()
+    rows = table(tmp_path / "study")
+    assert [(row["participant"], row["session"], row["status"]) for row in rows] == [
+        ("P001", "1", "withdrawn"),
+        ("P001", "2", "unfinished"),
+        ("P002", "1", "complete"),
+    ]
+    assert (rows[2]["trials"], rows[2]["responses"], rows[2]["validity"]) == ("4", "12", "valid")
+    assert (rows[2]["device"], rows[2]["language"]) == ("scripted", "en")
+    assert rows[1]["session_ended_at"] == "n/a"
+
+
+def test_no_name_or_initials_are_in_it(tmp_path: Path, start: Callable[..., SessionStore]) -> None:
+    start("P001", operator="ZQX").finish("complete")
+    assert "ZQX" not in StudyFolder(tmp_path / "study").participants("brackish").read_text(encoding="utf-8")
+
+
+def test_a_damaged_journal_stops_nobody_and_is_marked(
+    tmp_path: Path, start: Callable[..., SessionStore], attend: Callable[[SessionStore], None]
+) -> None:
+    store = start("P001")
+    attend(store)
+    store.finish("complete")
+    lines = store.folder.journal.read_bytes().split(b"\n")
+    lines[5] = b"\0" * 30
+    store.folder.journal.write_bytes(b"\n".join(lines))
+    start("P002").finish("complete")
+    assert [row["status"] for row in table(tmp_path / "study")] == ["damaged", "complete"]
+
+
+def test_a_claimed_folder_without_a_journal_has_no_row(tmp_path: Path, start: Callable[..., SessionStore]) -> None:
+    (tmp_path / "study" / "data" / "sub-P001" / "ses-01").mkdir(parents=True)
+    begun = tmp_path / "study" / "data" / "sub-P003" / "ses-01"
+    begun.mkdir(parents=True)
+    (begun / "journal.jsonl").touch()
+    start("P002").finish("complete")
+    assert [row["participant"] for row in table(tmp_path / "study")] == ["P002"]
+
+
+def test_of_two_programs_the_last_to_write_has_seen_both(
+    tmp_path: Path, start: Callable[..., SessionStore], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """While P001's program is between reading the journals and writing the table, P002's session ends and writes."""
+    write, other = participants.write_file, start("P002")
+    store = start("P001")
+
+    def late(path: Path, content: bytes) -> None:
+        monkeypatch.setattr(participants, "write_file", write)
+        other.finish("withdrawn")
+        write(path, content)
+
+    monkeypatch.setattr(participants, "write_file", late)
+    store.finish("complete")
+    assert [row["status"] for row in table(tmp_path / "study")] == ["complete", "withdrawn"]

@@ -1,0 +1,323 @@
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from study_app import __version__
+from study_app.errors import StoreError
+from study_app.protocol.model import Protocol
+from study_app.store import journal, receipt
+from study_app.store.session import SessionStore
+
+SOURCE_HASH = hashlib.sha256(b"[study]\nname = 'brackish'\n").hexdigest()
+
+
+def names_in(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir())
+
+
+def every_byte(folder: Path) -> dict[str, bytes | None]:
+    """Everything under ``folder``: files with their bytes, folders with None."""
+    paths = sorted(folder.rglob("*"))
+    return {str(path.relative_to(folder)): path.read_bytes() if path.is_file() else None for path in paths}
+
+
+@contextmanager
+def files_up_to(size: int) -> Iterator[None]:
+    """Let the system refuse to write any file beyond ``size`` bytes, as a full disk does."""
+    resource = pytest.importorskip("resource")
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+def test_everything_is_there_before_the_first_trial(tmp_path: Path, start: Callable[..., SessionStore]) -> None:
+    store = start()
+    assert {name for name, content in every_byte(tmp_path / "study").items() if content is not None} == {
+        "dataset_description.json",
+        "blinding/key.sealed",
+        "data/study-brackish_description-participants_data.csv",
+        "data/sub-P007/ses-01/journal.jsonl",
+        "data/sub-P007/ses-01/receipt.json",
+        "data/sub-P007/ses-01/subject-P007_session-01_task-brackish_description-responses_data.csv",
+        "data/sub-P007/ses-01/subject-P007_session-01_task-brackish_description-trials_data.csv",
+    }
+    store.close()
+
+
+def test_the_first_line_says_what_is_run(start: Callable[..., SessionStore]) -> None:
+    store = start(session=2, pilot=True)
+    store.close()
+    (line,) = journal.read(store.folder.journal)
+    assert line == {
+        "n": 1,
+        "event": "session_started",
+        "t_s": 0.0,
+        "at": "2026-03-01T10:00:00.000+01:00",
+        "participant": "P007",
+        "session": 2,
+        "study": "brackish",
+        "seed": 11,
+        "language": "en",
+        "operator": "AB",
+        "simulated": False,
+        "pilot": True,
+        "key_hash": store.key.hash,
+        "protocol_hash": SOURCE_HASH,
+        "version": __version__,
+        "device": "scripted",
+        "limits": {"lateness_ms": 2.0, "worst_gap_ms": 20.0, "delay_error_ms": 25.0},
+    }
+
+
+def test_the_receipt_holds_what_reproduces_the_session(start: Callable[..., SessionStore]) -> None:
+    store = start()
+    before = receipt.read(store.folder.receipt)
+    assert before["status"] == "unfinished"
+    assert (before["seed"], before["participant"], before["session"]) == (11, "P007", 1)
+    assert (before["key_hash"], before["protocol_hash"]) == (store.key.hash, SOURCE_HASH)
+    assert before["clock"] == {"origin_ns": 5_000_000_000, "origin_at": "2026-03-01T10:00:00.000+01:00"}
+    assert before["device"] == {"name": "scripted", "rate_hz": 1000}
+    assert before["screens"]["participant"]["refresh_hz"] == 60.0
+    assert "SHA-256 of (seed, name)" in before["generator"]
+    assert before["versions"]["liquid-study"] == __version__
+    store.finish("withdrawn", "tired, went home")
+    after = receipt.read(store.folder.receipt)
+    ended = journal.read(store.folder.journal)[-1]
+    assert {key for key in after if after[key] != before[key]} == {"status", "reason", "ended_at"}
+    assert (after["status"], after["reason"], after["ended_at"]) == ("withdrawn", "tired, went home", ended["at"])
+    assert (ended["event"], ended["status"], ended["reason"]) == ("session_ended", "withdrawn", "tired, went home")
+
+
+@pytest.mark.parametrize(
+    "again",
+    [
+        {},
+        {"participant": "p007"},
+        {"participant": "P-007"},
+        {"participant": "test"},
+        {"participant": "P008", "session": 0},
+        {"participant": "P008", "simulated": True},
+    ],
+    ids=["used", "used but for capitals", "a dash", "reserved", "no session", "a rehearsal among real ones"],
+)
+def test_a_refusal_touches_nothing(
+    tmp_path: Path,
+    start: Callable[..., SessionStore],
+    attend: Callable[[SessionStore], None],
+    again: dict[str, Any],
+) -> None:
+    store = start()
+    attend(store)
+    store.finish("complete")
+    before = every_byte(tmp_path / "study")
+    with pytest.raises(StoreError) as refusal:
+        start(**again)
+    assert "\n" not in str(refusal.value)
+    assert every_byte(tmp_path / "study") == before
+
+
+def test_the_folder_of_another_study_is_refused_untouched(
+    tmp_path: Path, start: Callable[..., SessionStore], tables_of_study: Callable[..., dict[str, Any]]
+) -> None:
+    start().finish("complete")
+    before = every_byte(tmp_path / "study")
+    tables = tables_of_study()
+    tables["study"]["name"] = "other"
+    with pytest.raises(StoreError, match="holds the study 'brackish', not 'other'"):
+        start("P008", protocol=Protocol.model_validate(tables))
+    assert every_byte(tmp_path / "study") == before
+
+
+def test_a_session_under_way_is_used_too(start: Callable[..., SessionStore]) -> None:
+    with start(), pytest.raises(StoreError, match="participant P007 already has session 1"):
+        start()
+
+
+def test_a_new_session_number_and_another_id_are_welcome(start: Callable[..., SessionStore]) -> None:
+    key_hashes = set()
+    for name, number in [("P007", 1), ("P007", 2), ("P008", 1)]:
+        with start(name, session=number) as store:
+            key_hashes.add(store.key.hash)
+    assert len(key_hashes) == 1
+
+
+def test_an_unwritable_results_folder_is_one_line(tmp_path: Path, start: Callable[..., SessionStore]) -> None:
+    (tmp_path / "file").write_text("no folder")
+    with pytest.raises(StoreError) as refusal:
+        start(results=tmp_path / "file" / "study")
+    assert "file/study cannot be written (Not a directory)" in str(refusal.value)
+    assert "\n" not in str(refusal.value)
+    assert names_in(tmp_path) == ["file"]
+
+
+@pytest.mark.skipif(os.name == "nt" or os.geteuid() == 0, reason="the administrator may write everywhere")
+def test_a_read_only_results_folder_is_one_line(tmp_path: Path, start: Callable[..., SessionStore]) -> None:
+    (tmp_path / "study").mkdir(mode=0o555)
+    with pytest.raises(StoreError, match=r"cannot be written \(Permission denied\)"):
+        start()
+    assert names_in(tmp_path / "study") == []
+
+
+def test_a_disk_that_fills_while_beginning_leaves_no_session(
+    tmp_path: Path, start: Callable[..., SessionStore]
+) -> None:
+    start("P001").finish("complete")
+    before = every_byte(tmp_path / "study")
+    with files_up_to(1000), pytest.raises(StoreError, match=r"receipt\.json cannot be written \(File too large\)"):
+        start("P002")
+    assert every_byte(tmp_path / "study") == before
+
+
+def test_a_table_that_is_held_stops_nothing_and_is_caught_up(
+    start: Callable[..., SessionStore], attend: Callable[[SessionStore], None]
+) -> None:
+    store = start()
+    path = store.folder.table("brackish", "responses")
+    path.unlink()
+    path.mkdir()
+    (path / "held").touch()
+    attend(store)
+    assert "responses_data.csv cannot be written (Is a directory)" in str(store.behind)
+    (path / "held").unlink()
+    path.rmdir()
+    store.append("note", kind="note", text="closed the spreadsheet")
+    store.write_tables()
+    assert store.behind is None
+    assert path.read_bytes().count(b"\n") == 13
+    store.close()
+
+
+def test_a_table_held_to_the_end_is_reported_and_the_rest_written(start: Callable[..., SessionStore]) -> None:
+    store = start()
+    path = store.folder.table("brackish", "trials")
+    path.unlink()
+    path.mkdir()
+    store.append("trial_started", trial=1, attempt=1, block="b", phase="main", part=1, index=1, of=1, code="L1")
+    with pytest.raises(StoreError, match=r"trials_data\.csv cannot be written"):
+        store.finish("complete")
+    assert receipt.read(store.folder.receipt)["status"] == "complete"
+    assert b"complete" in store.place.study_folder.participants("brackish").read_bytes()
+
+
+def test_a_receipt_that_cannot_be_written_at_the_end_is_reported(start: Callable[..., SessionStore]) -> None:
+    store = start()
+    store.folder.receipt.unlink()
+    store.folder.receipt.mkdir()
+    with pytest.raises(StoreError, match=r"receipt\.json cannot be written"):
+        store.finish("complete")
+    assert journal.read(store.folder.journal)[-1]["event"] == "session_ended"
+
+
+def test_after_its_end_a_session_takes_nothing(start: Callable[..., SessionStore]) -> None:
+    store = start()
+    store.finish("complete")
+    for late in (lambda: store.append("note", kind="note", text="late"), lambda: store.finish("aborted")):
+        with pytest.raises(StoreError, match="came after the session's end"):
+            late()
+    assert receipt.read(store.folder.receipt)["status"] == "complete"
+
+
+def test_an_answer_is_in_the_table_after_every_page(
+    start: Callable[..., SessionStore], attend: Callable[[SessionStore], None]
+) -> None:
+    with start() as store:
+        attend(store)
+        content = store.folder.table("brackish", "responses").read_text(encoding="utf-8")
+    assert content.count("\n") == 1 + 4 * 3
+
+
+def test_a_rehearsal_says_so_in_every_row(
+    tmp_path: Path, start: Callable[..., SessionStore], attend: Callable[[SessionStore], None]
+) -> None:
+    store = start(simulated=True)
+    attend(store)
+    store.finish("complete")
+    for path in (tmp_path / "study" / "data").rglob("*.csv"):
+        _, *rows = path.read_text(encoding="utf-8").splitlines()
+        assert rows
+        assert all(",true,false," in row for row in rows)
+
+
+def test_the_same_rehearsal_writes_the_same_tables(
+    tmp_path: Path, start: Callable[..., SessionStore], attend: Callable[[SessionStore], None]
+) -> None:
+    hashes = set()
+    for name in ("one", "two"):
+        store = start(results=tmp_path / name, simulated=True, clock=None)
+        attend(store)
+        hashes.add(store.key.hash)
+        store.finish("complete")
+    assert len(hashes) == 1
+    name = "subject-P007_session-01_task-brackish_description-responses_data.csv"
+    one, two = (
+        (tmp_path / results / "data" / "sub-P007" / "ses-01" / name).read_text(encoding="utf-8").splitlines()
+        for results in ("one", "two")
+    )
+    assert len(one) == 13
+    assert [row.rsplit(",", 1)[0] for row in one] == [row.rsplit(",", 1)[0] for row in two]
+
+
+RACER = """
+import json, sys
+from pathlib import Path
+from study_app.errors import StoreError
+from study_app.protocol.model import Protocol
+from study_app.store.session import begin
+protocol = Protocol.model_validate(json.loads(sys.argv[1]))
+given = dict(seed=1, operator="AB", language="en", device={"name": "mouse"}, screens={}, simulated=False)
+print("ready", flush=True)
+for line in sys.stdin:
+    folder, participant = line.split()
+    try:
+        store = begin(Path(folder), protocol, b"", participant, **given)
+    except StoreError as error:
+        print("refused", error, flush=True)
+    else:
+        print("begun", store.key.hash, flush=True)
+        store.close()
+"""
+
+
+def test_of_two_programs_racing_for_one_id_one_gets_it_and_both_share_the_key(
+    tmp_path: Path, tables_of_study: Callable[..., dict[str, Any]]
+) -> None:
+    """Every round in a new folder, so that the key is raced for too; then both take free ids and compare keys."""
+    command = [sys.executable, "-c", RACER, json.dumps(tables_of_study())]
+    racers = [subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) for _ in range(2)]
+
+    def ask(*orders: str) -> list[str]:
+        for racer, order in zip(racers, orders, strict=True):
+            assert racer.stdin
+            racer.stdin.write(f"{order}\n")
+            racer.stdin.flush()
+        return [racer.stdout.readline() for racer in racers if racer.stdout]
+
+    try:
+        assert [racer.stdout.readline() for racer in racers if racer.stdout] == ["ready\n"] * 2
+        for number in range(25):
+            folder = tmp_path / f"study{number}"
+            won, lost = sorted(ask(f"{folder} P001", f"{folder} P001"))
+            assert won.startswith("begun ")
+            assert lost.startswith("refused participant P001 already has session 1")
+            lines = journal.read(folder / "data" / "sub-P001" / "ses-01" / "journal.jsonl")
+            assert [line["event"] for line in lines] == ["session_started"]
+            assert set(ask(f"{folder} P002", f"{folder} P003")) == {won}
+            table = (folder / "data" / "study-brackish_description-participants_data.csv").read_text()
+            assert [row.split(",")[1] for row in table.splitlines()[1:]] == ["P001", "P002", "P003"]
+            assert not list(folder.rglob("*.tmp"))
+    finally:
+        for racer in racers:
+            racer.communicate()
