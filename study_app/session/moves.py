@@ -6,7 +6,6 @@ from dataclasses import replace
 from typing import Any, TypeAlias
 
 from study_app.errors import SessionError
-from study_app.protocol.model import POINTS
 from study_app.protocol.schedule import PageStep
 from study_app.session import compose
 from study_app.session.commands import (
@@ -222,11 +221,14 @@ def _check_item(state: SessionState, item: str) -> None:
 
 def _check_value(state: SessionState, value: int | None) -> None:
     questionnaire = state.questionnaire
-    scale = None if questionnaire is None else state.plan.protocol.scales[questionnaire.scale]
-    if value is None and (scale is None or scale.cannot_judge is None):
+    if questionnaire is None:
+        return
+    scale = state.plan.protocol.scales[questionnaire.scale]
+    points = len(scale.labels[state.plan.language])
+    if value is None and scale.cannot_judge is None:
         raise SessionError("this questionnaire has no answer off the scale: choose one of its points")
-    if value is not None and not 1 <= value <= POINTS:
-        raise SessionError(f"answer {value} is not on the scale: choose 1 to {POINTS}")
+    if value is not None and not 1 <= value <= points:
+        raise SessionError(f"answer {value} is not on the scale: choose 1 to {points}")
 
 
 def _missing(state: SessionState) -> list[int]:

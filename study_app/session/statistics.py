@@ -1,0 +1,104 @@
+"""What is measured of one trial while it runs: the servo's timing, the hand, the force, and the age of what was seen.
+
+Nothing here names the requested delay: only the achieved one less the requested is kept.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study_app.haptics.layout import LIMITER_NAMES, SAMPLE
+from study_app.haptics.telemetry import timing
+
+_TIMES = np.dtype([(name, SAMPLE[name]) for name in ("tick", "time_ns", "lateness_ns")])
+
+
+class TrialStatistics:
+    """Adds up samples and frames as they come.
+
+    Parameters
+    ----------
+    rate_hz : the servo's nominal rate
+    delay_s : the visual delay asked for
+    late_s : a frame counts as late if its delay is more than this over the one asked for
+    """
+
+    def __init__(self, *, rate_hz: float, delay_s: float, late_s: float) -> None:
+        self._rate_hz = rate_hz
+        self._delay_s = delay_s
+        self._late_s = late_s
+        self._times: list[Any] = []
+        self._ages_ns: list[int] = []
+        self._last_m: NDArray[np.float64] | None = None
+        self._path_m = 0.0
+        self._force_sum_n = 0.0
+        self._force_peak_n = 0.0
+        self._limited = np.zeros(len(LIMITER_NAMES), np.int64)
+
+    def feed(self, samples: Any) -> None:
+        """Take the next samples, in order (recarray of ``layout.SAMPLE``)."""
+        if len(samples) == 0:
+            return
+        times = np.empty(len(samples), _TIMES)
+        for name in _TIMES.fields or ():
+            times[name] = samples[name]
+        self._times.append(times)
+        self._move(samples["position_m"])
+        force_n = np.sqrt(np.einsum("ij,ij->i", samples["device_force_n"], samples["device_force_n"]))
+        self._force_sum_n += float(force_n.sum())
+        self._force_peak_n = max(self._force_peak_n, float(force_n.max()))
+        limiters = samples["limiters"]
+        if limiters.any():
+            bits = np.arange(len(LIMITER_NAMES))
+            self._limited += ((limiters[:, None] >> bits) & 1).sum(axis=0)
+
+    def frame(self, painted_ns: int, shown_ns: int) -> None:
+        """Take a frame that was painted at one moment and showed another [ns]."""
+        self._ages_ns.append(painted_ns - shown_ns)
+
+    def summary(self, samples_dropped: int) -> dict[str, Any]:
+        """Return the measured columns of the trial row; None where nothing was measured."""
+        times = np.concatenate([np.empty(0, _TIMES), *self._times]).view(np.recarray)
+        timed = timing(times, self._rate_hz)
+        ticks = timed.ticks
+        elapsed_s = float(times.time_ns[-1] - times.time_ns[0]) * 1e-9 if ticks else 0.0
+        return {
+            "ticks": ticks,
+            "tick_rate_hz": timed.rate_hz if ticks > 1 else None,
+            "lateness_p99_ms": timed.lateness_p99_s * 1e3 if ticks else None,
+            "worst_gap_ms": timed.worst_gap_s * 1e3 if ticks > 1 else None,
+            "overruns": timed.overruns,
+            "samples_dropped": samples_dropped,
+            "path_length_m": self._path_m,
+            "mean_speed_mps": self._path_m / elapsed_s if elapsed_s > 0 else None,
+            "force_mean_n": self._force_sum_n / ticks if ticks else None,
+            "force_peak_n": self._force_peak_n if ticks else None,
+            **{f"limiter_{name}": int(count) for name, count in zip(LIMITER_NAMES, self._limited, strict=True)},
+            **self._frames(),
+        }
+
+    def _move(self, positions: NDArray[np.float64]) -> None:
+        """Add the path through ``positions`` (n, 3) [m]; places that are no numbers are left out."""
+        finite = np.isfinite(positions).all(axis=1)
+        places = positions if finite.all() else positions[finite]
+        if self._last_m is not None:
+            places = np.concatenate((self._last_m, places))
+        if len(places) == 0:
+            return
+        steps = np.diff(places, axis=0)
+        self._path_m += float(np.sqrt(np.einsum("ij,ij->i", steps, steps)).sum())
+        self._last_m = places[-1:].copy()
+
+    def _frames(self) -> dict[str, Any]:
+        errors_s = np.asarray(self._ages_ns, np.float64) * 1e-9 - self._delay_s
+        seen = errors_s.size > 0
+        return {
+            "frames": int(errors_s.size),
+            "frames_late": int((errors_s > self._late_s).sum()),
+            "delay_error_mean_ms": float(errors_s.mean()) * 1e3 if seen else None,
+            "delay_error_p95_ms": float(np.percentile(errors_s, 95)) * 1e3 if seen else None,
+            "delay_error_max_ms": float(errors_s.max()) * 1e3 if seen else None,
+        }

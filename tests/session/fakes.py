@@ -1,0 +1,141 @@
+"""A world for the runner that is all memory: a servo, a journal, a screen and a clock that moves when told."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from study_app.errors import StoreError
+from study_app.haptics.scene import Scene
+from study_app.session.runner import Ports, Runner
+from study_app.session.state import SessionState
+from tests.session import small
+
+
+class FakeTelemetry:
+    def __init__(self) -> None:
+        self.samples = small.samples([], np.zeros((0, 3)))
+        self.read_until = 0
+        self.dropped = 0
+
+    def reader(self) -> FakeTelemetry:
+        return self
+
+    def read(self) -> Any:
+        new = self.samples[self.read_until :]
+        self.read_until = len(self.samples)
+        return new
+
+    def position_at(self, time_ns: int) -> tuple[Any, int]:
+        """Without interpolation: the newest sample not after ``time_ns``."""
+        index = max(int(np.searchsorted(self.samples.time_ns, time_ns, side="right")) - 1, 0)
+        return self.samples.position_m[index], int(self.samples.time_ns[index])
+
+
+class FakeServo:
+    """Its time is that of the last sample; ``run`` makes samples at 1 kHz under the scene loaded."""
+
+    rate_hz = 1000.0
+
+    def __init__(self, log: list[Any]) -> None:
+        self.telemetry = FakeTelemetry()
+        self.fault: str | None = None
+        self.refuses: Exception | None = None
+        self.scenes: list[Scene] = []
+        self.scene = 0
+        self.ticks = 0
+        self.force_is_on = True
+        self._log = log
+
+    def run(self, seconds: float, position_m: Any = (0.0, 0.0, 0.0), **fields: Any) -> None:
+        count = round(seconds * 1000)
+        ticks = np.arange(self.ticks + 1, self.ticks + count + 1)
+        made = small.samples(ticks / 1000, np.tile(position_m, (count, 1)), tick=ticks, scene=self.scene, **fields)
+        self.telemetry.samples = np.concatenate((self.telemetry.samples, made)).view(np.recarray)
+        self.ticks += count
+
+    def now_ns(self) -> int:
+        return self.ticks * 1_000_000
+
+    def load(self, scene: Scene) -> int:
+        if self.refuses is not None:
+            raise self.refuses
+        self._log.append("load")
+        self.scenes.append(scene)
+        self.scene = len(self.scenes)
+        return self.scene
+
+    def rest(self) -> None:
+        self._log.append("rest")
+        self.scene = 0
+
+    def stop_force(self) -> None:
+        self._log.append("stop_force")
+        self.force_is_on = False
+
+    def fade_in(self) -> None:
+        self._log.append("fade_in")
+        self.force_is_on = True
+
+
+class FakeJournal:
+    """Keeps lines; after ``fails_after`` lines the disk is full."""
+
+    def __init__(self, log: list[Any]) -> None:
+        self.lines: list[dict[str, Any]] = []
+        self.fails_after: int | None = None
+        self.finish_fails = False
+        self.tables_written = 0
+        self.status: str | None = None
+        self._log = log
+
+    def append(self, event: str, *, t_s: float | None = None, **fields: Any) -> None:
+        if self.fails_after is not None and len(self.lines) >= self.fails_after:
+            raise StoreError("disk full")
+        self._log.append(event)
+        self.lines.append({"event": event, "t_s": t_s, **fields})
+
+    def write_tables(self) -> None:
+        self.tables_written += 1
+
+    def finish(self, status: str, reason: str = "") -> None:
+        self._log.append("finish")
+        self.status = status
+        if self.finish_fails:
+            raise StoreError("no room for the receipt")
+
+    def of(self, event: str) -> list[dict[str, Any]]:
+        return [line for line in self.lines if line["event"] == event]
+
+
+class World:
+    """A runner of the small study with everything around it; ``log`` is what happened, in order."""
+
+    def __init__(self, seed: int = 1) -> None:
+        self.log: list[Any] = []
+        self.servo = FakeServo(self.log)
+        self.journal = FakeJournal(self.log)
+        self.pages: list[Any] = []
+        self.on_page: Callable[[Any], None] = lambda _page: None
+        plan = small.opened(seed).plan
+        ports = Ports(self.servo, self.journal, self._present, self.clock)
+        self.runner = Runner(plan.protocol, plan.schedule, plan.key, ports, plan.language)
+
+    def clock(self) -> float:
+        return self.servo.now_ns() / 1e9
+
+    @property
+    def state(self) -> SessionState:
+        return self.runner.state
+
+    def run(self, seconds: float, position_m: Any = (0.0, 0.0, 0.0), **fields: Any) -> None:
+        """Let time pass and look at the device once."""
+        self.servo.run(seconds, position_m, **fields)
+        self.runner.poll()
+
+    def _present(self, page: Any) -> None:
+        self.log.append(type(page).__name__)
+        self.pages.append(page)
+        self.on_page(page)

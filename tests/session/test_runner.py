@@ -1,0 +1,380 @@
+"""The runner in a world of fakes: what it asks of whom, in which order, and what it makes of samples and buttons."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from study_app.errors import ServoFault, SessionError, StoreError
+from study_app.session.events import (
+    Begin,
+    Chosen,
+    Continue,
+    EndAsked,
+    ForceStopped,
+    ItemShown,
+    Note,
+    PauseAsked,
+    RepeatAsked,
+    ResumeAsked,
+    Submitted,
+)
+from study_app.session.pages import EndPage, PausePage, QuestionnairePage, TaskPage, TroublePage
+from study_app.session.runner import BUTTON_CONTINUE, BUTTON_STOP
+from study_app.session.state import Phase
+from tests.session.fakes import World
+
+LEFT, RIGHT, AWAY = (-0.02, 0.0, 0.0), (0.02, 0.0, 0.0), (0.0, 0.01, 0.0)
+
+
+@pytest.fixture
+def world() -> World:
+    return World()
+
+
+@pytest.fixture
+def practising(world: World) -> World:
+    """Return a world in the practice: an exploration of 1 to 3 s without a questionnaire."""
+    world.runner.post(Begin(0.0))
+    world.runner.post(Continue(0.0))
+    world.log.clear()
+    return world
+
+
+def at_block(block: str, *, delayed: bool = False, seed: int = 1) -> World:
+    """Return a world at the beginning of a trial of ``block``."""
+    world = World(seed)
+    world.runner.post(Begin(0.0))
+    for _ in range(200):
+        state = world.state
+        if state.phase is Phase.TASK and state.trial.block == block:
+            page = world.pages[-1]
+            if not delayed or page.delay_s > 0:
+                return world
+        step(world)
+    raise AssertionError(block)
+
+
+def step(world: World) -> None:
+    state = world.state
+    if state.phase is Phase.READING:
+        world.runner.post(Continue(world.clock()))
+    elif state.phase is Phase.ANSWERING:
+        for item in state.trial.items:
+            world.runner.post(Chosen(world.clock(), item, 4))
+        world.runner.post(Submitted(world.clock()))
+    else:
+        world.run(0.3, LEFT)
+        if (world.state.phase, world.state.index) == (state.phase, state.index):
+            world.run(0.3, RIGHT)
+
+
+def test_a_whole_session_runs_from_device_samples_and_answers_to_its_end(world: World) -> None:
+    world.runner.post(Begin(0.0))
+    for _ in range(400):
+        if world.runner.finished:
+            break
+        step(world)
+    assert world.journal.status == "completed"
+    assert isinstance(world.pages[-1], EndPage)
+    assert len(world.journal.of("trial_ended")) == 6
+    assert sum(len(line["items"]) for line in world.journal.of("responses")) == 8
+
+
+def test_an_answer_is_kept_before_the_page_it_leads_to_and_tables_follow_every_page(world: World) -> None:
+    world = at_block("feeling")
+    world.run(3.1)
+    assert world.state.phase is Phase.ANSWERING
+    for item in world.state.trial.items:
+        world.runner.post(Chosen(9.0, item, 2))
+    world.log.clear()
+    tables = world.journal.tables_written
+    world.runner.post(Submitted(9.5))
+    assert world.log == ["responses", "trial_started", "load", "TaskPage"]
+    assert world.journal.tables_written == tables + 1
+
+
+def test_lines_carry_the_time_of_the_event_they_tell(world: World) -> None:
+    world.runner.post(Begin(12.5))
+    assert world.journal.lines[-1]["t_s"] == 12.5
+
+
+def test_a_page_that_answers_while_it_is_presented_is_heard_after_the_commands_under_way(world: World) -> None:
+    kept_at_once: list[Any] = []
+
+    def answer(page: Any) -> None:
+        if isinstance(page, QuestionnairePage):
+            for item in page.items:
+                world.runner.post(ItemShown(1.0, item.id))
+            kept_at_once.extend(world.journal.of("item_shown"))
+
+    world = at_block("feeling")
+    world.on_page = answer
+    world.run(3.1)
+    assert kept_at_once == []
+    assert [line["item"] for line in world.journal.of("item_shown")] == ["liquid", "strong", "spare"]
+
+
+def test_what_cannot_happen_is_refused_and_the_session_goes_on(world: World) -> None:
+    world.runner.post(Begin(0.0))
+    before = world.state
+    with pytest.raises(SessionError):
+        world.runner.post(Submitted(1.0))
+    assert world.state == before
+    world.runner.post(Continue(2.0))
+    assert world.state.phase is Phase.TASK
+
+
+def test_an_exploration_goes_on_until_its_longest_time_and_not_by_the_space_bar_before_its_least(
+    practising: World,
+) -> None:
+    practising.run(0.9)
+    practising.runner.post(Continue(0.9))
+    practising.run(0.5)
+    assert practising.state.phase is Phase.TASK
+    practising.runner.post(Continue(1.4))
+    practising.run(0.01)
+    assert practising.log[:3] == ["rest", "trial_ended", "trial_started"]
+    (ended,) = practising.journal.of("trial_ended")
+    assert ended["outcome"] == "complete"
+    assert ended["duration_s"] == pytest.approx(1.399)
+
+
+def test_samples_from_before_the_scene_was_in_force_do_not_count(practising: World) -> None:
+    practising.servo.scene = 0
+    practising.run(5.0)
+    assert practising.runner.task.elapsed_s == 0.0
+    practising.servo.scene = 1
+    practising.run(3.1)
+    assert practising.journal.of("trial_ended")[0]["duration_s"] == pytest.approx(3.0)
+
+
+def test_every_target_that_is_reached_is_kept_at_once() -> None:
+    world = at_block("seeing")
+    before = len(world.journal.of("target_reached"))
+    world.run(0.3, LEFT)
+    reached = world.journal.of("target_reached")[before:]
+    assert [(line["trial"], line["target"], line["t_task_s"]) for line in reached] == [
+        (world.state.trial.number, 0, pytest.approx(0.25))
+    ]
+
+
+def test_what_is_drawn_is_as_old_as_the_trial_asks() -> None:
+    world = at_block("seeing", delayed=True)
+    world.run(0.2, AWAY)
+    world.run(0.1, LEFT)
+    now = world.servo.now_ns()
+    late = world.runner.view(now)
+    assert late.sample_time_ns == now - 137_000_000
+    assert tuple(late.position_m) == AWAY
+    assert late.task.dwell == 0.0
+    assert world.runner.task.dwell == pytest.approx(0.099 / 0.25)
+    world.run(0.137, LEFT)
+    seen = world.runner.view(world.servo.now_ns())
+    assert tuple(seen.position_m) == LEFT
+    assert seen.task.dwell == pytest.approx(0.099 / 0.25)
+
+
+def test_without_a_trial_nothing_is_to_be_drawn(world: World) -> None:
+    world.runner.post(Begin(0.0))
+    assert world.runner.view(0) is None
+    assert world.runner.task is None
+    world.runner.frame_shown(1, 0)  # a last frame may still be on its way
+
+
+def test_a_delayed_task_is_left_when_its_end_was_drawn_and_its_duration_is_the_devices() -> None:
+    world = at_block("seeing", delayed=True)
+    world.run(0.3, LEFT)
+    world.run(0.251, RIGHT)
+    assert world.runner.task.reached == 2
+    done_ns = world.servo.now_ns()
+    world.run(0.13, RIGHT)
+    assert world.state.phase is Phase.TASK
+    assert world.runner.view(done_ns).task.reached == 1
+    world.run(0.01, RIGHT)
+    assert world.state.phase is Phase.ANSWERING
+    assert world.journal.of("trial_ended")[-1]["duration_s"] == pytest.approx(0.55, abs=0.002)
+
+
+def test_the_row_of_a_trial_holds_the_error_of_the_delay_and_never_the_delay() -> None:
+    world = at_block("seeing", delayed=True)
+    for error_ms in (0, 5, 10, 40):
+        world.servo.run(0.05, LEFT)
+        now = world.servo.now_ns()
+        world.runner.frame_shown(now + error_ms * 1_000_000, world.runner.view(now).sample_time_ns)
+    world.run(0.1, LEFT)
+    world.run(0.5, RIGHT)
+    row = world.journal.of("trial_ended")[-1]
+    assert (row["frames"], row["frames_late"]) == (4, 1)  # the study allows 25 ms
+    assert row["delay_error_mean_ms"] == pytest.approx(13.75)
+    assert row["delay_error_max_ms"] == pytest.approx(40)
+    assert 137 not in [round(value) for value in row.values() if isinstance(value, float)]
+
+
+def test_no_line_of_a_delayed_trial_names_condition_liquid_or_delay(world: World) -> None:
+    world.runner.post(Begin(0.0))
+    while not world.runner.finished:
+        step(world)
+    text = repr(world.journal.lines) + repr(world.pages) + repr(world.state)
+    assert [word for word in ("is_late", "on_time", "is_thin", "is_thick", "0.137", "1013.7") if word in text] == []
+
+
+def test_the_row_of_a_trial_sums_up_force_path_and_limiters(practising: World) -> None:
+    practising.servo.run(1.0, (0.0, 0.0, 0.0), device_force_n=(3.0, 0.0, 4.0), limiters=0b1001)
+    practising.servo.run(1.0, (0.03, 0.04, 0.0), device_force_n=(0.0, 0.0, 1.0), lateness_ns=2_000_000)
+    practising.run(1.1, (0.0, 0.0, 0.0))
+    (row,) = practising.journal.of("trial_ended")
+    assert row["ticks"] == 3001
+    assert row["tick_rate_hz"] == pytest.approx(1000)
+    assert row["path_length_m"] == pytest.approx(0.1)
+    assert row["mean_speed_mps"] == pytest.approx(0.1 / 3)
+    assert row["force_mean_n"] == pytest.approx((5 * 1000 + 1 * 1000) / 3001)
+    assert row["force_peak_n"] == pytest.approx(5)
+    assert (row["limiter_slope"], row["limiter_norm"], row["limiter_slew"]) == (1000, 1000, 0)
+    assert row["lateness_p99_ms"] == pytest.approx(2)
+    assert (row["frames"], row["delay_error_mean_ms"]) == (0, None)
+
+
+def test_samples_that_were_lost_are_counted_for_their_trial_alone(practising: World) -> None:
+    practising.servo.telemetry.dropped = 7
+    practising.run(3.1)
+    assert practising.journal.of("trial_ended")[0]["samples_dropped"] == 7
+    practising.run(3.1)
+    assert practising.journal.of("trial_ended")[1]["samples_dropped"] == 0
+
+
+def test_button_four_stops_the_force_before_anything_is_written(practising: World) -> None:
+    practising.run(0.5, buttons=BUTTON_STOP)
+    assert practising.log[0] == "stop_force"
+    assert practising.log.index("rest") < practising.log.index("force_stopped") < practising.log.index("PausePage")
+    assert not practising.servo.force_is_on
+    assert practising.journal.of("force_stopped")[0]["by"] == "device"
+    assert practising.pages[-1] == PausePage(force_off=True)
+
+
+def test_a_force_stop_reaches_the_servo_even_where_the_session_cannot_take_it(world: World) -> None:
+    with pytest.raises(SessionError):
+        world.runner.post(ForceStopped(0.0, "operator"))
+    assert world.log == ["stop_force"]
+
+
+def test_an_interrupted_attempt_keeps_what_was_measured_and_the_trial_starts_again(practising: World) -> None:
+    practising.run(0.8)
+    practising.runner.post(PauseAsked(0.8, "operator"))
+    (first,) = practising.journal.of("trial_ended")
+    assert (first["attempt"], first["outcome"], first["ticks"]) == (1, "interrupted", 800)
+    practising.run(5.0)  # a pause is no exploration
+    practising.runner.post(ResumeAsked(5.8))
+    assert practising.servo.scene == 2
+    practising.run(3.1)
+    second = practising.journal.of("trial_ended")[-1]
+    assert (second["attempt"], second["outcome"], second["ticks"]) == (2, "complete", 3001)
+
+
+def test_resuming_after_a_force_stop_fades_the_force_in(practising: World) -> None:
+    practising.run(0.1, buttons=BUTTON_STOP)
+    practising.runner.post(ResumeAsked(1.0))
+    assert practising.servo.force_is_on
+    assert practising.log.index("fade_in") < practising.log.index("load")
+
+
+def test_a_repeated_trial_keeps_both_attempts(practising: World) -> None:
+    practising.run(0.5)
+    practising.runner.post(RepeatAsked(0.5, "a sneeze"))
+    practising.run(3.1)
+    ended = practising.journal.of("trial_ended")
+    assert [(line["attempt"], line["outcome"]) for line in ended] == [(1, "interrupted"), (2, "complete")]
+    assert practising.journal.of("repeat") == [
+        {"event": "repeat", "t_s": 0.5, "trial": 1, "reason": "a sneeze"},
+    ]
+
+
+def test_the_first_button_goes_on_from_a_page_to_read_and_from_nothing_else(world: World) -> None:
+    world.runner.post(Begin(0.0))
+    world.run(0.1, buttons=BUTTON_CONTINUE)
+    assert world.state.phase is Phase.TASK
+    world.run(0.1)
+    world.run(1.5, buttons=BUTTON_CONTINUE)
+    assert world.state.phase is Phase.TASK  # the least time is over, but a squeeze is not a key
+
+
+def test_a_button_held_down_is_one_press(world: World) -> None:
+    world = at_block("seeing")
+    for _ in range(30):
+        if world.state.phase is Phase.READING:
+            break
+        step(world)
+    assert world.state.phase is Phase.READING
+    world.run(0.1, buttons=BUTTON_CONTINUE)
+    assert world.runner.finished
+    again = World()
+    again.servo.run(0.1, buttons=BUTTON_CONTINUE)
+    again.runner.post(Begin(0.1))
+    again.run(0.1, buttons=BUTTON_CONTINUE)  # pressed before the page was there
+    assert again.state.phase is Phase.READING
+
+
+def test_a_fault_of_the_servo_is_kept_once_and_calls_the_operator(practising: World) -> None:
+    practising.run(0.5)
+    practising.servo.fault = "the device 'scripted' stopped answering"
+    practising.run(0.1)
+    practising.run(0.1)
+    assert practising.journal.of("broke") == [
+        {"event": "broke", "t_s": pytest.approx(0.6), "what": "the device 'scripted' stopped answering"}
+    ]
+    assert isinstance(practising.pages[-1], TroublePage)
+    assert practising.log[0] == "stop_force"
+    practising.runner.post(EndAsked(2.0, "aborted", "cable"))
+    assert practising.journal.status == "broken"
+
+
+def test_a_servo_that_refuses_a_scene_calls_the_operator(world: World) -> None:
+    world.runner.post(Begin(0.0))
+    world.servo.refuses = ServoFault("the device is gone")
+    world.runner.post(Continue(1.0))
+    assert world.state.phase is Phase.TROUBLE
+    assert world.journal.of("broke")[0]["what"] == "the device is gone"
+    assert not world.servo.force_is_on
+
+
+def test_a_full_disk_stops_the_force_calls_the_operator_and_says_so(practising: World) -> None:
+    practising.journal.fails_after = len(practising.journal.lines)
+    seen: list[Phase] = []
+    practising.runner.on_change(lambda state: seen.append(state.phase))
+    with pytest.raises(StoreError, match="disk full"):
+        practising.run(3.1)
+    assert practising.state.phase is Phase.TROUBLE
+    assert not practising.servo.force_is_on
+    assert practising.servo.scene == 0
+    assert isinstance(practising.pages[-1], TroublePage)
+    assert not any(isinstance(page, TaskPage) and page.trial == 2 for page in practising.pages)
+    assert seen == [Phase.TROUBLE]
+
+
+def test_a_full_disk_at_a_target_stops_the_force_too() -> None:
+    world = at_block("seeing")
+    world.journal.fails_after = len(world.journal.lines)
+    with pytest.raises(StoreError):
+        world.run(0.3, LEFT)
+    assert world.state.phase is Phase.TROUBLE
+    assert not world.servo.force_is_on
+
+
+def test_an_end_whose_receipt_fails_is_an_end_and_says_so(practising: World) -> None:
+    practising.journal.finish_fails = True
+    with pytest.raises(StoreError, match="receipt"):
+        practising.runner.post(EndAsked(1.0, "withdrawn", ""))
+    assert practising.runner.finished
+    assert isinstance(practising.pages[-1], EndPage)
+
+
+def test_listeners_hear_every_event_that_was_taken(world: World) -> None:
+    phases: list[Phase] = []
+    world.runner.on_change(lambda state: phases.append(state.phase))
+    world.runner.post(Begin(0.0))
+    world.runner.post(Note(0.5, "mark", ""))
+    with pytest.raises(SessionError):
+        world.runner.post(Submitted(0.6))
+    world.runner.post(Continue(1.0))
+    assert phases == [Phase.READING, Phase.READING, Phase.TASK]
