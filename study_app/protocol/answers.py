@@ -16,7 +16,7 @@ import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-POINTS = 7
+from study_app.protocol.questionnaires import POINTS
 
 Draw = Callable[[], float]
 

@@ -123,7 +123,7 @@ def counted_parts(parts: Draft) -> Iterator[Fault]:
     if all(block.phase != "main" for block in parts.blocks.values()):
         yield Fault(("blocks",), "there is no main block", 'one needs phase = "main"')
     latest = 0
-    for name in parts.sequence:
+    for name in dict.fromkeys(parts.sequence):
         part = parts.blocks[name].part if name in parts.blocks else None
         if part is None:
             continue

@@ -28,7 +28,7 @@ def describe(protocol: Protocol) -> str:
         *(_statements(protocol, name, language) for name in protocol.questionnaires),
         _titled("A trial is valid up to", _limits(protocol)),
     )
-    return "\n\n".join("\n".join(section) for section in sections) + "\n"
+    return "\n\n".join("\n".join(section) for section in sections)
 
 
 def expected_duration_s(protocol: Protocol) -> float:

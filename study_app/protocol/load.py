@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Mapping
-from functools import cache
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
@@ -15,11 +14,12 @@ from study_app.errors import Problem, ProtocolError
 from study_app.haptics.scene import Liquid, Scene
 from study_app.protocol.checks import check
 from study_app.protocol.files import protocol_hash, shipped, source_bytes
-from study_app.protocol.model import Named, Protocol, SceneDefaults, Table
+from study_app.protocol.model import Named, Protocol, SceneDefaults, schema
 from study_app.protocol.places import Places
 from study_app.protocol.problems import Fault, did_you_mean, faults_of
+from study_app.protocol.table import Table
 
-__all__ = ["load", "load_scene", "parse", "protocol_hash", "schema", "shipped", "source_bytes"]
+__all__ = ["load", "load_scene", "parse", "protocol_hash", "shipped", "source_bytes"]
 
 M = TypeVar("M", bound=BaseModel)
 
@@ -90,18 +90,6 @@ def load_scene(name_or_path: str | Path, liquid_id: str) -> Scene:
         fault = Fault(("liquids",), f'there is no liquid "{liquid_id}"', did_you_mean(liquid_id, liquids))
         _raise(name, [fault], places)
     return Scene(**dict(table), liquids=(liquids[liquid_id],))
-
-
-@cache
-def schema(of: type[BaseModel] = Protocol) -> dict[str, Any]:
-    """Return the JSON Schema of a protocol file, for editors that complete and check while one writes."""
-    described = of.model_json_schema()
-    for table in ("Liquid", "Block"):  # their id is the name of their table
-        for part in described["$defs"].values():
-            if part.get("title") == table:
-                part["properties"].pop("id")
-                part["required"].remove("id")
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **described}
 
 
 def _document(source: bytes, name: str) -> tuple[dict[str, Any], Places]:

@@ -1,18 +1,21 @@
 """A study as a frozen, validated value; field names are the keys of the TOML file.
 
-Each class is one table of the file. What a single table can decide by itself is checked here; what needs two tables
-(references, languages, targets inside the workspace) is in ``checks``.
+Each class is one table of the file (questionnaires and tasks have modules of their own). What a single table can decide
+by itself is checked by its class; what needs two tables is in ``references`` and ``checks``.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
 from typing import Annotated, Any, Literal, Self, TypeAlias, TypeVar
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+from pydantic import BaseModel, BeforeValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from study_app.haptics.scene import Body, Ewma, Knee, Liquid, Scene
+from study_app.protocol.questionnaires import Item, Questionnaire, Scale
+from study_app.protocol.table import Table
 from study_app.protocol.tasks import Explore, Reach, Task
 from study_app.protocol.texts import Id, Language, Localised, text_in
 
@@ -30,16 +33,10 @@ __all__ = [
     "Scale",
     "SceneDefaults",
     "StudyHead",
+    "schema",
 ]
 
 MAX_FORCE_N = 8.0
-POINTS = 7
-
-
-class Table(BaseModel):
-    """A table of the file: unknown keys are errors, values never change."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
 class StudyHead(Table):
@@ -111,43 +108,6 @@ class Condition(Table):
         return self
 
 
-class Scale(Table):
-    """The seven points of an answer, lowest first."""
-
-    labels: dict[Language, Annotated[tuple[str, ...], Field(min_length=POINTS, max_length=POINTS)]] = Field(
-        description="Per language the names of the seven points, lowest first."
-    )
-    cannot_judge: Localised | None = Field(
-        default=None, description="Label of an answer off the scale; left out: none."
-    )
-
-
-class Item(Table):
-    """One statement."""
-
-    id: Id = Field(description="Name of the item in every table; never change it once data exist.")
-    text: Localised = Field(description="The statement as the participant reads it.")
-    short: Localised = Field(description="One to three words for figures and tables.")
-    required: bool = Field(default=True, description="Whether the participant can go on without an answer.")
-
-
-class Questionnaire(Table):
-    """The statements that are answered after a trial."""
-
-    title: Localised | None = Field(default=None, description="Heading; left out: the name of the setting.")
-    intro: Localised = Field(description="The question above the statements.")
-    scale: Id = Field(description="The scale of all items.")
-    item_order: Literal["fixed", "shuffled"] = Field(default="fixed", description="As written, or anew in every trial.")
-    items: tuple[Item, ...] = Field(min_length=1, description="The statements.")
-
-    def item(self, item_id: str) -> Item:
-        """Return the item of that id (KeyError if there is none)."""
-        for item in self.items:
-            if item.id == item_id:
-                return item
-        raise KeyError(item_id)
-
-
 class PageText(Table):
     """A page to read."""
 
@@ -180,9 +140,11 @@ class Block(Table):
     def _codes_where_blinded(self) -> Self:
         if self.phase == "main":
             if self.code_prefix is None:
-                raise PydanticCustomError("codes", "a main block needs a code_prefix, a capital letter", {})
+                raise PydanticCustomError(
+                    "codes", "a main block needs a code_prefix, a capital letter", {"place": "code_prefix"}
+                )
             if self.part is None:
-                raise PydanticCustomError("part", "a main block needs a part: 1, 2, …", {})
+                raise PydanticCustomError("part", "a main block needs a part: 1, 2, …", {"place": "part"})
         elif self.code_prefix is not None:
             raise PydanticCustomError(
                 "codes",
@@ -292,3 +254,15 @@ class Protocol(Table):
             for block in self.blocks.values()
             if block.questionnaire is not None
         )
+
+
+@cache
+def schema(of: type[BaseModel] = Protocol) -> dict[str, Any]:
+    """Return the JSON Schema of a protocol file, for editors that complete and check while one writes."""
+    described = of.model_json_schema()
+    for table in ("Liquid", "Block"):  # their id is the name of their table
+        for part in described["$defs"].values():
+            if part.get("title") == table:
+                part["properties"].pop("id")
+                part["required"].remove("id")
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **described}

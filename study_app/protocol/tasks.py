@@ -6,18 +6,17 @@ import math
 from itertools import pairwise
 from typing import Annotated, Literal, Self, TypeAlias
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
+from study_app.protocol.table import Table
 from study_app.protocol.texts import Localised
 
 Point: TypeAlias = tuple[float, float, float]
 
 
-class Explore(BaseModel):
+class Explore(Table):
     """Free motion in the tank: at least ``min_s``, at most ``max_s``; between the two the participant may go on."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     kind: Literal["explore"]
     min_s: float = Field(ge=0, le=3600, description="Least time before the participant may go on [s].")
@@ -35,14 +34,12 @@ class Explore(BaseModel):
         return self
 
 
-class Reach(BaseModel):
+class Reach(Table):
     """Targets lit one after the other, round and round: hold the ball in the lit one for ``dwell_s``.
 
     The task is complete after ``count`` targets or after ``duration_s``, whichever of the two the protocol gives; it
     ends without being complete at ``timeout_s``. Points are in the hand frame.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     kind: Literal["reach"]
     targets_mm: tuple[Point, ...] = Field(min_length=2, description="Centres of the targets, hand frame [mm].")

@@ -1,0 +1,327 @@
+"""A small sound protocol, and a table of what goes wrong with it: edits of the text and the problems they cause."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+SOUND = """\
+format = 1
+sequence = ["hello", "warm_up", "feel", "look"]
+
+[study]
+name = "small"
+title = { en = "Small", nl = "Klein" }
+version = "1.0"
+languages = ["en", "nl"]
+
+[device]
+rate_hz = 1000
+force_limit_n = 8
+workspace_mm = [100, 60, 60]
+
+[scene]
+scale = 10
+
+[liquids.thin]
+density_kg_m3 = 1000
+effects = ["drag", "wake"]
+wake = { length = 100, scaling = 200, exponent = 0.5 }
+
+[liquids.thick]
+density_kg_m3 = 1400
+
+[liquids.other]
+density_kg_m3 = 1200
+
+[conditions.is_thin]
+liquid = "thin"
+
+[conditions.is_thick]
+liquid = "thick"
+
+[conditions.both]
+liquids = ["thin", "thick"]
+delay_ms = 120
+
+[conditions.apart]
+liquid = "other"
+
+[tasks.explore]
+kind = "explore"
+min_s = 3
+max_s = 9
+instruction = { en = "Move.", nl = "Beweeg." }
+
+[tasks.reach]
+kind = "reach"
+targets_mm = [
+    [-30, 0, 0],
+    [30, 0, 0],
+]
+radius_mm = 6
+dwell_s = 0.5
+count = 4
+timeout_s = 60
+instruction = { en = "Reach.", nl = "Reik." }
+
+[scales.agreement]
+labels.en = ["a", "b", "c", "d", "e", "f", "g"]
+labels.nl = ["h", "i", "j", "k", "l", "m", "n"]
+
+[questionnaires.short]
+intro = { en = "How much?", nl = "Hoeveel?" }
+scale = "agreement"
+
+[[questionnaires.short.items]]
+id = "warm"
+text = { en = "It is warm.", nl = "Het is warm." }
+short = { en = "Warm", nl = "Warm" }
+
+[[questionnaires.short.items]]
+id = "cold"
+text = { en = "It is cold.", nl = "Het is koud." }
+short = { en = "Cold", nl = "Koud" }
+
+[pages.hello]
+kind = "consent"
+title = { en = "Hello", nl = "Hallo" }
+[pages.hello.body]
+en = "Read this."
+nl = "Lees dit."
+
+[blocks.warm_up]
+phase = "practice"
+title = { en = "Practice", nl = "Oefenen" }
+setting_label = { en = "Practice", nl = "Oefenen" }
+conditions = ["apart"]
+task = "explore"
+
+[blocks.feel]
+part = 1
+title = { en = "Feeling", nl = "Voelen" }
+setting_label = { en = "Liquid", nl = "Vloeistof" }
+code_prefix = "L"
+conditions = ["is_thin", "is_thick"]
+order = "shuffled"
+repetitions = 2
+task = "explore"
+questionnaire = "short"
+
+[blocks.look]
+part = 2
+title = { en = "Looking", nl = "Kijken" }
+setting_label = { en = "Delay", nl = "Vertraging" }
+code_prefix = "D"
+conditions = ["is_thin", "both"]
+order = "shuffled"
+task = "reach"
+questionnaire = "short"
+"""
+
+
+class Expected(NamedTuple):
+    """A problem: text of the line it must point at (None: no line), its place, words of its sentence and hint."""
+
+    at: str | None
+    place: str
+    words: str
+
+
+class Case(NamedTuple):
+    """Edits (old, new; each old text occurs once) and the problems, all of them, in the order of their lines."""
+
+    name: str
+    edits: tuple[tuple[str, str], ...]
+    expected: tuple[Expected, ...]
+
+    @property
+    def text(self) -> str:
+        text = SOUND
+        for old, new in self.edits:
+            assert text.count(old) == 1, f"{self.name}: {old!r} is there {text.count(old)} times"
+            text = text.replace(old, new)
+        return text
+
+
+def case(name: str, old: str, new: str, *expected: tuple[str | None, str, str]) -> Case:
+    return Case(name, ((old, new),), tuple(Expected(*one) for one in expected))
+
+
+CASES = (
+    # keys
+    case("unknown key", "rate_hz = 1000", "rate = 1000", ("rate = 1000", "device.rate", 'did you mean "rate_hz"?')),
+    case(
+        "unknown key of a block",
+        'order = "shuffled"\nrepetitions',
+        'ordre = "shuffled"\nrepetitions',
+        ("ordre", "blocks.feel.ordre", 'unknown key (did you mean "order"?)'),
+    ),
+    case(
+        "unknown key of an item",
+        'short = { en = "Cold", nl = "Koud" }',
+        'short = { en = "Cold", nl = "Koud" }\nrequierd = true',
+        ("requierd", "questionnaires.short.items.2.requierd", 'did you mean "required"?'),
+    ),
+    case(
+        "unknown key of one kind of task",
+        "dwell_s = 0.5",
+        "dwel_s = 0.5",
+        ("[tasks.reach]", "tasks.reach.dwell_s", "is missing"),
+        ("dwel_s", "tasks.reach.dwel_s", 'did you mean "dwell_s"?'),
+    ),
+    case(
+        "key of another kind of task",
+        "min_s = 3",
+        "dwell_s = 3",
+        ("[tasks.explore]", "tasks.explore.min_s", "is missing"),
+        ("dwell_s = 3", "tasks.explore.dwell_s", "unknown key (known: instruction, kind, max_s, min_s)"),
+    ),
+    case(
+        "unknown key in an inline table",
+        "exponent = 0.5 }",
+        "exponnent = 0.5 }",
+        ("wake = {", "liquids.thin.wake.exponnent", 'did you mean "exponent"?'),
+    ),
+    case("unknown table", "[scene]", "[scenery]", ("[scenery]", "scenery", 'did you mean "scene"?')),
+    case("missing key", 'version = "1.0"\n', "", ("[study]", "study.version", "is missing")),
+    case("missing format", "format = 1\n", "", (None, "format", "is missing")),
+    case("later format", "format = 1", "format = 2", ("format", "format", "is 2, this program reads format 1")),
+    case("wrong format", "format = 1", "format = 0", ("format", "format", "0 is not 1")),
+    # values
+    case("text for a number", "rate_hz = 1000", 'rate_hz = "fast"', ("fast", "device.rate_hz", 'a number, not "fast"')),
+    case("number for a text", 'version = "1.0"', "version = 1.0", ("version", "study.version", "a string, not 1")),
+    case("truth for a number", "scale = 10", "scale = true", ("scale = true", "scene.scale", "a number, not true")),
+    case("fraction of a count", "count = 4", "count = 4.5", ("count = 4.5", "tasks.reach.count", "a whole number")),
+    case("not a number", "scale = 10", "scale = nan", ("scale = nan", "scene.scale", "a finite number")),
+    case("table for a list", 'sequence = ["hello", "warm_up", "feel", "look"]', "sequence = {}",
+         ("sequence", "sequence", "must be an array, not a table")),
+    case("value for a table", "wake = { length = 100, scaling = 200, exponent = 0.5 }", "wake = 3",
+         ("wake = 3", "liquids.thin.wake", "must be a table, not 3")),
+    case("force limit", "force_limit_n = 8", "force_limit_n = 9",
+         ("force_limit_n", "device.force_limit_n", "is 9, must be at most 8")),
+    case("no force", "force_limit_n = 8", "force_limit_n = 0",
+         ("force_limit_n", "device.force_limit_n", "is 0, must be more than 0")),
+    case("density", "density_kg_m3 = 1400", "density_kg_m3 = -1",
+         ("density_kg_m3 = -1", "liquids.thick.density_kg_m3", "is -1, must be more than 0")),
+    case("word not permitted", 'order = "shuffled"\nrepetitions', 'order = "shufled"\nrepetitions',
+         ("shufled", "blocks.feel.order", '"shufled" is not "fixed" or "shuffled" (did you mean "shuffled"?)')),
+    case("unknown kind of task", 'kind = "explore"', 'kind = "wander"',
+         ('kind = "wander"', "tasks.explore.kind", '"wander" is not one of "explore", "reach"')),
+    case("task without kind", 'kind = "explore"\n', "", ("[tasks.explore]", "tasks.explore.kind", "is missing")),
+    case("unknown effect", 'effects = ["drag", "wake"]', 'effects = ["drag", "wave"]',
+         ("effects", "liquids.thin.effects.2", 'did you mean "wake"?')),
+    case("name of the study", 'name = "small"', 'name = "a_small"',
+         ("a_small", "study.name", "small letters and digits, a letter first, no underscore")),
+    case("name of a table", "[conditions.is_thick]", "[conditions.isThick]",
+         ("[conditions.isThick]", "conditions.isThick", "small letters, digits and underscores"),
+         ("is_thick", "blocks.feel.conditions.2", 'there is no condition "is_thick"')),
+    case("too few labels", 'labels.nl = ["h", "i", "j", "k", "l", "m", "n"]', 'labels.nl = ["h", "i"]',
+         ("labels.nl", "scales.agreement.labels.nl", "has 2 entries, needs at least 7")),
+    case("too many labels", 'labels.nl = ["h",', 'labels.nl = ["h", "z",',
+         ("labels.nl", "scales.agreement.labels.nl", "has 8 entries, more than 7")),
+    case("flat target", "    [-30, 0, 0],\n", "    [-30, 0],\n",
+         ("[-30, 0]", "tasks.reach.targets_mm.1.3", "entry 3 is missing")),
+    case("single target", "    [-30, 0, 0],\n", "", ("targets_mm", "tasks.reach.targets_mm", "has 1 entries, needs")),
+    case("empty text", 'en = "Read this."', 'en = "  "', ("[pages.hello.body]", "pages.hello.body", "text is empty")),
+    case("text of the wrong type", 'title = { en = "Small", nl = "Klein" }', "title = 3",
+         ("title = 3", "study.title", "one string per language")),
+    # what one table can tell
+    case("wake outruns the body", "length = 100", "length = 300",
+         ("wake = {", "liquids.thin.wake", "length 300 exceeds scaling 200")),
+    case("wake called for but missing", "wake = { length = 100, scaling = 200, exponent = 0.5 }\n", "",
+         ("[liquids.thin]", "liquids.thin", 'the effect "wake" is called for')),
+    case("least after most", "min_s = 3", "min_s = 30",
+         ("min_s = 30", "tasks.explore.min_s", "min_s = 30 is more than max_s = 9")),
+    case("two ends of a task", "count = 4", "count = 4\nduration_s = 20",
+         ("count = 4", "tasks.reach.count", "either count or duration_s")),
+    case("no end of a task", "count = 4\n", "", ("[tasks.reach]", "tasks.reach.count", "either count or duration_s")),
+    case("longer than the timeout", "count = 4", "duration_s = 70",
+         ("duration_s", "tasks.reach.duration_s", "70 is longer than timeout_s = 60")),
+    case("targets on each other", "[30, 0, 0]", "[-24, 0, 0]",
+         ("targets_mm", "tasks.reach.targets_mm", "target 1 and the next are 6 mm apart and overlap")),
+    case("liquid and liquids", "delay_ms = 120", 'liquid = "thin"',
+         ('liquid = "thin"\n\n[conditions.apart]', "conditions.both.liquid", "either liquid or liquids")),
+    case("no workspace", "[100, 60, 60]", "[100, 60, 0]",
+         ("workspace_mm", "device.workspace_mm", "from 10 to 1000 mm")),
+    case("main block without codes", 'code_prefix = "L"\n', "",
+         ("[blocks.feel]", "blocks.feel.code_prefix", "a main block needs a code_prefix")),
+    case("main block without part", "part = 1\n", "",
+         ("[blocks.feel]", "blocks.feel.part", "a main block needs a part")),
+    case("practice with codes", 'phase = "practice"', 'phase = "practice"\ncode_prefix = "P"',
+         ('code_prefix = "P"', "blocks.warm_up.code_prefix", "a practice block is not blinded")),
+    case("practice in two conditions", 'conditions = ["apart"]', 'conditions = ["apart", "both"]',
+         ('"apart", "both"', "blocks.warm_up.conditions", "has one condition, this one 2")),
+    # names
+    case("unknown liquid", 'liquid = "thick"', 'liquid = "thik"',
+         ("thik", "conditions.is_thick.liquid", 'no liquid "thik" (did you mean "thick"?)')),
+    case("unknown liquid in a list", '["thin", "thick"]', '["thin", "tick"]',
+         ("tick", "conditions.both.liquids.2", 'no liquid "tick"')),
+    case("unknown condition", 'conditions = ["is_thin", "both"]', 'conditions = ["is_thin", "booth"]',
+         ("booth", "blocks.look.conditions.2", 'no condition "booth" (did you mean "both"?)')),
+    case("unknown task", 'task = "reach"', 'task = "search"', ("search", "blocks.look.task", 'no task "search"')),
+    case("unknown questionnaire", 'task = "reach"\nquestionnaire = "short"', 'task = "reach"\nquestionnaire = "shirt"',
+         ("shirt", "blocks.look.questionnaire", 'did you mean "short"?')),
+    case("unknown scale", 'scale = "agreement"', 'scale = "likert"',
+         ("likert", "questionnaires.short.scale", 'no scale "likert" (known: agreement)')),
+    case("unknown step", '"feel", "look"]', '"feel", "loop", "look"]',
+         ("sequence", "sequence.4", 'no page or block "loop" (did you mean "look"?)')),
+    case("block left out", '"feel", "look"]', '"feel"]', ("[blocks.look]", "blocks.look", "comes nowhere in sequence")),
+    case("page left out", '["hello", ', "[", ("[pages.hello]", "pages.hello", "comes nowhere in sequence")),
+    case("block twice", '"feel", "look"]', '"feel", "look", "feel"]',
+         ("sequence", "sequence.5", 'block "feel" comes twice')),
+    case("condition twice", '["is_thin", "is_thick"]', '["is_thin", "is_thin"]',
+         ('"is_thin", "is_thin"', "blocks.feel.conditions.2", '"is_thin" is there twice')),
+    case("liquid twice", '["thin", "thick"]', '["thin", "thin"]', ("liquids =", "conditions.both.liquids.2", "twice")),
+    case("item twice", 'id = "cold"', 'id = "warm"',
+         ('id = "warm"\ntext = { en = "It is cold', "questionnaires.short.items.2.id", 'a second item "warm"')),
+    # languages
+    case("language without words", 'languages = ["en", "nl"]', 'languages = ["en", "nl", "nl"]',
+         ("languages", "study.languages.3", '"nl" is there twice')),
+    case("text in one language", 'short = { en = "Cold", nl = "Koud" }', 'short = "Cold"',
+         ('short = "Cold"', "questionnaires.short.items.2.short", 'write { en = "…", nl = "…" }')),
+    case("text not translated", ', nl = "Beweeg." }', " }",
+         ('instruction = { en = "Move." }', "tasks.explore.instruction", 'is missing in "nl"')),
+    case("labels not translated", 'labels.nl = ["h", "i", "j", "k", "l", "m", "n"]\n', "",
+         ("labels.en", "scales.agreement.labels", 'is missing in "nl"')),
+    case("text in a language too many", 'nl = "Lees dit."', 'nl = "Lees dit."\nde = "Lies das."',
+         ("Lies das", "pages.hello.body.de", "not a language of the study")),
+    # between tables
+    case("target outside", "[30, 0, 0]", "[46, 0, 0]",
+         ("[46, 0, 0]", "tasks.reach.targets_mm.2", "x = 46 mm with radius 6 mm leaves the tank")),
+    case("practice in a judged liquid", 'liquid = "other"', 'liquid = "thick"',
+         ('conditions = ["apart"]', "blocks.warm_up.conditions", 'practice is in "thick"')),
+    case("codes of two blocks", 'code_prefix = "D"', 'code_prefix = "L"',
+         ('code_prefix = "L"\nconditions = ["is_thin", "both"]', "blocks.look.code_prefix",
+          'block "feel" has the prefix "L" too')),
+    case("part left out", "part = 2", "part = 3", ("part = 3", "blocks.look.part", "is 3, must be 1 or 2")),
+    case("first part", "part = 1", "part = 2",
+         ('part = 2\ntitle = { en = "Feeling"', "blocks.feel.part", "is 2, must be 1")),
+    # several at once
+    Case(
+        "all at once",
+        (
+            ("rate_hz = 1000", "rate_hz = 10"),
+            ("density_kg_m3 = 1400", 'density_kg_m3 = "heavy"'),
+            ("[30, 0, 0]", "[30, 40, 0]"),
+            ("id = \"cold\"", "id = \"Cold\""),
+            ('title = { en = "Hello", nl = "Hallo" }', 'title = { en = "Hello" }'),
+            ('order = "shuffled"\nrepetitions = 2\ntask = "explore"', 'order = 3\nrepetitions = 2\ntask = "exlore"'),
+        ),
+        (
+            Expected("rate_hz", "device.rate_hz", "is 10, must be at least 250"),
+            Expected("heavy", "liquids.thick.density_kg_m3", "must be a number"),
+            Expected("Cold\"\ntext", "questionnaires.short.items.2.id", '"Cold" is not permitted'),
+            Expected('title = { en = "Hello" }', "pages.hello.title", 'is missing in "nl"'),
+            Expected("order = 3", "blocks.feel.order", "3 is not"),
+            Expected("exlore", "blocks.feel.task", 'did you mean "explore"?'),
+        ),
+    ),
+)  # fmt: skip
+
+BROKEN = (
+    ("unclosed string", SOUND.replace('"small"', '"small'), 5, "column"),
+    ("key twice", SOUND.replace("scale = 10", "scale = 10\nscale = 11"), 17, "column 11: Cannot overwrite a value"),
+    ("table twice", SOUND.replace("[liquids.other]", "[liquids.thick]"), 26, "column"),
+    ("no value", SOUND.replace("scale = 10", "scale ="), 16, "column 8: Invalid value"),
+    ("cut off", SOUND.rstrip() + "\nlast = [1,", SOUND.count("\n") + 1, "column"),
+)

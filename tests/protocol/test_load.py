@@ -1,0 +1,136 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from study_app.errors import ProtocolError
+from study_app.protocol.load import load, load_scene, parse, protocol_hash, shipped, source_bytes
+from tests.protocol.cases import BROKEN, CASES, SOUND, Case
+
+
+def problems_of(text: str | bytes):
+    with pytest.raises(ProtocolError) as caught:
+        parse(text if isinstance(text, bytes) else text.encode(), "file.toml")
+    return caught.value.problems
+
+
+def line_of(fragment: str, text: str) -> int:
+    assert text.count(fragment) == 1, f"{fragment!r} is there {text.count(fragment)} times"
+    return text[: text.index(fragment)].count("\n") + 1
+
+
+def test_the_sound_protocol_is_sound():
+    assert parse(SOUND.encode(), "file.toml").study.name == "small"
+
+
+@pytest.mark.parametrize("case", CASES, ids=[case.name for case in CASES])
+def test_every_problem_is_named_with_its_line(case: Case):
+    text = case.text
+    found = problems_of(text)
+    assert [problem.place for problem in found] == [expected.place for expected in case.expected]
+    for problem, expected in zip(found, case.expected, strict=True):
+        assert expected.words in str(problem)
+        assert problem.line == (None if expected.at is None else line_of(expected.at, text))
+
+
+@pytest.mark.parametrize(("name", "text", "line", "words"), BROKEN, ids=[broken[0] for broken in BROKEN])
+def test_broken_toml_gives_line_and_column(name: str, text: str, line: int, words: str):
+    (problem,) = problems_of(text)
+    assert problem.line == line, name
+    assert words in problem.message
+
+
+def test_text_that_is_not_utf_8_is_refused_with_its_line():
+    (problem,) = problems_of(SOUND.replace("Klein", "Kl\udce9in").encode("utf-8", "surrogateescape"))
+    assert problem.line == line_of("Kl", SOUND)
+    assert "UTF-8" in str(problem)
+
+
+def test_windows_line_ends_change_nothing():
+    text = SOUND.replace("rate_hz = 1000", "rate = 1000")
+    assert problems_of(text.replace("\n", "\r\n")) == problems_of(text)
+
+
+def test_a_name_is_looked_up_in_the_working_folder_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(tmp_path)
+    assert load("rek2024").study.name == "rek2024"
+    own = tmp_path / "protocols" / "rek2024.toml"
+    own.parent.mkdir()
+    own.write_text(SOUND)
+    assert load("rek2024").study.name == "small"
+    assert source_bytes("rek2024") == SOUND.encode()
+    assert load(own).study.name == load(str(own)).study.name == "small"
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("rek2042", 'did you mean "rek2024"?'),
+        ("elsewhere", "known: demo, rek2024"),
+        ("folder/rek2024.toml", "no such file"),
+        ("rek2024.toml", "no such file"),
+        (".", "is a folder"),
+    ],
+)
+def test_a_protocol_that_is_not_there(name: str, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ProtocolError) as caught:
+        load(name)
+    assert words in str(caught.value)
+    assert str(caught.value).startswith(f"{name}: 1 problem")
+
+
+def test_a_file_that_cannot_be_read_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    path = tmp_path / "secret.toml"
+    path.write_text(SOUND)
+
+    def refuse(_: Path) -> bytes:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "read_bytes", refuse)
+    with pytest.raises(ProtocolError, match="Permission denied"):
+        load(path)
+
+
+def test_the_hash_is_of_the_bytes():
+    assert protocol_hash(b"") == "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855"
+    assert protocol_hash(SOUND.encode()) != protocol_hash(SOUND.encode() + b"\n")
+
+
+def test_shipped_protocols_are_listed_by_name():
+    assert {"demo", "rek2024"} <= set(shipped())
+
+
+def test_a_scene_is_one_liquid_of_a_protocol():
+    scene = load_scene("rek2024", "honey")
+    assert [liquid.id for liquid in scene.liquids] == ["honey"]
+    assert (scene.scale, scene.rate_hz, scene.force_limit_n) == (10, 1000, 8)
+    assert scene == load("rek2024").scene_for("honey")
+
+
+def test_a_scene_file_needs_no_study(tmp_path: Path):
+    path = tmp_path / "scene.toml"
+    path.write_text("[scene]\nscale = 3\nrate_hz = 500\n[liquids.tar]\ndensity_kg_m3 = 1153\n")
+    scene = load_scene(path, "tar")
+    assert (scene.scale, scene.rate_hz, scene.liquids[0].density_kg_m3) == (3, 500, 1153)
+    path.write_text("[liquids.tar]\ndensity_kg_m3 = 1153\n")
+    assert load_scene(path, "tar").scale == 10
+
+
+def test_problems_of_a_scene_file_are_its_own(tmp_path: Path):
+    path = tmp_path / "scene.toml"
+    path.write_text("[scene]\nscael = 3\n\n[liquids.tar]\ndensity = 1153\n")
+    with pytest.raises(ProtocolError) as caught:
+        load_scene(path, "tar")
+    assert [(problem.line, problem.place) for problem in caught.value.problems] == [
+        (2, "scene.scael"),
+        (4, "liquids.tar.density_kg_m3"),
+        (5, "liquids.tar.density"),
+    ]
+
+
+def test_an_unknown_liquid_is_named_with_the_nearest():
+    with pytest.raises(ProtocolError, match='there is no liquid "hony"') as caught:
+        load_scene("rek2024", "hony")
+    assert 'did you mean "honey"?' in str(caught.value)
