@@ -1,4 +1,4 @@
-"""The C functions the servo calls: signatures, and how compiled code turns an address into records.
+"""The C functions the servo calls: signatures, how to compile one, and how an address becomes records.
 
 A device and a clock are each a few C functions and the address of their own memory (``context``), handed to the
 compiled loop as arguments, so that one specialisation serves all of them. Simulated ones are ``numba.cfunc`` of the
@@ -16,11 +16,17 @@ same signatures; a driver in C passes its function pointers.
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from typing import Any, Protocol
 
+import numba
 import numpy as np
+from llvmlite import ir
 from numba import from_dtype, types
+from numba.core import cgutils
 from numba.extending import intrinsic
+
+import study_app.haptics.compiled  # noqa: F401 - decides where compiled functions are kept, before the first is made
 
 READ = types.int32(types.intp, types.int64, types.intp)
 WRITE = types.int32(types.intp, types.float64, types.float64, types.float64)
@@ -32,15 +38,81 @@ READ_NOTHING_NEW = 1
 READ_LOST = -1
 
 
-def pointer_to(dtype: np.dtype[Any]) -> Any:
-    """Return an intrinsic that turns an address (intp) into a pointer to records of ``dtype``, for ``carray``."""
-    pointer = types.CPointer(from_dtype(dtype))
+class Driver(Protocol):
+    """What the servo needs of a device, and no more (``devices.base.Device`` is the whole)."""
 
-    @intrinsic  # type: ignore[untyped-decorator]
+    @property
+    def name(self) -> str:
+        """The word that ``open_device`` takes."""
+        ...
+
+    @property
+    def read(self) -> Any:
+        """C function ``READ``."""
+        ...
+
+    @property
+    def write(self) -> Any:
+        """C function ``WRITE``."""
+        ...
+
+    @property
+    def context(self) -> int:
+        """Address of the device's own memory, handed to both."""
+        ...
+
+    @property
+    def force_limit_n(self) -> float:
+        """The greatest force it may be asked for [N]."""
+        ...
+
+
+_alloca_once: Any = cgutils.alloca_once
+
+
+def c_function(signature: Any, function: Callable[..., Any]) -> Any:
+    """Compile ``function`` as a C function of ``signature``, kept on disk like every kernel."""
+    return numba.cfunc(signature, cache=True, error_model="numpy")(function)
+
+
+def external(symbol: str, signature: Any) -> Any:
+    """Return the system's C function ``symbol`` for compiled code to call."""
+    return types.ExternalFunction(symbol, signature)
+
+
+def record_at(dtype: np.dtype[Any]) -> Any:
+    """Return a function for compiled code: an address (intp) -> the record of ``dtype`` that lives there."""
+    record: Any = from_dtype(dtype)
+
     def cast(_typing_context: Any, _address: Any) -> Any:
         def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
-            return builder.inttoptr(arguments[0], context.get_value_type(pointer))
+            return builder.inttoptr(arguments[0], context.get_value_type(record))
 
-        return pointer(types.intp), generate
+        return record(types.intp), generate
 
-    return cast
+    return intrinsic(cast)
+
+
+def stack_memory(words: int) -> Any:
+    """Return a function for compiled code: -> the address (intp) of ``words`` 8-byte words on its own stack."""
+    block = ir.ArrayType(ir.IntType(64), words)
+
+    def allocate(_typing_context: Any) -> Any:
+        def generate(context: Any, builder: Any, _signature: Any, _arguments: Any) -> Any:
+            return builder.ptrtoint(_alloca_once(builder, block), context.get_value_type(types.intp))
+
+        return types.intp(), generate
+
+    return intrinsic(allocate)
+
+
+def _order_memory(_typing_context: Any) -> Any:
+    def generate(context: Any, builder: Any, _signature: Any, _arguments: Any) -> Any:
+        builder.fence("acq_rel")
+        return context.get_dummy_value()
+
+    return types.none(), generate
+
+
+fence: Any = intrinsic(_order_memory)
+"""For compiled code: other threads see what was written before it before what is written after it."""

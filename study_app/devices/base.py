@@ -1,0 +1,39 @@
+"""What every device is to the servo: two C functions, their memory, a workspace and a force limit."""
+
+from __future__ import annotations
+
+from types import TracebackType
+from typing import Any, Protocol, Self
+
+from study_app.haptics.cfunctions import Driver
+
+
+class Device(Driver, Protocol):
+    """Something that can be felt with.
+
+    Opened before a servo uses it and closed after the servo has stopped; in between only the servo calls ``read`` and
+    ``write``. Positions and forces are in the hand frame (x right, y up, z toward the participant), SI.
+    """
+
+    @property
+    def workspace_m(self) -> tuple[float, float, float]:
+        """Half extents of where it reaches, about the origin [m]."""
+        ...
+
+    def open(self) -> None:
+        """Make it ready; raise ``DeviceNotFound`` where there is none."""
+        ...
+
+    def close(self) -> None:
+        """Let go of it; a second call does nothing."""
+        ...
+
+    def describe(self) -> dict[str, Any]:
+        """Return what a receipt should record of it: names and numbers, nothing of this machine's folders."""
+        ...
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None: ...

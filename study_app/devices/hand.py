@@ -1,0 +1,174 @@
+"""Where a simulated hand wants the handle at a moment: at the pointer, along a motion, on a reach, or where it is.
+
+Orders come from any thread, one at a time, through a seqlock: the writer makes the serial odd, writes, makes it even;
+the reader, inside the servo, takes an order only when it is whole, else leaves it for the next tick; so neither ever
+waits for the other.
+
+Everything is made of sums, products, divisions and square roots, which IEEE 754 rounds alike everywhere; so a scripted
+hand moves to the same bit on every machine.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from study_app.haptics.cfunctions import fence, record_at
+from study_app.haptics.compiled import kernel
+
+STAY, POINT, HOLD, REACH, FOLLOW = range(5)
+
+WAVES = 3  # tremor: so many waves an axis
+
+ORDER = np.dtype(
+    [
+        ("kind", np.int64),  # STAY ... FOLLOW
+        ("target_m", np.float64, (3,)),  # of POINT, HOLD and REACH
+        ("duration_ns", np.int64),  # of REACH; 0: as long as such a reach takes
+        ("rows", np.intp),  # of FOLLOW: address of MOTION_ROW records
+        ("count", np.int64),  # of FOLLOW: how many
+    ],
+    align=True,
+)
+
+MOTION_ROW = np.dtype([("t_s", np.float64), ("position_m", np.float64, (3,))], align=True)
+
+HAND = np.dtype(
+    [
+        ("serial", np.int64),  # of the posted order; odd while it is being written
+        ("posted", ORDER),
+        ("taken", np.int64),  # serial of the order in force
+        ("order", ORDER),
+        ("began_ns", np.int64),
+        ("began_m", np.float64, (3,)),  # where the hand was when the order began
+        ("row", np.int64),  # of FOLLOW: the row before now
+        ("moving", np.int64),  # 1 while an order is not yet fulfilled
+        ("lag_s", np.float64),  # of POINT: time constant of each of two low-passes that smooth the pointer
+        ("smooth_m", np.float64, (3,)),  # of POINT: after the first low-pass
+        ("aim_m", np.float64, (3,)),  # where the hand means to be
+        ("place_m", np.float64, (3,)),  # where it is: aim and tremor
+        ("was_m", np.float64, (3,)),  # where it was the time before
+        ("tremor_m", np.float64),  # amplitude of each wave
+        ("tremor_hz", np.float64, (3, WAVES)),
+        ("tremor_turn", np.float64, (3, WAVES)),  # phase at time 0, in turns
+    ],
+    align=True,
+)
+
+_row_at = record_at(MOTION_ROW)
+_ROW_BYTES = MOTION_ROW.itemsize
+
+REACH_START_S = 0.3  # a reach takes this long and
+REACH_PACE_MPS = 0.25  # its distance at this pace: 60 mm in 0.54 s with a peak of 0.21 m/s
+
+
+@kernel
+def post(hand: Any, order: Any) -> None:
+    """Give ``hand`` a new order."""
+    hand.serial += 1
+    fence()
+    hand.posted = order
+    fence()
+    hand.serial += 1
+
+
+@kernel
+def move_hand(hand: Any, now_ns: int, elapsed_s: float) -> None:
+    """Bring ``hand.place_m`` to ``now_ns``, ``elapsed_s`` after the last time."""
+    _take_order(hand, now_ns)
+    since_s = (now_ns - hand.began_ns) * 1e-9
+    if hand.order.kind == POINT:
+        _point(hand, elapsed_s)
+    elif hand.order.kind == HOLD:
+        for i in range(3):
+            hand.aim_m[i] = hand.order.target_m[i]
+        hand.moving = 0
+    elif hand.order.kind == REACH:
+        _reach(hand, since_s)
+    elif hand.order.kind == FOLLOW:
+        _follow(hand, since_s)
+    else:
+        hand.moving = 0
+    for i in range(3):
+        hand.was_m[i] = hand.place_m[i]
+        hand.place_m[i] = hand.aim_m[i] + tremor(hand, i, now_ns * 1e-9)
+
+
+@kernel
+def _take_order(hand: Any, now_ns: int) -> None:
+    serial = hand.serial
+    if serial == hand.taken or serial % 2 == 1:
+        return
+    fence()
+    hand.order = hand.posted
+    fence()
+    if hand.serial != serial:  # overwritten meanwhile: the next tick takes the newer one
+        hand.order.kind = STAY
+        return
+    hand.taken = serial
+    hand.began_ns = now_ns
+    hand.row = 0
+    hand.moving = 1
+    square = 0.0
+    for i in range(3):
+        hand.began_m[i] = hand.aim_m[i]
+        square += (hand.order.target_m[i] - hand.aim_m[i]) ** 2
+    if hand.order.kind == REACH and hand.order.duration_ns <= 0:
+        hand.order.duration_ns = int(1e9 * (REACH_START_S + math.sqrt(square) / REACH_PACE_MPS))
+
+
+@kernel
+def _point(hand: Any, elapsed_s: float) -> None:
+    gain = elapsed_s / (hand.lag_s + elapsed_s) if elapsed_s > 0.0 else 0.0
+    for i in range(3):
+        hand.smooth_m[i] += gain * (hand.order.target_m[i] - hand.smooth_m[i])
+        hand.aim_m[i] += gain * (hand.smooth_m[i] - hand.aim_m[i])
+
+
+@kernel
+def _reach(hand: Any, since_s: float) -> None:
+    """Minimum jerk: x = x_0 + (x_1 - x_0)(10 s^3 - 15 s^4 + 6 s^5), Flash & Hogan 1985, eq. 10."""
+    share = since_s * 1e9 / hand.order.duration_ns
+    if share >= 1.0:
+        share = 1.0
+        hand.moving = 0
+    done = share * share * share * (10.0 + share * (6.0 * share - 15.0))
+    for i in range(3):
+        hand.aim_m[i] = hand.began_m[i] + done * (hand.order.target_m[i] - hand.began_m[i])
+
+
+@kernel
+def _follow(hand: Any, since_s: float) -> None:
+    time = _row_at(hand.order.rows).t_s + since_s
+    last = hand.order.count - 1
+    while hand.row < last and _row_at(hand.order.rows + (hand.row + 1) * _ROW_BYTES).t_s <= time:
+        hand.row += 1
+    before = _row_at(hand.order.rows + hand.row * _ROW_BYTES)
+    after = _row_at(hand.order.rows + min(hand.row + 1, last) * _ROW_BYTES)
+    share = 0.0
+    if hand.row == last:
+        hand.moving = 0
+    else:
+        share = (time - before.t_s) / (after.t_s - before.t_s)
+    for i in range(3):
+        hand.aim_m[i] = before.position_m[i] + share * (after.position_m[i] - before.position_m[i])
+
+
+@kernel
+def tremor(hand: Any, axis: int, time_s: float) -> Any:
+    """Return how far physiological tremor (8 to 12 Hz) takes the hand from its aim along ``axis`` [m]."""
+    offset = 0.0
+    for k in range(WAVES):
+        turn = hand.tremor_hz[axis, k] * time_s + hand.tremor_turn[axis, k]
+        offset += wave(turn)
+    return hand.tremor_m * offset
+
+
+@kernel
+def wave(turn: float) -> float:
+    """Return nearly sin(2 pi turn), within 0.0012, by two parabolas: the same bits on every machine."""
+    phase = 2.0 * (turn - math.floor(turn)) - 1.0  # half turns, [-1, 1): shifted by half a turn, hence the sign
+    arch = 4.0 * phase * (1.0 - abs(phase))
+    return -(0.225 * (arch * abs(arch) - arch) + arch)

@@ -1,0 +1,40 @@
+"""The mouse as a haptic device: what cannot be felt is seen.
+
+The pointer draws a simulated handle along by a spring and a damper, and the liquid's force acts on that handle: it
+falls behind the pointer by force / stiffness, and goes on after the pointer has stopped, as the liquid commands. In
+free space it follows smoothly, 24 ms behind (two low-passes of 12 ms, which make one motion of a pointer's steps).
+"""
+
+from __future__ import annotations
+
+from study_app.devices.hand import POINT
+from study_app.devices.simulated import SimulatedDevice
+from study_app.haptics.plant import new_handle
+
+MASS_KG = 0.2
+STIFFNESS_NPM = 400.0  # 8 N hold the handle back by 20 mm, a fifth of the workspace
+DAMPING_NSPM = 27.0  # 1.5 times critical
+LAG_S = 0.012
+
+
+class MouseDevice(SimulatedDevice):
+    """The built-in default: a pointer and its buttons, and no hardware.
+
+    Parameters
+    ----------
+    workspace_m : half extents of where the handle reaches [m]
+    force_limit_n : the greatest force it may be asked for [N]
+    """
+
+    name = "mouse"
+
+    def __init__(
+        self, workspace_m: tuple[float, float, float] = (0.05, 0.05, 0.05), force_limit_n: float = 8.0
+    ) -> None:
+        handle = new_handle(mass_kg=MASS_KG, stiffness_npm=STIFFNESS_NPM, damping_nspm=DAMPING_NSPM)
+        super().__init__(handle, workspace_m, force_limit_n)
+        self._state.hand.lag_s = LAG_S
+
+    def point_to(self, x_m: float, y_m: float, z_m: float) -> None:
+        """Say where the pointer is [m, hand frame]; a place outside the workspace counts as its border."""
+        self._post(POINT, target_m=self._inside(x_m, y_m, z_m))

@@ -1,0 +1,95 @@
+"""Windows: the performance counter, and a high-resolution waitable timer for all but the last half millisecond."""
+
+from __future__ import annotations
+
+import ctypes
+import sys
+import weakref
+from typing import Any
+
+import numpy as np
+from llvmlite import binding
+from numba import types
+
+from study_app.haptics.cfunctions import external, record_at, stack_memory
+from study_app.haptics.compiled import kernel
+from study_app.haptics.layout import records
+
+_COUNTER = np.dtype([("frequency_hz", np.int64), ("timer", np.intp)], align=True)
+_INT64 = np.dtype([("value", np.int64)], align=True)
+_counter_at = record_at(_COUNTER)
+_int64_at = record_at(_INT64)
+_int64_on_stack = stack_memory(1)
+
+_query = external("QueryPerformanceCounter", types.int32(types.intp))
+_set_timer = external(
+    "SetWaitableTimer", types.int32(types.intp, types.intp, types.int32, types.intp, types.intp, types.int32)
+)
+_wait = external("WaitForSingleObject", types.int32(types.intp, types.int32))
+
+_INFINITE = -1
+_SPIN_NS = 500_000  # the timer may be this late; the rest is waited for by looking at the counter
+_HIGH_RESOLUTION = 0x2
+_ALL_ACCESS = 0x1F0003
+_TIME_CRITICAL = 15
+
+
+def open_clock() -> Any:
+    """Return the memory of a clock: the counter's frequency and a timer of its own, closed with the memory."""
+    memory = records(_COUNTER, 1)
+    if sys.platform == "win32":
+        kernel32 = ctypes.WinDLL("kernel32")
+        for name in ("QueryPerformanceCounter", "SetWaitableTimer", "WaitForSingleObject"):
+            binding.add_symbol(name, ctypes.cast(getattr(kernel32, name), ctypes.c_void_p).value)
+        kernel32.CreateWaitableTimerExW.restype = ctypes.c_void_p
+        kernel32.CloseHandle.argtypes = [ctypes.c_void_p]
+        frequency = ctypes.c_int64()
+        kernel32.QueryPerformanceFrequency(ctypes.byref(frequency))
+        memory[0].frequency_hz = frequency.value
+        timer = kernel32.CreateWaitableTimerExW(None, None, _HIGH_RESOLUTION, _ALL_ACCESS)
+        if not timer:  # before Windows 10, version 1803
+            ctypes.WinDLL("winmm").timeBeginPeriod(1)
+            timer = kernel32.CreateWaitableTimerExW(None, None, 0, _ALL_ACCESS)
+        memory[0].timer = timer
+        weakref.finalize(memory, kernel32.CloseHandle, timer)
+    return memory
+
+
+@kernel
+def _counter_ns(frequency_hz: int) -> Any:
+    address = _int64_on_stack()
+    _query(address)
+    ticks = _int64_at(address).value
+    whole = ticks // frequency_hz
+    return whole * 1_000_000_000 + (ticks - whole * frequency_hz) * 1_000_000_000 // frequency_hz
+
+
+def now(context: int) -> Any:
+    """``NOW``: the performance counter, in nanoseconds without overflow."""
+    return _counter_ns(_counter_at(context).frequency_hz)
+
+
+def sleep(context: int, deadline_ns: int) -> Any:
+    """``SLEEP``: on the timer to half a millisecond before the deadline, then by looking at the counter."""
+    clock = _counter_at(context)
+    time_ns = _counter_ns(clock.frequency_hz)
+    if deadline_ns - time_ns > _SPIN_NS:
+        address = _int64_on_stack()
+        due = _int64_at(address)
+        due.value = -((deadline_ns - time_ns - _SPIN_NS) // 100)  # negative: from now, in units of 100 ns
+        if due.value < 0 and _set_timer(clock.timer, address, 0, 0, 0, 0) != 0:
+            _wait(clock.timer, _INFINITE)
+    while time_ns < deadline_ns:
+        time_ns = _counter_ns(clock.frequency_hz)
+    return time_ns
+
+
+def raise_priority() -> str:
+    """Make the calling thread time-critical within its process."""
+    if sys.platform == "win32":
+        kernel32 = ctypes.WinDLL("kernel32")
+        kernel32.GetCurrentThread.restype = ctypes.c_void_p
+        kernel32.SetThreadPriority.argtypes = [ctypes.c_void_p, ctypes.c_int]
+        if kernel32.SetThreadPriority(kernel32.GetCurrentThread(), _TIME_CRITICAL):
+            return "raised (time critical)"
+    return "normal (the system grants no more)"

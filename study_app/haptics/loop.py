@@ -1,0 +1,159 @@
+"""The servo's loop, compiled: read the device, take a tick, write the force, publish the sample, sleep.
+
+It meets Python only where it begins and ends. It never allocates, logs, locks or raises; what the host wants it finds
+in a control record, what it did it leaves in the telemetry ring. Whatever ends it, it ends with zero force.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from study_app.haptics.cfunctions import READ_LOST, READ_NEW, fence
+from study_app.haptics.compiled import kernel
+from study_app.haptics.layout import STATUS_DEVICE_LOST, STATUS_OK
+from study_app.haptics.safety import begin_scene
+from study_app.haptics.tick import tick
+
+CONTROL = np.dtype(
+    [
+        # written by the host
+        ("run", np.int64),  # 1 while the loop may go on
+        ("stop", np.int64),  # 1 for no force
+        ("request", np.int64),  # counts the scenes handed over; the newest is in slot request % 2
+        ("serial", np.int64, (2,)),  # what telemetry calls the scene of each slot; 0 is rest
+        ("period_ns", np.int64),
+        # written by the loop
+        ("taken", np.int64),  # the request in force
+        ("deadline_ns", np.int64),  # when the next turn is due
+        ("turns", np.int64),  # how many were taken
+        ("overruns", np.int64),  # deadlines passed over because a turn did not fit
+        ("status", np.int64),  # STATUS_* of the last turn; any but STATUS_OK ended the loop
+    ],
+    align=True,
+)
+
+
+# Numbers before functions: numba calls a tuple that begins with a function experimental.
+class DeviceCalls(NamedTuple):
+    """A device as the loop sees it."""
+
+    context: int
+    read: Any
+    write: Any
+
+
+class ClockCalls(NamedTuple):
+    """A clock as the loop sees it."""
+
+    context: int
+    now: Any
+    sleep: Any
+
+
+class Output(NamedTuple):
+    """Where samples go (``haptics.telemetry``)."""
+
+    ring: Any
+    written: Any
+
+
+@kernel
+def run(control: Any, slots: Any, safety: Any, reading: Any, output: Any, device: Any, clock: Any, turns: int) -> int:
+    """Turn until the host or a fault ends it, or ``turns`` are done (below 0: without end); return how many were taken.
+
+    Parameters
+    ----------
+    control, safety, reading : (1,) arrays of ``CONTROL``, ``layout.SAFETY`` and ``layout.READING``
+    slots : the two models a scene may be in
+    output, device, clock : what is written to and called
+
+    Notes
+    -----
+    After ``turns`` it only pauses, and the device goes on holding the last force; all other ways out write zero.
+    """
+    first, second = slots
+    ring, written = output.ring, output.written
+    host = control[0]
+    done = 0
+    while host.run != 0 and host.status == STATUS_OK:
+        if turns >= 0 and done >= turns:
+            return done
+        began_ns = clock.sleep(clock.context, host.deadline_ns)
+        sample = ring[written[0] % ring.shape[0]]
+        sample.tick = host.turns
+        sample.time_ns = began_ns
+        sample.lateness_ns = began_ns - host.deadline_ns
+        _sense(sample, reading, device)
+        _take_scene(host, safety[0], sample)
+        if sample.status == STATUS_OK:
+            safety[0].stop = host.stop
+            if host.taken % 2 == 0:
+                tick(first, safety[0], sample)
+            else:
+                tick(second, safety[0], sample)
+        force = sample.device_force_n
+        if device.write(device.context, force[0], force[1], force[2]) == READ_LOST:
+            sample.status = STATUS_DEVICE_LOST
+        ended_ns = clock.now(clock.context)
+        sample.busy_ns = ended_ns - began_ns
+        host.status = sample.status
+        fence()
+        written[0] += 1
+        host.turns += 1
+        done += 1
+        _set_deadline(host, ended_ns)
+    device.write(device.context, 0.0, 0.0, 0.0)
+    return done
+
+
+@kernel
+def _sense(sample: Any, reading: Any, device: Any) -> None:
+    """Read the device into ``sample``; a lost one leaves its status, no velocity and no force."""
+    answer = device.read(device.context, sample.time_ns, np.intp(reading.ctypes.data))
+    sample.fresh = 1 if answer == READ_NEW else 0
+    sample.status = STATUS_DEVICE_LOST if answer == READ_LOST else STATUS_OK
+    sample.buttons = reading[0].buttons
+    sample.limiters = 0
+    for axis in range(3):
+        sample.position_m[axis] = reading[0].position_m[axis]
+        sample.velocity_mps[axis] = 0.0
+        sample.wake_mps[axis] = 0.0
+        sample.force_n[axis] = 0.0
+        sample.device_force_n[axis] = 0.0
+
+
+@kernel
+def _take_scene(host: Any, safety: Any, sample: Any) -> None:
+    """Take the scene that was handed over last, if it is another one."""
+    request = host.request
+    if request != host.taken:
+        fence()
+        host.taken = request
+        begin_scene(safety)
+    sample.scene = host.serial[host.taken % 2]
+
+
+@kernel
+def _set_deadline(host: Any, ended_ns: int) -> None:
+    """Set the next deadline and pass over those that are gone: a gap is never made up for by a burst of turns."""
+    host.deadline_ns += host.period_ns
+    if ended_ns > host.deadline_ns:
+        missed = (ended_ns - host.deadline_ns) // host.period_ns
+        host.overruns += missed
+        host.deadline_ns += missed * host.period_ns
+
+
+@kernel
+def offer_scene(control: Any, slot: int, serial: int) -> None:
+    """Make the scene in ``slot``, already packed, the one that the next turn takes."""
+    control[0].serial[slot] = serial
+    fence()
+    control[0].request += 1
+
+
+@kernel
+def let_go(device: Any) -> None:
+    """Write zero force to the device."""
+    device.write(device.context, 0.0, 0.0, 0.0)

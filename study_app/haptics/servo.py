@@ -1,0 +1,160 @@
+"""The servo as the rest of the program knows it: started and stopped, given scenes, asked for faults and telemetry."""
+
+from __future__ import annotations
+
+import threading
+import weakref
+from types import TracebackType
+from typing import Any, Self
+
+from study_app.errors import DeviceLost, ServoFault, StudyError
+from study_app.haptics.cfunctions import Driver
+from study_app.haptics.clock import Clock, SystemClock
+from study_app.haptics.layout import STATUS_DEVICE_LOST, STATUS_NON_FINITE, STATUS_STALE_FAULT
+from study_app.haptics.pack import elements_needed
+from study_app.haptics.scene import Scene
+from study_app.haptics.telemetry import Telemetry
+from study_app.haptics.thread import LoopThread
+
+ELEMENTS = 10_000
+
+_FAULTS = {
+    STATUS_DEVICE_LOST: "stopped answering; plug it in again and start anew",
+    STATUS_STALE_FAULT: "sent nothing usable for 50 ms; check its cable and start anew",
+    STATUS_NON_FINITE: "was to be sent a force that is not a finite number; check the scene's parameters",
+}
+
+
+class Servo:
+    """One device's servo: start it, load scenes, look at its telemetry, stop it.
+
+    As a context manager it starts on entry, on a clock that runs by itself, and stops on exit. On a ``VirtualClock``
+    nothing runs but `advance`, in the calling thread, through the same compiled loop.
+
+    Parameters
+    ----------
+    device : an opened device; it must stay open until the servo has stopped
+    clock : ``SystemClock`` (default) or ``VirtualClock``
+    rate_hz : turns a second; every scene must be made for this rate
+    elements : the most wake elements a scene may call for (``pack.elements_needed``)
+    """
+
+    def __init__(
+        self, device: Driver, *, clock: Clock | None = None, rate_hz: float = 1000.0, elements: int = ELEMENTS
+    ) -> None:
+        self.rate_hz = rate_hz
+        self.elements = elements
+        self.telemetry = Telemetry()
+        self._device = device
+        self._scene = Scene(rate_hz=rate_hz)
+        self._serial = 0
+        self._loading = threading.Lock()
+        self._loop = LoopThread(device, clock or SystemClock(), self._scene, elements, self.telemetry)
+        self._ending = weakref.finalize(self, self._loop.end)
+
+    def prepare(self) -> None:
+        """Compile all that runs later, or load it from the cache; takes seconds when first used after a change."""
+        self._loop.compile()
+        self.telemetry.position_at(0)
+        self.telemetry.reader().read()
+
+    def start(self) -> None:
+        """Turn in a thread of its own from now on, at rest unless a scene is loaded; the force fades in."""
+        if not self._loop.clock.runs:
+            raise StudyError("a servo on a virtual clock does not run by itself: call advance(ticks)")
+        if self._loop.live:
+            raise StudyError("this servo has been started already: stop it first")
+        self.prepare()
+        self._loop.start()
+
+    def advance(self, ticks: int) -> int:
+        """Take ``ticks`` turns in this thread; return how many were taken: fewer after a fault (see `check`)."""
+        if self._loop.thread is not None:
+            raise StudyError("this servo turns in its own thread: stop it before advancing it by hand")
+        return self._loop.advance(ticks)
+
+    def stop(self) -> None:
+        """End the loop and wait for it; the last force written is zero. A stopped servo may be started again."""
+        self._loop.end()
+
+    def load(self, scene: Scene) -> int:
+        """Let the next tick present ``scene``; return the serial number by which telemetry knows it.
+
+        Raises
+        ------
+        StudyError
+            The scene is of another rate, or calls for more wake elements than this servo has.
+        ServoFault, DeviceLost
+            The servo has stopped itself.
+        """
+        if scene.rate_hz != self.rate_hz:
+            raise StudyError(
+                f"the scene is made for {scene.rate_hz:g} Hz but the servo runs at {self.rate_hz:g} Hz: "
+                "give both the same rate_hz"
+            )
+        needed = elements_needed(scene)
+        if needed > self.elements:
+            raise StudyError(
+                f"the scene calls for {needed} wake elements but the servo has room for {self.elements}: "
+                "make the servo with more elements, or the wake's length shorter"
+            )
+        self.check()
+        with self._loading:
+            self._serial += 1
+            self._scene = scene
+            self._loop.hand_over(scene, self._serial)
+            return self._serial
+
+    def rest(self) -> None:
+        """Let the next tick present no liquid, scene 0: the force fades to zero."""
+        with self._loading:
+            self._loop.hand_over(self._scene.model_copy(update={"liquids": ()}), 0)
+
+    def stop_force(self) -> None:
+        """Send zero force from the next tick on, past all fades, until `fade_in`."""
+        self._loop.control[0].stop = 1
+
+    def fade_in(self) -> None:
+        """Let the force return after `stop_force`, as slowly as at a start."""
+        self._loop.control[0].stop = 0
+
+    @property
+    def force_is_on(self) -> bool:
+        """Whether forces are sent: not stopped by hand, and no fault."""
+        return bool(self._loop.control[0].stop == 0) and self.fault is None
+
+    @property
+    def fault(self) -> str | None:
+        """Why the servo stopped itself, in a sentence; None while it has not."""
+        reason = _FAULTS.get(int(self._loop.control[0].status))
+        return None if reason is None else f"the device '{self._device.name}' {reason}"
+
+    @property
+    def overruns(self) -> int:
+        """How many deadlines were passed over because a turn did not fit."""
+        return int(self._loop.control[0].overruns)
+
+    def check(self) -> None:
+        """Raise ``DeviceLost`` or ``ServoFault`` if the servo has stopped itself."""
+        fault = self.fault
+        if fault is not None:
+            lost = self._loop.control[0].status == STATUS_DEVICE_LOST
+            raise (DeviceLost if lost else ServoFault)(f"{fault}; the force is zero")
+
+    def now_ns(self) -> int:
+        """Return the time on the servo's clock [ns], the clock of all samples."""
+        return self._loop.clock.now_ns()
+
+    def describe(self) -> dict[str, Any]:
+        """Return what a receipt should record: the rate, and the priority that the system granted to the thread."""
+        return {"rate_hz": self.rate_hz, "priority": self._loop.priority, "elements": self.elements}
+
+    def __enter__(self) -> Self:
+        if self._loop.clock.runs:
+            self.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.stop()

@@ -1,0 +1,154 @@
+"""The loop's memory, its thread, and all the ways it ends.
+
+Whatever ends the host ends the loop, and with it the force: being stopped, an exception, the last reference to the
+servo, the interpreter's exit, and those signals that would otherwise kill the process on the spot.
+"""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+import weakref
+from types import FrameType
+
+from study_app.errors import ServoFault
+from study_app.haptics.cfunctions import Driver
+from study_app.haptics.clock import Clock, raise_priority
+from study_app.haptics.layout import READING, STATUS_OK, records
+from study_app.haptics.loop import CONTROL, ClockCalls, DeviceCalls, Output, let_go, offer_scene, run
+from study_app.haptics.pack import pack, pack_into
+from study_app.haptics.safety import new_safety
+from study_app.haptics.scene import Scene
+from study_app.haptics.telemetry import Telemetry
+
+_FOREVER = -1
+_PATIENCE_S = 2.0  # for a loop that was told to end; it takes one turn
+
+
+class LoopThread:
+    """What the loop needs to turn, kept apart from the servo, so that a servo nobody holds any more is collected.
+
+    Parameters
+    ----------
+    driver, clock : what it reads and writes, and when
+    rest : a scene without liquids, which it begins with
+    elements : wake elements each of the two slots has room for
+    """
+
+    def __init__(self, driver: Driver, clock: Clock, rest: Scene, elements: int, telemetry: Telemetry) -> None:
+        self.clock = clock
+        self.live = False  # begun, and not ended
+        self.thread: threading.Thread | None = None
+        self.priority = "none: not in a thread of its own"
+        self.control = records(CONTROL, 1)
+        self.control[0].period_ns = round(1e9 / rest.rate_hz)
+        self._rest = rest
+        self._driver = driver
+        self._safety = new_safety(driver.force_limit_n)
+        self._slots = (pack(rest, capacity=elements), pack(rest, capacity=elements))
+        self._device = DeviceCalls(driver.context, driver.read, driver.write)
+        self._arguments = (
+            self.control,
+            self._slots,
+            self._safety,
+            records(READING, 1),
+            Output(telemetry.ring, telemetry.written),
+            self._device,
+            ClockCalls(clock.context, clock.now, clock.sleep),
+        )
+
+    def compile(self) -> None:
+        """Compile the loop for its arguments, or load it from the cache: zero force is written, no turn taken."""
+        let_go(self._device)
+        run(*self._arguments, 0)
+
+    def start(self) -> None:
+        """Turn in a thread of its own until `end`."""
+        self._begin()
+        ready = threading.Event()
+        self.thread = threading.Thread(target=self._turn, args=(ready,), name="servo", daemon=True)
+        self.thread.start()
+        ready.wait()
+
+    def advance(self, turns: int) -> int:
+        """Take ``turns`` in the calling thread; return how many were taken."""
+        if not self.live:
+            self._begin()
+        return int(run(*self._arguments, max(turns, 0)))
+
+    def hand_over(self, scene: Scene, serial: int) -> None:
+        """Pack ``scene`` into the spare slot and let the next turn take it; first let it take the one before."""
+        host = self.control[0]
+        patience = time.monotonic() + _PATIENCE_S
+        while self.thread is not None and self.thread.is_alive() and host.taken != host.request:
+            if time.monotonic() > patience:
+                raise self._silence()
+            time.sleep(host.period_ns * 1e-9)
+        spare = (int(host.request) + 1) % 2
+        pack_into(self._slots[spare], scene)
+        offer_scene(self.control, spare, serial)
+
+    def end(self) -> None:
+        """End the loop, wait for it, and write zero force once more from here; then rest is what it would begin with.
+
+        Raises
+        ------
+        ServoFault
+            The loop does not answer: the device's driver hangs.
+        """
+        if not self.live:
+            return
+        self.control[0].run = 0
+        if self.thread is not None and self.thread is not threading.current_thread():
+            self.thread.join(_PATIENCE_S)
+            if self.thread.is_alive():
+                raise self._silence()
+        self.thread = None
+        self.live = False
+        let_go(self._device)
+        self.hand_over(self._rest, 0)
+
+    def _silence(self) -> ServoFault:
+        return ServoFault(
+            f"the servo is stuck: its device '{self._driver.name}' gave no answer for {_PATIENCE_S:g} s; switch it off"
+        )
+
+    def _begin(self) -> None:
+        _leave_by_the_exit()
+        _live.add(self)
+        self._safety[0] = new_safety(self._driver.force_limit_n)[0]
+        host = self.control[0]
+        host.status = STATUS_OK
+        host.deadline_ns = self.clock.now_ns() + host.period_ns
+        host.run = 1
+        self.live = True
+
+    def _turn(self, ready: threading.Event) -> None:
+        try:
+            self.priority = raise_priority()
+        finally:
+            ready.set()
+        try:
+            run(*self._arguments, _FOREVER)
+        finally:
+            let_go(self._device)
+
+
+_live: weakref.WeakSet[LoopThread] = weakref.WeakSet()
+
+
+def _leave_by_the_exit() -> None:
+    """Let signals that would kill the process at once end it as ``sys.exit`` does; others keep their handlers."""
+    if threading.current_thread() is not threading.main_thread():
+        return
+    for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK"):
+        number = getattr(signal, name, None)
+        if number is not None and signal.getsignal(number) is signal.SIG_DFL:
+            signal.signal(number, _leave)
+
+
+def _leave(number: int, _frame: FrameType | None) -> None:
+    for loop in tuple(_live):
+        loop.control[0].run = 0
+    raise SystemExit(128 + number)

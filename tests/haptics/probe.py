@@ -1,0 +1,81 @@
+"""A device for tests: moves evenly, remembers every force written to it, and fails on command."""
+
+import numpy as np
+
+from study_app.haptics.cfunctions import READ, READ_LOST, READ_NEW, READ_NOTHING_NEW, WRITE, c_function, record_at
+from study_app.haptics.layout import READING, records
+
+WRITES = 8192
+
+PROBE = np.dtype(
+    [
+        ("velocity_mps", np.float64, (3,)),
+        ("reads", np.int64),
+        ("writes", np.int64),
+        ("lost_at_read", np.int64),
+        ("lost_at_write", np.int64),
+        ("silent_from_read", np.int64),
+        ("bad_at_read", np.int64),
+        ("stall_at_read", np.int64),
+        ("stall_ns", np.int64),
+        ("clock", np.intp),
+        ("forces_n", np.float64, (WRITES, 3)),
+    ],
+    align=True,
+)
+CLOCK = np.dtype([("now_ns", np.int64)], align=True)
+NEVER = 1 << 60
+
+_probe_at = record_at(PROBE)
+_reading_at = record_at(READING)
+_clock_at = record_at(CLOCK)
+
+
+def _read(context, now_ns, reading):
+    probe = _probe_at(context)
+    probe.reads += 1
+    if probe.reads == probe.stall_at_read:
+        _clock_at(probe.clock).now_ns += probe.stall_ns
+    if probe.reads >= probe.lost_at_read:
+        return READ_LOST
+    if probe.reads >= probe.silent_from_read:
+        return READ_NOTHING_NEW
+    out = _reading_at(reading)
+    for axis in range(3):
+        out.position_m[axis] = probe.velocity_mps[axis] * now_ns * 1e-9
+    if probe.reads == probe.bad_at_read:
+        out.position_m[1] = np.nan
+    return READ_NEW
+
+
+def _write(context, fx, fy, fz):
+    probe = _probe_at(context)
+    force = probe.forces_n[probe.writes % WRITES]
+    force[0], force[1], force[2] = fx, fy, fz
+    probe.writes += 1
+    return READ_LOST if probe.writes >= probe.lost_at_write else 0
+
+
+class Probe:
+    """Moves at ``velocity_mps`` through the origin at time 0; its memory may be given, to be shared with a process."""
+
+    name = "probe"
+    force_limit_n = 8.0
+    read = c_function(READ, _read)
+    write = c_function(WRITE, _write)
+
+    def __init__(self, velocity_mps=(0.2, 0.0, 0.0), memory=None):
+        self.memory = records(PROBE, 1) if memory is None else memory
+        self.state = self.memory[0]
+        self.state.velocity_mps = velocity_mps
+        for name in ("lost_at_read", "lost_at_write", "silent_from_read", "bad_at_read", "stall_at_read"):
+            self.state[name] = NEVER
+        self.context = self.memory.ctypes.data
+
+    @property
+    def forces_n(self):
+        return self.state.forces_n[: self.state.writes].copy()
+
+    def stall(self, clock, at_read, stall_ns):
+        """Let ``stall_ns`` of virtual time pass within one reading."""
+        self.state.clock, self.state.stall_at_read, self.state.stall_ns = clock.context, at_read, stall_ns
