@@ -11,7 +11,7 @@ import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numba
 
@@ -44,7 +44,7 @@ def _use_own_cache() -> None:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError:
         return  # numba then falls back to its own places; slower, never wrong within one run
-    numba.config.CACHE_DIR = str(folder)
+    vars(numba.config)["CACHE_DIR"] = str(folder)
 
 
 _use_own_cache()
@@ -52,5 +52,9 @@ _use_own_cache()
 
 def kernel(function: F) -> F:
     """Compile ``function`` for the servo: no interpreter lock, IEEE arithmetic, division by zero gives infinity."""
-    compiled: F = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
-    return compiled
+    return cast(F, numba.njit(cache=True, nogil=True, error_model="numpy")(function))
+
+
+def part(function: F) -> F:
+    """Compile ``function`` into each kernel that calls it: for the steps of a tick, which hand on whole models."""
+    return cast(F, numba.njit(cache=True, nogil=True, error_model="numpy", forceinline=True)(function))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from study_app.haptics.compiled import kernel
+from study_app.haptics.compiled import part
 from study_app.haptics.layout import LIMITER_GLITCH, LIMITER_STALE, STATUS_OK, STATUS_STALE_FAULT, Record
 from study_app.haptics.vector import copy, distance
 
@@ -17,13 +17,13 @@ STALE_NS = 5_000_000
 FAULT_NS = 50_000_000
 
 
-@kernel
+@part
 def clamp(interval_s: float) -> float:
     """Return a time between samples as the model takes it [s], whatever the clock did."""
     return min(max(interval_s, SHORTEST_S), LONGEST_S)
 
 
-@kernel
+@part
 def admit(parameters: Record, state: Record, safety: Record, sample: Record) -> float:
     """Take the sample's position into the scene and return Δt [s], or 0 where there is nothing to take.
 
@@ -52,7 +52,7 @@ def admit(parameters: Record, state: Record, safety: Record, sample: Record) -> 
     return interval_s
 
 
-@kernel
+@part
 def place(state: Record, x_m: float, y_m: float, z_m: float) -> None:
     """Put the body at a place of the scene; at a beginning it has always been there."""
     copy(state.position_m, state.previous_m)
@@ -63,13 +63,13 @@ def place(state: Record, x_m: float, y_m: float, z_m: float) -> None:
         copy(state.position_m, state.previous_m)
 
 
-@kernel
+@part
 def _in_scene(parameters: Record, hand_m: Any) -> tuple[float, float, float]:
     scale, origin_m = parameters.scale, parameters.origin_m
     return scale * hand_m[0] + origin_m[0], scale * hand_m[1] + origin_m[1], scale * hand_m[2] + origin_m[2]
 
 
-@kernel
+@part
 def _plausible(parameters: Record, state: Record, sample: Record, interval_s: float) -> bool:
     """Return whether the position is finite, in the scene too, and within reach of the last accepted one."""
     x_m, y_m, z_m = _in_scene(parameters, sample.position_m)
@@ -78,7 +78,7 @@ def _plausible(parameters: Record, state: Record, sample: Record, interval_s: fl
     return state.tracking == 0 or distance(sample.position_m, state.hand_m) <= FASTEST_HAND_MPS * interval_s
 
 
-@kernel
+@part
 def watch(safety: Record, sample: Record) -> None:
     """Say how long the turn is, and let the force go when no usable sample came: 5 ms fade, 50 ms zero and fault."""
     if safety.started == 0:

@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from study_app.haptics.compiled import kernel
+from study_app.haptics.compiled import part
 from study_app.haptics.layout import REGION_BOX, REGION_EVERYWHERE, Record
 
 HYSTERESIS_M = 1e-3
 FADE_S = 20e-3
 
 
-@kernel
+@part
 def share_out(model: Any, interval_s: float) -> None:
     """Move the share φ of every liquid toward 1 where the body is in it, else toward 0.
 
@@ -30,7 +30,7 @@ def share_out(model: Any, interval_s: float) -> None:
     state.placed = 1
 
 
-@kernel
+@part
 def _contains(region: Record, place_m: Any, inside: int) -> int:
     """Return 1 where ``place_m`` is in the region; a body that was inside leaves it 1 mm beyond the border."""
     if region.kind == REGION_EVERYWHERE:

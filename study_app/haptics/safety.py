@@ -9,7 +9,7 @@ import math
 from typing import Any
 
 from study_app.errors import StudyError
-from study_app.haptics.compiled import kernel
+from study_app.haptics.compiled import kernel, part
 from study_app.haptics.layout import (
     EFFECT_DRAG,
     LIMITER_FADE,
@@ -59,7 +59,7 @@ def begin_scene(safety: Record) -> None:
     safety.fade = 0.0
 
 
-@kernel
+@part
 def guard(model: Any, safety: Record, sample: Record) -> None:
     """Turn the force of the effects into the force to be sent, ``sample.device_force_n``."""
     parameters, state = model.parameters[0], model.state[0]
@@ -80,7 +80,7 @@ def guard(model: Any, safety: Record, sample: Record) -> None:
     copy(force_n, safety.sent_n)
 
 
-@kernel
+@part
 def _limit_slope(model: Any, sample: Record) -> None:
     """Shorten each drag to F·min(1, B|w|/|F|): a secant a sampled damper of the hand's mass stays stable under.
 
@@ -102,7 +102,7 @@ def _limit_slope(model: Any, sample: Record) -> None:
                     sample.device_force_n[axis] -= excess * local.drag.force_n[axis]
 
 
-@kernel
+@part
 def _limit_norm(force_n: Any, limit_n: float, sample: Record) -> None:
     """Shorten the force to the limit, keeping its direction."""
     size_n = norm(force_n)
@@ -112,7 +112,7 @@ def _limit_norm(force_n: Any, limit_n: float, sample: Record) -> None:
             force_n[axis] *= limit_n / size_n
 
 
-@kernel
+@part
 def _fade(force_n: Any, safety: Record, sample: Record) -> None:
     """Weaken the force while it fades in (start 500 ms, scene 50 ms) or out (no usable sample)."""
     if safety.withheld:
@@ -128,7 +128,7 @@ def _fade(force_n: Any, safety: Record, sample: Record) -> None:
         safety.fade_s = SCENE_FADE_S
 
 
-@kernel
+@part
 def _limit_slew(force_n: Any, safety: Record, sample: Record) -> None:
     """Let the force move by at most 0.5 N from the one sent before."""
     step_n = distance(force_n, safety.sent_n)
@@ -138,7 +138,7 @@ def _limit_slew(force_n: Any, safety: Record, sample: Record) -> None:
             force_n[axis] = safety.sent_n[axis] + (force_n[axis] - safety.sent_n[axis]) * SLEW_N / step_n
 
 
-@kernel
+@part
 def _let_go(force_n: Any, safety: Record, sample: Record) -> None:
     """Zero force now; when let on again, the force fades in as at the start."""
     if safety.stop != 0:

@@ -66,7 +66,7 @@ class Wake(Frozen):
     """The position tail: the liquid velocity left by the body's recent path (Rek 2024, §4.3; ``effects.wake``).
 
     ``length`` N and ``scaling`` S count elements at 1 kHz; N ≤ S, so that the liquid never outruns the body.
-    ``decay`` λ is the factor a millisecond, ``exponent`` y that of the response to the fill. ``breaking_angle_deg`` β is
+    ``decay`` λ is the factor a millisecond, ``exponent`` y shapes the response to the fill. ``breaking_angle_deg`` β is
     the turn that starts a new segment, taken between elements ``breaking_span_m`` of path apart (0: neighbours).
     ``resolution_m`` is the least motion between two stored elements (0: every tick). ``axes`` says whether vertical
     motion enters the tail.

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from study_app.haptics.compiled import kernel
+from study_app.haptics.compiled import kernel, part
 from study_app.haptics.door import admit, watch
 from study_app.haptics.effects.drag import resist
 from study_app.haptics.effects.segments import empty
@@ -37,7 +37,7 @@ def tick(model: Any, safety: Record, sample: Record) -> None:
     guard(model, safety, sample)
 
 
-@kernel
+@part
 def respond(model: Any, interval_s: float) -> None:
     """Let the liquids respond to the place the body has reached, Δt after the one before.
 
@@ -74,7 +74,7 @@ def begin(model: Any) -> None:
     model.state[0].tracking = 1
 
 
-@kernel
+@part
 def report(state: Record, sample: Record) -> None:
     """Write what the liquids did into the sample."""
     copy(state.velocity_mps, sample.velocity_mps)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from study_app.haptics.compiled import kernel
+from study_app.haptics.compiled import part
 
 
-@kernel
+@part
 def clear(vector: Any) -> None:
     """Set it to zero."""
     vector[0] = 0.0
@@ -16,7 +16,7 @@ def clear(vector: Any) -> None:
     vector[2] = 0.0
 
 
-@kernel
+@part
 def copy(source: Any, to: Any) -> None:
     """Set ``to`` to ``source``."""
     to[0] = source[0]
@@ -24,20 +24,20 @@ def copy(source: Any, to: Any) -> None:
     to[2] = source[2]
 
 
-@kernel
+@part
 def norm(vector: Any) -> float:
     """Return its length."""
     return math.sqrt(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2])
 
 
-@kernel
+@part
 def distance(a: Any, b: Any) -> float:
     """Return the length of a − b."""
     x, y, z = a[0] - b[0], a[1] - b[1], a[2] - b[2]
     return math.sqrt(x * x + y * y + z * z)
 
 
-@kernel
+@part
 def is_finite(vector: Any) -> bool:
     """Return whether all three are finite."""
     return math.isfinite(vector[0]) and math.isfinite(vector[1]) and math.isfinite(vector[2])

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import math
 
-from study_app.haptics.compiled import kernel
+from study_app.haptics.compiled import part
 from study_app.haptics.layout import ESTIMATOR_EWMA, ESTIMATOR_GIVEN, KNEE_SQRT, KNEE_SQUARE, Record
 from study_app.haptics.vector import clear, norm
 
 
-@kernel
+@part
 def forget(parameters: Record, state: Record) -> None:
     """Begin anew: a position alone says nothing about velocity, so it is 0. A given velocity is already there."""
     if parameters.estimator != ESTIMATOR_GIVEN:
         clear(state.estimate_mps)
 
 
-@kernel
+@part
 def estimate(parameters: Record, state: Record, interval_s: float) -> None:
     """Bring ``state.estimate_mps`` and ``state.velocity_mps`` to the newest position."""
     if parameters.estimator == ESTIMATOR_EWMA:
@@ -24,7 +24,7 @@ def estimate(parameters: Record, state: Record, interval_s: float) -> None:
     _knee(parameters, state)
 
 
-@kernel
+@part
 def _ewma(parameters: Record, state: Record, interval_s: float) -> None:
     """Move the estimate to the newest difference u = Δp/Δt: v ← v + α(Δt)(u − v) (Rek 2024, §4.2).
 
@@ -36,7 +36,7 @@ def _ewma(parameters: Record, state: Record, interval_s: float) -> None:
         state.estimate_mps[axis] += weight * (difference_mps - state.estimate_mps[axis])
 
 
-@kernel
+@part
 def _knee(parameters: Record, state: Record) -> None:
     """Lower speeds above the threshold, keep the direction; the estimate itself stays as it is.
 

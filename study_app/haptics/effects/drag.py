@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from study_app.haptics.compiled import kernel
+from study_app.haptics.compiled import part
 from study_app.haptics.layout import Record
 from study_app.haptics.vector import norm
 
 
-@kernel
+@part
 def resist(liquid: Record, local: Record, state: Record) -> None:
     """Add F = −½ ρ C_d A |w| w φ to the force, with w = v − v_flow (Rek 2024, §4.1).
 

@@ -11,14 +11,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from study_app.haptics.compiled import kernel
+from study_app.haptics.compiled import kernel, part
 from study_app.haptics.layout import Record
 from study_app.haptics.vector import clear
 
 COSINE_TOLERANCE = 1e-12
 
 
-@kernel
+@part
 def add(total: float, carry: float, term: float) -> tuple[float, float]:
     """Return total + term and the rounding errors so far (Neumaier 1974): their sum is right to twice the digits."""
     new = total + term
@@ -35,7 +35,7 @@ def empty(wake: Record, tracks: Record, segments: Any) -> None:
     _clear_sums(wake, tracks, segments)
 
 
-@kernel
+@part
 def tail(wake: Record, tracks: Record, segments: Any, out_mps: Any) -> None:
     """Write v_tail = (1/S) Σ_i d_i Σ|e| to ``out_mps``, shape (3,)."""
     first = segments[wake.row + tracks.first_segment % wake.length]
@@ -48,7 +48,7 @@ def tail(wake: Record, tracks: Record, segments: Any, out_mps: Any) -> None:
         out_mps[axis] = tracks.scale * (interior_mps + ends_mps) / wake.scaling
 
 
-@kernel
+@part
 def store(
     wake: Record, tracks: Record, elements: Any, segments: Any, ex: float, ey: float, ez: float, speed_mps: float
 ) -> None:
@@ -72,7 +72,7 @@ def store(
     tracks.held += 1
 
 
-@kernel
+@part
 def _turns(
     wake: Record, tracks: Record, elements: Any, segments: Any, ex: float, ey: float, ez: float, speed_mps: float
 ) -> bool:
@@ -97,7 +97,7 @@ def _turns(
     return bool(along < least)
 
 
-@kernel
+@part
 def _open(wake: Record, tracks: Record, segments: Any) -> None:
     """Start a new segment; the one before, unless it is the oldest or empty, now stands still."""
     last = segments[wake.row + tracks.last_segment % wake.length]
@@ -109,7 +109,7 @@ def _open(wake: Record, tracks: Record, segments: Any) -> None:
     _clear(segments[wake.row + tracks.last_segment % wake.length])
 
 
-@kernel
+@part
 def _join(wake: Record, tracks: Record, segments: Any, element: Record) -> None:
     """Add the newest element to the newest segment, whose direction it becomes, and to the sums."""
     segment = segments[wake.row + tracks.last_segment % wake.length]
@@ -122,7 +122,7 @@ def _join(wake: Record, tracks: Record, segments: Any, element: Record) -> None:
     _count_speed(tracks, segment, element.speed_mps, 1.0)
 
 
-@kernel
+@part
 def _evict(wake: Record, tracks: Record, elements: Any, segments: Any) -> None:
     """Let the oldest element fall off the list."""
     oldest = tracks.stored - tracks.held
@@ -145,7 +145,7 @@ def _evict(wake: Record, tracks: Record, elements: Any, segments: Any) -> None:
             _add_interior(tracks, segments[wake.row + tracks.first_segment % wake.length], -1.0)
 
 
-@kernel
+@part
 def _move_reference(wake: Record, tracks: Record, elements: Any) -> None:
     """Compare with the next moving element from now on: the reference fell off, and this is its segment's oldest."""
     tracks.reference += 1
@@ -180,7 +180,7 @@ def renew(wake: Record, tracks: Record, elements: Any, segments: Any) -> None:
         _add_interior(tracks, segments[wake.row + i % wake.length], 1.0)
 
 
-@kernel
+@part
 def _count_speed(tracks: Record, segment: Record, speed_mps: float, sign: float) -> None:
     """Add an element's speed to its segment and to the totals, or with ``sign`` −1 take it away."""
     segment.speed_mps, segment.speed_carry_mps = add(segment.speed_mps, segment.speed_carry_mps, sign * speed_mps)
@@ -189,7 +189,7 @@ def _count_speed(tracks: Record, segment: Record, speed_mps: float, sign: float)
     tracks.square_m2ps2, tracks.square_carry_m2ps2 = add(tracks.square_m2ps2, tracks.square_carry_m2ps2, square)
 
 
-@kernel
+@part
 def _add_interior(tracks: Record, segment: Record, sign: float) -> None:
     """Add what a segment contributes to the interior, or with ``sign`` −1 take exactly that away."""
     speed_mps = segment.speed_mps + segment.speed_carry_mps
@@ -200,7 +200,7 @@ def _add_interior(tracks: Record, segment: Record, sign: float) -> None:
         tracks.interior_carry_mps[axis] = carry
 
 
-@kernel
+@part
 def _clear_sums(wake: Record, tracks: Record, segments: Any) -> None:
     """No moving element is left: every sum is exactly zero, and the scale may begin anew."""
     tracks.first_segment = 0
@@ -209,7 +209,7 @@ def _clear_sums(wake: Record, tracks: Record, segments: Any) -> None:
     _clear_totals(tracks)
 
 
-@kernel
+@part
 def _clear_totals(tracks: Record) -> None:
     tracks.scale = 1.0
     tracks.evicted = 0
@@ -221,7 +221,7 @@ def _clear_totals(tracks: Record) -> None:
     clear(tracks.interior_carry_mps)
 
 
-@kernel
+@part
 def _clear(segment: Record) -> None:
     clear(segment.direction)
     segment.count = 0

@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from study_app.haptics.compiled import kernel
+from study_app.haptics.compiled import part
 from study_app.haptics.effects.segments import empty, renew, store, tail
 from study_app.haptics.layout import Record
 from study_app.haptics.vector import clear, copy, distance, norm
@@ -27,7 +27,7 @@ SMALLEST_SCALE = 1e-60
 NOTHING_MPS = 1e-30
 
 
-@kernel
+@part
 def flow(liquid: Record, local: Record, segments: Any) -> None:
     """Set the liquid's velocity at the body, ``local.flow_mps``, from the wake so far.
 
@@ -53,7 +53,7 @@ def flow(liquid: Record, local: Record, segments: Any) -> None:
         out[axis] *= gain
 
 
-@kernel
+@part
 def follow(liquid: Record, local: Record, state: Record, elements: Any, segments: Any, interval_s: float) -> None:
     """Let the wake take in this tick, after the force: decay, arc, and an element where the rules ask for one.
 

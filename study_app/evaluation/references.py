@@ -1,0 +1,174 @@
+"""The force model by the letter of its definition: slow, plain, and what the product must equal.
+
+Every element of the wake is kept in a list and decays by itself; segments are summed anew each tick. Written from the
+definition, not from ``haptics.effects``, which it shares no code with.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from study_app.haptics.compiled import kernel
+from study_app.haptics.motion import Floats, Motion
+from study_app.haptics.scene import Ewma, Knee, Scene
+
+
+class Response(NamedTuple):
+    """What the definition says about each row of a motion, (n, 3) but for the last."""
+
+    velocity_mps: Floats
+    wake_mps: Floats
+    force_n: Floats
+    size_mps: Floats  # (n,): Σ|e| / S, the measure that rounding errors are compared with
+
+
+def respond(scene: Scene, motion: Motion) -> Response:
+    """Return velocity, wake and force along ``motion`` in a scene of one liquid that is everywhere."""
+    liquid = scene.liquids[0]
+    interval_s = np.clip(np.diff(motion.t_s, prepend=motion.t_s[0] - 1 / scene.rate_hz), 0.2e-3, 20e-3)
+    interval_s[0] = 1 / scene.rate_hz
+    given = motion.velocity_mps if motion.velocity_mps is not None else _filtered(scene, motion, interval_s)
+    velocity_mps = np.array([lowered(row, scene.knee) for row in given])
+    wake_mps, size_mps = np.zeros_like(velocity_mps), np.zeros(len(velocity_mps))
+    if liquid.wake is not None and "wake" in liquid.effects:
+        length = max(1, math.floor(liquid.wake.length * scene.rate_hz / 1000))
+        wake_mps, size_mps = wakes(
+            velocity_mps * np.array([1.0, 1.0 if liquid.wake.axes == "xyz" else 0.0, 1.0]),
+            motion.position_m,
+            interval_s,
+            length,
+            max(liquid.wake.scaling * scene.rate_hz / 1000, length),
+            liquid.wake.exponent,
+            math.cos(math.radians(liquid.wake.breaking_angle_deg)),
+            liquid.wake.breaking_span_m,
+            liquid.wake.decay,
+            liquid.wake.resolution_m,
+        )
+    relative_mps = velocity_mps - wake_mps
+    area_m2 = math.pi * (scene.body.diameter_m / 2) ** 2
+    pressure = 0.5 * liquid.density_kg_m3 * scene.body.drag_coefficient * area_m2
+    force_n = -pressure * np.linalg.norm(relative_mps, axis=1, keepdims=True) * relative_mps
+    return Response(velocity_mps, wake_mps, force_n, size_mps)
+
+
+def _filtered(scene: Scene, motion: Motion, interval_s: Floats) -> Floats:
+    """Return the exponentially weighted velocity (n, 3), zero at the first row."""
+    if not isinstance(scene.velocity, Ewma):
+        raise TypeError(f"the definition filters with ewma alone, not {scene.velocity.kind}")
+    velocity_mps = np.zeros_like(motion.position_m)
+    for k in range(1, len(interval_s)):
+        weight = 1 - (1 - scene.velocity.alpha) ** (interval_s[k] / 1e-3)
+        difference_mps = (motion.position_m[k] - motion.position_m[k - 1]) / interval_s[k]
+        velocity_mps[k] = velocity_mps[k - 1] + weight * (difference_mps - velocity_mps[k - 1])
+    return velocity_mps
+
+
+def lowered(velocity_mps: Floats, knee: Knee) -> Floats:
+    """Return one velocity (3,) after the speed knee."""
+    speed = float(np.linalg.norm(velocity_mps))
+    excess = speed - knee.threshold_mps
+    if excess <= 0 or knee.law == "none":
+        return velocity_mps
+    wanted = knee.threshold_mps + (math.sqrt(1 + 2 * excess) - 1 if knee.law == "sqrt" else excess**2)
+    return velocity_mps * (wanted / speed)
+
+
+@kernel
+def wakes(
+    h_mps: Any,
+    position_m: Any,
+    interval_s: Any,
+    length: int,
+    scaling: float,
+    exponent: float,
+    breaking_cosine: float,
+    breaking_span_m: float,
+    decay: float,
+    resolution_m: float,
+) -> Any:
+    """Return v_wake (n, 3) as each tick's drag meets it, and Σ|e|/S (n,), for velocities ``h_mps`` (n, 3) of the tail.
+
+    The list is newest first: row 0 is the youngest of ``count`` elements. Zero elements have segment -1.
+    """
+    ticks = len(h_mps)
+    wake_mps, size_mps = np.zeros((ticks, 3)), np.zeros(ticks)
+    element, segment, arc = np.zeros((length + 1, 3)), np.zeros(length + 1, np.int64), np.zeros(length + 1)
+    count, current, arc_m, stored_at, stored = 0, 0, 0.0, np.zeros(3), False
+    for k in range(ticks):
+        wake_mps[k], size_mps[k] = _wake(element, segment, count, scaling, exponent)
+
+        element[:count] *= decay ** (interval_s[k] / 1e-3)
+        speed = _size(h_mps[k])
+        arc_m += speed * interval_s[k]
+        rests = speed < 1e-3
+        moved = not stored or _size(position_m[k] - stored_at) >= resolution_m
+        if not rests and not moved:
+            continue
+        if not rests and _breaks(
+            h_mps[k], element, segment, arc, count, current, arc_m, breaking_cosine, breaking_span_m
+        ):
+            current += 1
+        for j in range(count, 0, -1):
+            element[j], segment[j], arc[j] = element[j - 1], segment[j - 1], arc[j - 1]
+        element[0] = np.zeros(3) if rests else h_mps[k]
+        segment[0] = -1 if rests else current
+        arc[0] = arc_m
+        count = min(count + 1, length)
+        stored_at[:], stored = position_m[k], True
+    return wake_mps, size_mps
+
+
+@kernel
+def _wake(element: Any, segment: Any, count: int, scaling: float, exponent: float) -> Any:
+    """Return v_wake of a list and Σ|e|/S: eq. (1), then the response to the fill."""
+    tail, speeds, squares = np.zeros(3), 0.0, 0.0
+    direction, summed, inside = np.zeros(3), 0.0, -1
+    for j in range(count):
+        speed = _size(element[j])
+        if segment[j] >= 0 and speed > 0.0:
+            if segment[j] != inside:
+                tail += direction * summed
+                direction, summed, inside = element[j] / speed, 0.0, segment[j]
+            summed += speed
+            speeds += speed
+            squares += speed * speed
+    tail = (tail + direction * summed) / scaling
+    if speeds == 0.0:
+        return np.zeros(3), 0.0
+    fill = _size(tail) / (squares / speeds)
+    gain = fill ** (exponent - 1.0) if exponent >= 1.0 else (fill**2 + 0.05**2) ** ((exponent - 1.0) / 2.0)
+    return tail * gain, speeds / scaling
+
+
+@kernel
+def _breaks(
+    h: Any,
+    element: Any,
+    segment: Any,
+    arc: Any,
+    count: int,
+    current: int,
+    arc_m: float,
+    breaking_cosine: float,
+    breaking_span_m: float,
+) -> bool:
+    """Return whether a velocity begins a new segment."""
+    reference = -1
+    for j in range(count):
+        if segment[j] == current:
+            reference = j
+            if arc_m - arc[j] >= breaking_span_m:
+                break
+    if reference < 0:
+        return True
+    e = element[reference]
+    along = h[0] * e[0] + h[1] * e[1] + h[2] * e[2]
+    return bool(along < (breaking_cosine - 1e-12) * _size(h) * _size(e))
+
+
+@kernel
+def _size(vector: Any) -> float:
+    return math.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
