@@ -1,0 +1,123 @@
+"""What figures say of themselves: titles, n, and captions that stand on their own."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from study_app.analysis.measures import QUARTILES
+from study_app.analysis.questions import Block
+from study_app.analysis.tables import Study
+
+_NUMBERS: Final = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
+
+
+def title(block: Block) -> str:
+    """Return the heading of a block's figure."""
+    if block.kind == "delays":
+        return "Answers over added delay" if block.revealed else "Answers by delay setting"
+    return "Agreement for each liquid" if block.revealed else "Agreement for each setting"
+
+
+def counts(study: Study, block: Block) -> list[str]:
+    """Return what a figure says about n, the longest wording first."""
+    people = people_a_setting(study, block)
+    n = len(set(study.answers(block)["participant"]))
+    if set(people.values()) != {n}:
+        low, high = min(people.values()), max(people.values())
+        few = f"n = {low} to {high} of {n} participants" if low < high else f"n = {low} of {n} participants"
+        return [f"{few} in a {_noun(block)}", few, f"n = {low}–{high}"]
+    short = f"n = {n} participant" + ("s" if n != 1 else "")
+    presented = set(study.presented(block).values())
+    if presented == {n}:
+        return [f"{short}, every {_noun(block)} rated by all" if n > 1 else short, short, f"n = {n}"]
+    return [f"{short}, {_listed(presented)} presentations of a {_noun(block)}", short, f"n = {n}"]
+
+
+def people_a_setting(study: Study, block: Block) -> dict[str, int]:
+    """Return how many participants were presented each setting of a block."""
+    rows = study.trials[study.trials["counted"] & (study.trials["block"] == block.id)]
+    return {code: int(rows.loc[rows["code"] == code, "participant"].nunique()) for code in block.codes}
+
+
+def foot(block: Block) -> str:
+    """Return the line under the plots over delay."""
+    scale = f"1 = {block.labels[0]}, 7 = {block.labels[-1]}."
+    if block.revealed:
+        return f"Added delay, ms.   {scale}"
+    return f"Delay settings by code; the order of the codes says nothing.   {scale}"
+
+
+def caption(study: Study, block: Block) -> str:
+    """Return the caption of a block's figure."""
+    return " ".join(sentence for sentence in _sentences(study, block) if sentence)
+
+
+def _sentences(study: Study, block: Block) -> list[str]:
+    statements = f"{_number(len(block.items))} statement" + ("s" if len(block.items) != 1 else "")
+    settings = f"{_number(len(block.settings))} {_noun(block)}" + ("s" if len(block.settings) != 1 else "")
+    simulated = "SIMULATED participants, no people; " if study.simulated else ""
+    start = f"{'Pilot. ' if study.pilot else ''}Agreement with {statements} on {settings}"
+    head = f"{start} ({simulated}{counts(study, block)[0]})."
+    drawn = _bars(block) if block.kind == "liquids" else _plots(block)
+    return [head, *drawn, _blinded(study), _unanswered(study, block), _left_out(study), _invalid(study, block)]
+
+
+def _bars(block: Block) -> list[str]:
+    return [
+        "Bars: number of answers, disagreement left and agreement right of the line; neutral answers apart in grey, on "
+        "the same scale.",
+        "Numbers: counts of answers; a segment too narrow for its number carries none (all counts are in the exported "
+        "aggregate table). n beside a bar: valid answers where some are missing.",
+        f"Levels, from 1 to 7: {', '.join(block.labels)}.",
+    ]
+
+
+def _plots(block: Block) -> list[str]:
+    quartiles = f"the middle half of the answers; quartiles {QUARTILES}."
+    scale = f"Answers from 1 ({block.labels[0]}) to 7 ({block.labels[-1]})."
+    if block.revealed:
+        return [
+            "Thin lines: participants, slightly apart in height where they coincide; thick line: median; band: "
+            + quartiles,
+            scale,
+        ]
+    return ["Dots: participants, equal answers beside each other; ring: median; band: " + quartiles, scale]
+
+
+def _blinded(study: Study) -> str:
+    if study.revealed:
+        return ""
+    return "Settings are shown by code in the order of the codes, since the key is sealed; the order says nothing."
+
+
+def _unanswered(study: Study, block: Block) -> str:
+    table = study.aggregate(block)
+    return f"Cannot judge: {table['cannot_judge'].sum()}; not answered: {table['missing'].sum()}."
+
+
+def _left_out(study: Study) -> str:
+    if not study.left_out:
+        return ""
+    sessions = "session is" if study.left_out == 1 else "sessions are"
+    return f"{study.left_out} {sessions} left out, not having been completed."
+
+
+def _invalid(study: Study, block: Block) -> str:
+    rows = study.trials[study.trials["counted"] & (study.trials["block"] == block.id)]
+    invalid = int((~rows["valid"].fillna(value=True)).sum())
+    if not invalid:
+        return ""
+    return f"{invalid} of {len(rows)} trials exceeded the protocol's limits of timing and are included."
+
+
+def _noun(block: Block) -> str:
+    return "setting" if not block.revealed else "liquid" if block.kind == "liquids" else "delay"
+
+
+def _number(count: int) -> str:
+    return _NUMBERS[count] if count < len(_NUMBERS) else str(count)
+
+
+def _listed(values: set[int]) -> str:
+    low, high = min(values), max(values)
+    return str(low) if low == high else f"{low} to {high}"

@@ -1,0 +1,137 @@
+"""The figures of a study: agreement for each liquid, and answers over delay; by code until the key is opened."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+from matplotlib.figure import Figure
+
+from study_app.analysis import bars, captions, multiples, style
+from study_app.analysis.measures import by_participant
+from study_app.analysis.output import write_files
+from study_app.analysis.questions import Block, Kind
+from study_app.analysis.sheet import Mark
+from study_app.analysis.tables import Study, load_study
+from study_app.errors import AnalysisError
+
+KINDS: Final[tuple[Kind, ...]] = ("liquids", "delays")
+
+
+def liquids(study: Study, block: Block | None = None, *, fonts: Sequence[str] | None = None) -> Figure:
+    """Draw the counts of answers as diverging bars, a panel per setting.
+
+    Parameters
+    ----------
+    block : Block, optional
+        One of ``study.blocks``; by default the first that compares liquids.
+    fonts : sequence of str, optional
+        Font families, best first; by default those for screens.
+
+    Raises
+    ------
+    AnalysisError
+        No such block, or no session was completed.
+    """
+    block = block or _only(study, "liquids")
+    _require_answers(study, block)
+    table = study.aggregate(block)
+    panels = [
+        bars.Panel(setting.code, block.name(setting), table[table["code"] == setting.code].reset_index(drop=True))
+        for setting in block.settings
+    ]
+    return bars.draw(
+        panels,
+        [item.short for item in block.items],
+        block.labels,
+        title=captions.title(block),
+        marks=_marks(study),
+        counts=captions.counts(study, block),
+        fonts=fonts or style.screen_fonts(),
+    ).figure
+
+
+def delays(study: Study, block: Block | None = None, *, fonts: Sequence[str] | None = None) -> Figure:
+    """Draw the answers over the delay that was asked for, a small plot per statement; by code while blinded.
+
+    Parameters and errors as in :func:`liquids`. A participant's repeated answers are drawn as their median.
+    """
+    block = block or _only(study, "delays")
+    _require_answers(study, block)
+    answers = study.answers(block)
+    people = sorted(answers["participant"].unique())
+    plots = [multiples.Plot(item.short, by_participant(answers, people, block.codes, item.id)) for item in block.items]
+    return multiples.draw(
+        plots,
+        block.codes,
+        [setting.delay_ms or 0.0 for setting in block.settings] if block.revealed else None,
+        title=captions.title(block),
+        marks=_marks(study),
+        counts=captions.counts(study, block),
+        foot=captions.foot(block),
+        fonts=fonts or style.screen_fonts(),
+    ).figure
+
+
+def plot(folder: Path, to: Path) -> tuple[Path, ...]:
+    """Write every figure of a study as PNG, SVG and PDF, each with its caption as text, into the folder ``to``.
+
+    The same results give the same bytes. Returns the files written.
+
+    Raises
+    ------
+    AnalysisError
+        The results cannot be evaluated, or ``to`` cannot be written; nothing was.
+    StoreError
+        The key was opened, and is now missing or changed.
+    """
+    study = load_study(folder)
+    if not study.blocks:
+        raise AnalysisError(f"{folder}: the study {study.name!r} asks no statements, so there is nothing to draw")
+    files: dict[str, bytes] = {}
+    for kind in KINDS:
+        blocks = study.blocks_of(kind)
+        for block in blocks:
+            name = kind if len(blocks) == 1 else f"{kind}-{block.id}"
+            for form in style.FORMATS:
+                figure = _draw(study, block, style.fonts_for(form))
+                files[f"{name}.{form}"] = style.file_bytes(figure, form, f"{study.name}: {captions.title(block)}")
+            files[f"{name}.txt"] = f"{captions.caption(study, block)}\n".encode()
+    return write_files(Path(to), files)
+
+
+def _draw(study: Study, block: Block, fonts: Sequence[str]) -> Figure:
+    return (liquids if block.kind == "liquids" else delays)(study, block, fonts=fonts)
+
+
+def _only(study: Study, kind: Kind) -> Block:
+    blocks = study.blocks_of(kind)
+    if not blocks:
+        raise AnalysisError(f"{study.folder}: the study {study.name!r} has no part that compares {kind}")
+    return blocks[0]
+
+
+def _require_answers(study: Study, block: Block) -> None:
+    if not len(study.answers(block)):
+        states = ", ".join(
+            f"{participant} session {session} {status}"
+            for participant, session, status in study.participants[["participant", "session", "status"]]
+            .head(5)
+            .itertuples(index=False)
+        )
+        raise AnalysisError(
+            f"{study.folder}: no completed session with answers in {block.id!r} yet ({states}): figures are drawn from "
+            "completed sessions; export writes what there is"
+        )
+
+
+def _marks(study: Study) -> list[Mark]:
+    marks = []
+    if study.simulated:
+        marks.append(Mark("SIMULATED participants", style.WARN, style.WARN_GROUND))
+    if study.pilot:
+        marks.append(Mark("PILOT", style.WARN, style.WARN_GROUND))
+    if not study.revealed:
+        marks.append(Mark("Blinded: by code", style.SEALED, style.SEALED_GROUND))
+    return marks

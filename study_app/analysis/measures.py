@@ -1,0 +1,112 @@
+"""Measures of single statements: counts of all seven levels, medians, quartiles, agreement.
+
+One statement is ordinal, so there are no means. Quartiles are linear (Hyndman & Fan 1996, type 7: numpy's default).
+All seven levels are always there, chosen or not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Final, TypeAlias
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+Array: TypeAlias = NDArray[np.float64]
+
+LEVELS: Final = (1, 2, 3, 4, 5, 6, 7)
+NEUTRAL: Final = 4
+AGREEMENT: Final = (5, 6, 7)
+QUARTILES: Final = "linear (Hyndman & Fan type 7)"
+COUNT_COLUMNS: Final = tuple(f"count_{level}" for level in LEVELS)
+COLUMNS: Final = (
+    "code",
+    "item",
+    "participants",
+    "presented",
+    "n",
+    "cannot_judge",
+    "missing",
+    *COUNT_COLUMNS,
+    "median",
+    "q1",
+    "q3",
+    "agree_percent",
+)
+
+
+def aggregate(
+    answers: pd.DataFrame, presented: Mapping[str, int], codes: Sequence[str], items: Sequence[str]
+) -> pd.DataFrame:
+    """Summarise answers by setting and statement, in the order of ``codes`` and within it of ``items``.
+
+    Parameters
+    ----------
+    answers : DataFrame
+        One row per answer that counts: ``participant``, ``code``, ``item``, ``response`` (1 to 7 or missing) and
+        ``cannot_judge``.
+    presented : mapping of str to int
+        How often each setting was presented and its questionnaire due: what was neither answered nor judged
+        impossible is ``missing``.
+
+    Returns
+    -------
+    DataFrame
+        ``COLUMNS``. ``n`` counts valid answers, ``participants`` the people who gave them; ``median``, ``q1``, ``q3``
+        and ``agree_percent`` (levels 5 to 7) are NaN without any.
+    """
+    groups = dict(iter(answers.groupby(["code", "item"], sort=False)))
+    empty = answers.iloc[:0]
+    rows = [
+        {"code": code, "item": item, **_measures(groups.get((code, item), empty), presented.get(code, 0))}
+        for code in codes
+        for item in items
+    ]
+    return pd.DataFrame(rows, columns=list(COLUMNS))
+
+
+def _measures(group: pd.DataFrame, presented: int) -> dict[str, float]:
+    valid = group[group["response"].notna()]
+    values = valid["response"].to_numpy(dtype=float)
+    cannot_judge = int(group["cannot_judge"].sum())
+    q1, median, q3 = quartiles(values)
+    return {
+        "participants": valid["participant"].nunique(),
+        "presented": presented,
+        "n": len(values),
+        "cannot_judge": cannot_judge,
+        "missing": presented - len(values) - cannot_judge,
+        **{column: int((values == level).sum()) for column, level in zip(COUNT_COLUMNS, LEVELS, strict=True)},
+        "median": median,
+        "q1": q1,
+        "q3": q3,
+        "agree_percent": 100 * float(np.isin(values, AGREEMENT).mean()) if len(values) else float("nan"),
+    }
+
+
+def quartiles(values: Array) -> tuple[float, float, float]:
+    """Return the lower quartile, median and upper quartile of ``values`` (n,), leaving out NaN; NaN without any."""
+    valid = values[~np.isnan(values)]
+    if not len(valid):
+        return (float("nan"),) * 3
+    q1, median, q3 = np.quantile(valid, (0.25, 0.5, 0.75), method="linear")
+    return float(q1), float(median), float(q3)
+
+
+def by_participant(answers: pd.DataFrame, participants: Sequence[str], codes: Sequence[str], item: str) -> Array:
+    """Return one value per participant and setting for a statement: the median over repeated presentations.
+
+    Returns
+    -------
+    (participants, codes) array
+        NaN where a participant gave no valid answer.
+    """
+    chosen = answers[(answers["item"] == item) & answers["response"].notna()]
+    values = np.full((len(participants), len(codes)), np.nan)
+    rows = {participant: row for row, participant in enumerate(participants)}
+    columns = {code: column for column, code in enumerate(codes)}
+    for key, group in chosen.groupby(["participant", "code"]):
+        participant, code = (str(part) for part in key)
+        values[rows[participant], columns[code]] = np.median(group["response"].to_numpy(dtype=float))
+    return values

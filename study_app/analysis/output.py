@@ -1,0 +1,47 @@
+"""Files handed out: all of them whole, or none."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import secrets
+from collections.abc import Mapping
+from pathlib import Path
+
+from study_app.errors import AnalysisError
+
+
+def write_files(to: Path, files: Mapping[str, bytes]) -> tuple[Path, ...]:
+    """Put ``files`` (name to content) into the folder ``to``, which is created; older files of these names give way.
+
+    All are written beside and flushed to the disk before the first takes its name, so that a full disk changes nothing.
+
+    Raises
+    ------
+    AnalysisError
+        The folder cannot be written; it is as before.
+    """
+    created = not to.exists()
+    token = secrets.token_hex(4)
+    staged = {name: to / f".{name}.{token}.tmp" for name in files}
+    try:
+        to.mkdir(parents=True, exist_ok=True)
+        for name, content in files.items():
+            with staged[name].open("xb") as file:
+                file.write(content)
+                file.flush()
+                os.fsync(file.fileno())
+        for name, path in staged.items():
+            path.replace(to / name)
+    except OSError as error:
+        for path in staged.values():
+            with contextlib.suppress(OSError):
+                path.unlink(missing_ok=True)
+        if created:
+            with contextlib.suppress(OSError):
+                to.rmdir()
+        why = error.strerror or type(error).__name__
+        raise AnalysisError(
+            f"{to} cannot be written ({why}): choose another folder with --to, free space, or mend the permissions"
+        ) from error
+    return tuple(to / name for name in files)

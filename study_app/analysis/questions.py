@@ -1,0 +1,149 @@
+"""What was asked and of what: blocks, their settings and their statements, as the receipts and the key tell it.
+
+While the key is sealed a setting is its code and nothing else. Texts are in English where the study has it, otherwise
+in its first language.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final, Literal, TypeAlias
+
+from study_app.store.blinding import Key
+
+Kind: TypeAlias = Literal["liquids", "delays"]
+
+DELAY_PREFIX: Final = "D"
+"""Codes of delay settings are D1, D2 …: what tells a block of delays while the conditions are sealed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Item:
+    """One statement: its id, its words, and a few words for figures."""
+
+    id: str
+    text: str
+    short: str
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """What was presented under a code; all but the code is None until the key is opened."""
+
+    code: str
+    condition: str | None = None
+    liquid: str | None = None
+    delay_ms: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """A main block with a questionnaire: ``settings`` in code order, once known in the order of the conditions.
+
+    A block compares ``delays`` if it has one liquid under several delays, otherwise ``liquids``. ``labels`` name the
+    seven levels, lowest first; ``cannot_judge`` is the answer off the scale, or None.
+    """
+
+    id: str
+    title: str
+    kind: Kind
+    settings: tuple[Setting, ...]
+    items: tuple[Item, ...]
+    labels: tuple[str, ...]
+    cannot_judge: str | None
+
+    @property
+    def codes(self) -> tuple[str, ...]:
+        """The codes of the settings, in their order."""
+        return tuple(setting.code for setting in self.settings)
+
+    @property
+    def codes_as_dealt(self) -> tuple[str, ...]:
+        """The codes of the settings in the order of the codes."""
+        return tuple(sorted(self.codes, key=lambda code: (len(code), code)))
+
+    @property
+    def revealed(self) -> bool:
+        """Whether the settings' conditions are known."""
+        return all(setting.condition is not None for setting in self.settings)
+
+    def name(self, setting: Setting) -> str:
+        """Return what a figure calls a setting: its code, or its liquid and, where delays differ, its delay."""
+        if setting.liquid is None or setting.delay_ms is None:
+            return setting.code
+        liquid = setting.liquid.replace("_", " ")
+        named = liquid[:1].upper() + liquid[1:]
+        delays = {other.delay_ms for other in self.settings}
+        return f"{named}, {setting.delay_ms:g} ms" if len(delays) > 1 else named
+
+
+def settings_of(key: Key) -> dict[tuple[str, str], Setting]:
+    """Return what the opened key says of every code: (block id, code) → setting."""
+    return {
+        (block, code): Setting(code, condition, " + ".join(key.liquids(block, code)), key.delay_ms(block, code))
+        for block, codes in key.codes.items()
+        for code, condition in codes.items()
+    }
+
+
+def main_blocks(protocol: Mapping[str, Any], key: Key | None) -> tuple[Block, ...]:
+    """Read the main blocks that ask something, in the order of the session.
+
+    Parameters
+    ----------
+    protocol : mapping
+        The protocol as a receipt holds it: without conditions, blocks with their codes.
+    key : Key, optional
+        The key, once it was opened.
+    """
+    asked = [protocol["blocks"][step] for step in protocol["sequence"] if step in protocol["blocks"]]
+    return tuple(
+        _block(protocol, block, spoken(protocol), key)
+        for block in asked
+        if block["phase"] == "main" and block["questionnaire"] is not None
+    )
+
+
+def spoken(protocol: Mapping[str, Any]) -> str:
+    """Return the language of figures and tables: English where the study has it, otherwise its first."""
+    languages = list(protocol["study"]["languages"])
+    return "en" if "en" in languages else str(languages[0])
+
+
+def text_in(value: str | Mapping[str, str], language: str) -> str:
+    """Return a text of a receipt in ``language``."""
+    return value if isinstance(value, str) else value[language]
+
+
+def _block(protocol: Mapping[str, Any], block: Mapping[str, Any], language: str, key: Key | None) -> Block:
+    questionnaire = protocol["questionnaires"][block["questionnaire"]]
+    scale = protocol["scales"][questionnaire["scale"]]
+    off_scale = scale["cannot_judge"]
+    settings = tuple(Setting(code) for code in block["codes"])
+    kind: Kind = "delays" if block["code_prefix"] == DELAY_PREFIX else "liquids"
+    if key is not None:
+        settings, kind = _opened(key, block["id"], block["codes"])
+    return Block(
+        id=block["id"],
+        title=text_in(block["title"], language),
+        kind=kind,
+        settings=settings,
+        items=tuple(
+            Item(item["id"], text_in(item["text"], language), text_in(item["short"], language))
+            for item in questionnaire["items"]
+        ),
+        labels=tuple(scale["labels"][language]),
+        cannot_judge=None if off_scale is None else text_in(off_scale, language),
+    )
+
+
+def _opened(key: Key, block: str, codes: Sequence[str]) -> tuple[tuple[Setting, ...], Kind]:
+    """Return the settings by name: delays ascending, anything else in the order of the protocol's conditions."""
+    known = settings_of(key)
+    settings = [known[block, code] for code in codes]
+    delays = {setting.delay_ms for setting in settings}
+    if len(delays) > 1 and len({setting.liquid for setting in settings}) == 1:
+        return tuple(sorted(settings, key=lambda setting: setting.delay_ms or 0.0)), "delays"
+    order = list(key.tables["conditions"])
+    return tuple(sorted(settings, key=lambda setting: order.index(setting.condition))), "liquids"

@@ -1,0 +1,129 @@
+"""A figure laid out like a page: every place in points from the upper left corner, every text measured."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties
+from matplotlib.lines import Line2D
+from matplotlib.patches import FancyBboxPatch
+from matplotlib.text import Text
+from matplotlib.transforms import Affine2D
+
+from study_app.analysis import style
+
+MARGIN_PT = 4.0
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """What must not be overlooked, said beside a figure's title: words, their colour and the ground under them."""
+
+    words: str
+    ink: str
+    ground: str
+
+
+class Sheet:
+    """A figure of ``width_pt`` x ``height_pt``; each letter comes from the first of ``fonts`` that has it."""
+
+    def __init__(self, width_pt: float, height_pt: float, fonts: Sequence[str]) -> None:
+        self.width_pt = width_pt
+        self.height_pt = height_pt
+        self._fonts = list(fonts)
+        self.figure = Figure(figsize=(width_pt / 72, height_pt / 72), dpi=style.PNG_DPI, facecolor="white")
+        self._canvas = FigureCanvasAgg(self.figure)
+
+    def font(self, size: float, weight: str = "regular") -> FontProperties:
+        """Return the sheet's font at ``size`` [pt]."""
+        return FontProperties(family=self._fonts, size=size, weight=weight)
+
+    def text_width(self, words: str, size: float, weight: str = "regular") -> float:
+        """Return the advance of one line of text [pt]."""
+        renderer = self._canvas.get_renderer()  # type: ignore[no-untyped-call]  # matplotlib leaves it untyped
+        width, _, _ = renderer.get_text_width_height_descent(words, self.font(size, weight), ismath=False)
+        return float(width) * 72 / self.figure.dpi
+
+    def wrap(self, words: str, width_pt: float, size: float, weight: str = "regular") -> list[str]:
+        """Break a text into lines no wider than ``width_pt`` where its spaces allow."""
+        lines: list[str] = []
+        for word in words.split():
+            longer = f"{lines[-1]} {word}" if lines else word
+            if lines and self.text_width(longer, size, weight) <= width_pt:
+                lines[-1] = longer
+            else:
+                lines.append(word)
+        return lines or [""]
+
+    def text(
+        self,
+        x: float,
+        y: float,
+        words: str,
+        *,
+        size: float = 7,
+        weight: str = "regular",
+        colour: str = style.TEXT,
+        **place: Any,
+    ) -> Text:
+        """Write ``words`` with their baseline at ``y``; ``ha`` and ``va`` as matplotlib's."""
+        return self.figure.text(
+            x / self.width_pt,
+            1 - y / self.height_pt,
+            words,
+            fontproperties=self.font(size, weight),
+            color=colour,
+            parse_math=False,
+            **place,
+        )
+
+    def axes(self, x: float, y: float, width: float, height: float) -> Axes:
+        """Return bare axes: no frame, no ticks; ``x, y`` is their upper left corner."""
+        place = (x / self.width_pt, 1 - (y + height) / self.height_pt, width / self.width_pt, height / self.height_pt)
+        axes = self.figure.add_axes(place)
+        axes.set_facecolor("none")
+        for spine in axes.spines.values():
+            spine.set_visible(False)
+        axes.tick_params(length=0, pad=3, labelsize=6.5, labelcolor=style.TEXT_SOFT)
+        axes.set_xticks([])
+        axes.set_yticks([])
+        return axes
+
+    def box(self, x: float, y: float, width: float, height: float, colour: str, rounding: float = 1.5) -> None:
+        """Fill a rounded rectangle with its upper left corner at ``x, y``."""
+        patch = FancyBboxPatch(
+            (x + rounding, self.height_pt - y - height + rounding),
+            width - 2 * rounding,
+            height - 2 * rounding,
+            boxstyle=f"round,pad={rounding}",
+            facecolor=colour,
+            edgecolor="none",
+            transform=Affine2D().scale(1 / 72) + self.figure.dpi_scale_trans,
+        )
+        self.figure.add_artist(patch)
+
+    def line(self, xs: Sequence[float], ys: Sequence[float], **look: Any) -> None:
+        """Draw a line through points of the sheet."""
+        line = Line2D([x / self.width_pt for x in xs], [1 - y / self.height_pt for y in ys], **look)
+        line.set_transform(self.figure.transFigure)
+        self.figure.add_artist(line)
+
+    def heading(self, title: str, marks: Sequence[Mark], counts: Sequence[str]) -> None:
+        """Write the title, the marks beside it and, at the right, the first of ``counts`` that fits the line."""
+        baseline, x = 15.0, MARGIN_PT
+        self.text(x, baseline, title, size=10, weight="bold")
+        x += self.text_width(title, 10, "bold") + 8
+        for mark in marks:
+            width = self.text_width(mark.words, 7, "bold") + 11
+            self.box(x, baseline - 9.6, width, 13.2, mark.ground, rounding=4)
+            self.text(x + 5.5, baseline - 0.6, mark.words, size=7, weight="bold", colour=mark.ink)
+            x += width + 5
+        right = self.width_pt - MARGIN_PT
+        fitting = [words for words in counts if x + 10 + self.text_width(words, 7.5) <= right]
+        words = fitting[0] if fitting else counts[-1]
+        self.text(right, baseline, words, size=7.5, colour=style.TEXT_SOFT, ha="right")

@@ -1,0 +1,174 @@
+"""A study as tables: every session of a results folder, read from its tables and receipts.
+
+Everything recorded is kept; the column ``counted`` says what enters measures and figures: main trials of completed
+sessions, of a repeated trial the last attempt. Practice and baseline stay apart by their ``phase``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import pandas as pd
+
+from study_app.analysis import measures
+from study_app.analysis.questions import Block, Kind, Setting, settings_of
+from study_app.analysis.sessions import Session, read_session
+from study_app.errors import AnalysisError
+from study_app.store import blinding
+from study_app.store.layout import StudyFolder
+
+COMPLETED: Final = "completed"
+_TRIAL: Final = ["participant", "session", "trial"]
+
+
+@dataclass(frozen=True)
+class Study:
+    """All sessions of one study.
+
+    ``responses``, ``trials``, ``participants`` have the columns of ``store.columns``, the first two with
+    ``session_status`` and ``counted`` added. ``blocks`` are the main blocks that ask something; ``settings`` says what
+    every (block, code) stands for, and is empty while the key is sealed.
+    """
+
+    folder: Path
+    name: str
+    title: str
+    version: str
+    blocks: tuple[Block, ...]
+    settings: Mapping[tuple[str, str], Setting]
+    responses: pd.DataFrame
+    trials: pd.DataFrame
+    participants: pd.DataFrame
+
+    @property
+    def people(self) -> tuple[str, ...]:
+        """The participants of completed sessions, in the order of their ids."""
+        completed = self.participants["status"] == COMPLETED
+        return tuple(sorted(self.participants.loc[completed, "participant"].unique()))
+
+    @property
+    def n(self) -> int:
+        """How many participants are in the measures."""
+        return len(self.people)
+
+    @property
+    def left_out(self) -> int:
+        """How many sessions are not: they were not completed."""
+        return int((self.participants["status"] != COMPLETED).sum())
+
+    @property
+    def simulated(self) -> bool:
+        """Whether any participant was simulated."""
+        return bool(self.participants["simulated"].any())
+
+    @property
+    def pilot(self) -> bool:
+        """Whether these are pilot sessions."""
+        return bool(self.participants["pilot"].any())
+
+    @property
+    def revealed(self) -> bool:
+        """Whether the key was opened, so that settings have names."""
+        return bool(self.settings)
+
+    def blocks_of(self, kind: Kind) -> tuple[Block, ...]:
+        """Return the blocks that compare liquids, or delays."""
+        return tuple(block for block in self.blocks if block.kind == kind)
+
+    def answers(self, block: Block) -> pd.DataFrame:
+        """Return the rows of ``responses`` that count, of one block."""
+        return self.responses[self.responses["counted"] & (self.responses["block"] == block.id)]
+
+    def presented(self, block: Block) -> dict[str, int]:
+        """Return how often each setting of a block was presented in trials that count."""
+        rows = self.trials[self.trials["counted"] & (self.trials["block"] == block.id)]
+        return {code: int((rows["code"] == code).sum()) for code in block.codes}
+
+    def aggregate(self, block: Block) -> pd.DataFrame:
+        """Return the measures of a block: see ``measures.aggregate``."""
+        items = [item.id for item in block.items]
+        return measures.aggregate(self.answers(block), self.presented(block), block.codes, items)
+
+
+def load_study(folder: Path) -> Study:
+    """Read the results of a study.
+
+    Raises
+    ------
+    AnalysisError
+        The folder holds no sessions, or a file in it is missing, damaged or of another study: says which, where in it,
+        and what to do.
+    StoreError
+        The key was opened, and is now missing or changed.
+    """
+    place = StudyFolder(Path(folder))
+    sessions = place.sessions()
+    if not sessions:
+        raise AnalysisError(_no_sessions(place.path))
+    key = blinding.revealed_key(place.path)
+    records = [read_session(session, key) for session in sessions]
+    for session in records[1:]:
+        _check_alike(records[0], session)
+    responses = pd.concat([_with_status(session, session.responses) for session in records], ignore_index=True)
+    trials = pd.concat([_with_status(session, session.trials) for session in records], ignore_index=True)
+    last = pd.concat([responses, trials])[[*_TRIAL, "attempt"]].groupby(_TRIAL)["attempt"].max().rename("last_attempt")
+    return Study(
+        folder=place.path,
+        name=records[0].study,
+        title=records[0].title,
+        version=records[0].version,
+        blocks=records[0].blocks,
+        settings={} if key is None else settings_of(key),
+        responses=_with_counted(responses, last),
+        trials=_with_counted(trials, last),
+        participants=pd.DataFrame([session.facts for session in records]),
+    )
+
+
+def _no_sessions(path: Path) -> str:
+    if not path.is_dir():
+        return f"{path} is no folder: give a study's folder, such as results/rek2024"
+    inside = sorted(found.name for found in path.iterdir() if found.is_dir() and StudyFolder(found).sessions())
+    if inside:
+        return f"{path} holds no sessions itself, but studies that do ({', '.join(inside)}): give {path / inside[0]}"
+    return (
+        f"{path} holds no sessions (data/sub-…/ses-…): give a study's folder, such as results/rek2024, in which at "
+        "least one session was begun"
+    )
+
+
+def _check_alike(first: Session, other: Session) -> None:
+    """Refuse to pool what was not asked alike, or not under one key."""
+    if other.study != first.study:
+        raise AnalysisError(
+            f"{other.folder.path} is of the study {other.study!r}, {first.folder.path} of {first.study!r}: keep each "
+            "study in a folder of its own"
+        )
+    if other.facts["key_hash"] != first.facts["key_hash"]:
+        raise AnalysisError(
+            f"{other.folder.path} and {first.folder.path} ran under different sealed keys, so that one code does not "
+            "mean one thing: keep them in folders of their own"
+        )
+    if other.asked != first.asked:
+        raise AnalysisError(
+            f"{other.folder.path} (version {other.version}) was asked other statements than {first.folder.path} "
+            f"(version {first.version}): keep the versions of a study in folders of their own"
+        )
+
+
+def _with_status(session: Session, table: pd.DataFrame) -> pd.DataFrame:
+    return table.assign(session_status=pd.Series(session.facts["status"], index=table.index, dtype="string"))
+
+
+def _with_counted(table: pd.DataFrame, last: pd.Series[int]) -> pd.DataFrame:
+    """Add what counts: main trials of completed sessions, of each trial the last attempt."""
+    joined = table.join(last, on=_TRIAL)
+    counted = (
+        (joined["phase"] == "main")
+        & (joined["session_status"] == COMPLETED)
+        & (joined["attempt"] == joined["last_attempt"])
+    )
+    return table.assign(counted=counted.astype(bool))

@@ -1,0 +1,196 @@
+import csv
+import json
+from pathlib import Path
+
+import pytest
+
+from study_app.analysis.export import export
+from study_app.analysis.output import write_files
+from study_app.errors import AnalysisError
+from study_app.store.columns import RESPONSES, TRIALS, header
+from tests.analysis.conftest import CANNOT_JUDGE, DELAY_ERROR_MS, HIDDEN, Results
+
+NAMES = {
+    "study-rek2024_description-responses_data.csv",
+    "study-rek2024_description-trials_data.csv",
+    "study-rek2024_description-aggregate_data.csv",
+    "codebook.json",
+}
+
+
+def rows(to: Path, name: str, study: str = "rek2024") -> list[dict[str, str]]:
+    with (to / f"study-{study}_description-{name}_data.csv").open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file, strict=True))
+
+
+@pytest.fixture
+def to(tmp_path: Path) -> Path:
+    return tmp_path / "deep" / "out"
+
+
+def test_every_row_of_every_participant_is_there_with_its_values(rek: Results, to: Path) -> None:
+    rek.add("P001", lambda condition, item: 2 if condition == "honey" else 6)
+    rek.add("P002", lambda *_: 7, status="withdrawn", trials=4)
+    assert {path.name for path in export(rek.folder, to)} == NAMES == {path.name for path in to.iterdir()}
+    found = rows(to, "responses")
+    assert len(found) == 62 + 27
+    assert list(found[0]) == [*header(RESPONSES), "session_status", "counted"]
+    honey = rek.code("honey", "liquids")
+    for row in found:
+        expected = "7" if row["participant"] == "P002" else "2" if row["code"] == honey else "6"
+        assert row["response"] == expected
+        assert row["counted"] == ("true" if row["participant"] == "P001" else "false")
+    assert [row["session_status"] for row in found[-2:]] == ["withdrawn", "withdrawn"]
+    assert len(rows(to, "trials")) == 12 + 4
+    assert list(rows(to, "trials")[0]) == [*header(TRIALS), "session_status", "counted"]
+
+
+def test_cells_are_those_of_the_sessions_own_tables(rek: Results, to: Path) -> None:
+    rek.add(
+        "P001", lambda *_: 6, changes={"force_mean_n": 0.1 + 0.2, "notes": '=1+1, "so"\nnew line π 😀', "targets": None}
+    )
+    export(rek.folder, to)
+    with rek.trials("P001").open(encoding="utf-8", newline="") as file:
+        own = list(csv.DictReader(file, strict=True))
+    exported = rows(to, "trials")
+    assert [{name: row[name] for name in header(TRIALS)} for row in exported] == own
+    assert exported[0]["force_mean_n"] == "0.30000000000000004"
+    assert exported[0]["notes"] == '=1+1, "so"\nnew line π 😀'
+
+
+def test_the_aggregate_counts_all_levels_and_what_is_missing(small: Results, to: Path) -> None:
+    small.add("A", lambda condition, item: {"smooth": 7, "warm": None}[item])
+    small.add("B", lambda condition, item: {"smooth": CANNOT_JUDGE, "warm": 4}[item])
+    export(small.folder, to)
+    found = rows(to, "aggregate", "small")
+    assert [(row["code"], row["item"]) for row in found] == [
+        (code, item) for code in ("L1", "L2") for item in ("smooth", "warm")
+    ]
+    smooth = found[0]
+    assert [smooth[f"count_{level}"] for level in range(1, 8)] == ["0", "0", "0", "0", "0", "0", "2"]
+    assert {
+        name: smooth[name] for name in ("n", "presented", "cannot_judge", "missing", "median", "agree_percent")
+    } == {
+        "n": "2",
+        "presented": "4",
+        "cannot_judge": "2",
+        "missing": "0",
+        "median": "7.0",
+        "agree_percent": "100.0",
+    }
+    assert found[1]["missing"] == "2"
+
+
+def test_of_a_repeated_trial_both_attempts_are_exported_and_one_counted(rek: Results, to: Path) -> None:
+    rek.add("P001", lambda *_: 6, repeated={"L3": lambda *_: 1})
+    export(rek.folder, to)
+    found = [row for row in rows(to, "responses") if row["code"] == "L3" and row["item"] == "immersive"]
+    assert [(row["attempt"], row["response"], row["counted"]) for row in found] == [
+        ("1", "1", "false"),
+        ("2", "6", "true"),
+    ]
+
+
+def test_nothing_hidden_is_in_any_blinded_file(small: Results, to: Path) -> None:
+    small.add("A", lambda *_: 3)
+    for path in export(small.folder, to):
+        content = path.read_text().lower()
+        for word in HIDDEN:
+            assert word not in content, path.name
+    codebook = json.loads((to / "codebook.json").read_text())
+    assert codebook["blinded"] is True
+    assert codebook["key_opened"] == []
+
+
+def test_opened_rows_say_condition_liquid_and_delay_asked_for_and_achieved(rek: Results, to: Path) -> None:
+    rek.add("P001", lambda *_: 6)
+    rek.open()
+    export(rek.folder, to)
+    for name in ("responses", "trials"):
+        for row in rows(to, name):
+            condition = rek.key.condition(row["block"], row["code"])
+            assert row["condition"] == condition
+            requested = float(condition.removeprefix("delay_")) if condition.startswith("delay_") else 0.0
+            assert float(row["delay_ms"]) == requested
+            assert float(row["delay_achieved_ms"]) == requested + DELAY_ERROR_MS
+            assert row["liquid"] == {"honey": "honey", "light_oil": "light_oil", "practice": "syrup"}.get(
+                condition, "water"
+            )
+    aggregate = rows(to, "aggregate")
+    assert [row["condition"] for row in aggregate[::9][:3]] == ["water", "honey", "light_oil"]
+    assert [float(row["delay_ms"]) for row in aggregate[27::5]] == [0, 50, 75, 100, 125, 150, 200]
+    assert json.loads((to / "codebook.json").read_text())["key_opened"][0]["by"] == "AB"
+
+
+def test_a_delay_that_was_not_measured_is_not_claimed(rek: Results, to: Path) -> None:
+    rek.add("P001", lambda *_: 6, changes={"delay_error_mean_ms": None})
+    rek.open()
+    export(rek.folder, to)
+    assert {row["delay_achieved_ms"] for row in rows(to, "responses")} == {"n/a"}
+
+
+@pytest.mark.parametrize("opened", [False, True])
+def test_the_codebook_describes_every_column_of_every_file(rek: Results, to: Path, opened: bool) -> None:
+    rek.add("P001", lambda *_: 6)
+    if opened:
+        rek.open()
+    export(rek.folder, to)
+    codebook = json.loads((to / "codebook.json").read_text())
+    for name in ("responses", "trials", "aggregate"):
+        described = codebook["files"][f"study-rek2024_description-{name}_data.csv"]
+        assert [column["name"] for column in described] == list(rows(to, name)[0])
+        assert all(column["description"] and column["type"] for column in described)
+    liquids = codebook["blocks"][0]
+    assert liquids["items"][0]["text"] == "I think this feels like interacting with a liquid."
+    assert liquids["levels"]["7"] == "Completely agree"
+
+
+def test_the_same_results_give_the_same_bytes(rek: Results, to: Path, tmp_path: Path) -> None:
+    rek.add("P001", lambda *_: 6)
+    first = [path.read_bytes() for path in export(rek.folder, to)]
+    assert [path.read_bytes() for path in export(rek.folder, tmp_path / "again")] == first
+
+
+def test_an_export_replaces_the_one_before_it_and_leaves_other_files(rek: Results, to: Path) -> None:
+    rek.add("P001", lambda *_: 6)
+    export(rek.folder, to)
+    (to / "mine.txt").write_text("kept")
+    rek.add("P002", lambda *_: 6)
+    export(rek.folder, to)
+    assert len(rows(to, "responses")) == 124
+    assert (to / "mine.txt").read_text() == "kept"
+
+
+def test_results_without_a_completed_session_are_exported_and_count_nothing(rek: Results, to: Path) -> None:
+    rek.add("P001", lambda *_: 6, status="unfinished", trials=2)
+    export(rek.folder, to)
+    assert len(rows(to, "responses")) == 9
+    assert {row["n"] for row in rows(to, "aggregate")} == {"0"}
+    assert {row["median"] for row in rows(to, "aggregate")} == {"n/a"}
+
+
+def test_a_broken_folder_leaves_no_export(rek: Results, to: Path) -> None:
+    rek.add("P001", lambda *_: 6)
+    rek.responses("P001").write_text("x")
+    with pytest.raises(AnalysisError):
+        export(rek.folder, to)
+    assert not to.exists()
+
+
+def test_a_file_in_the_place_of_the_folder_is_refused(rek: Results, tmp_path: Path) -> None:
+    rek.add("P001", lambda *_: 6)
+    (tmp_path / "taken").write_text("x")
+    with pytest.raises(AnalysisError, match=r"taken cannot be written .*--to"):
+        export(rek.folder, tmp_path / "taken")
+    assert (tmp_path / "taken").read_text() == "x"
+
+
+def test_where_one_file_cannot_be_written_the_others_stay_as_they_were(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("old")
+    with pytest.raises(AnalysisError, match="cannot be written"):
+        write_files(tmp_path, {"a.csv": b"new", "x" * 300: b"too long a name"})
+    assert [path.name for path in tmp_path.iterdir()] == ["a.csv"]
+    assert (tmp_path / "a.csv").read_text() == "old"
+    with pytest.raises(AnalysisError):
+        write_files(tmp_path / "made", {"x" * 300: b""})
+    assert not (tmp_path / "made").exists()

@@ -1,0 +1,83 @@
+import matplotlib as mpl
+import pytest
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+
+from study_app.analysis import style
+from study_app.analysis.sheet import Sheet
+
+
+def luminance(colour: str) -> float:
+    linear = [part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in to_rgb(colour)]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+def contrast(one: str, other: str) -> float:
+    low, high = sorted((luminance(one), luminance(other)))
+    return (high + 0.05) / (low + 0.05)
+
+
+@pytest.mark.parametrize("level", range(1, 8))
+def test_counts_on_every_level_are_legible(level: int) -> None:
+    assert contrast(style.LEVEL_COLOURS[level - 1], style.LEVEL_INKS[level - 1]) >= 4.5
+
+
+@pytest.mark.parametrize(
+    ("ink", "ground"),
+    [
+        (style.TEXT, "#ffffff"),
+        (style.TEXT_SOFT, "#ffffff"),
+        (style.WARN, style.WARN_GROUND),
+        (style.SEALED, style.SEALED_GROUND),
+    ],
+)
+def test_words_are_legible(ink: str, ground: str) -> None:
+    assert contrast(ink, ground) >= 4.5
+
+
+def drawn() -> Figure:
+    sheet = Sheet(100, 40, style.PRINT_FONTS)
+    sheet.text(10, 20, "Text $kept$ as text")
+    return sheet.figure
+
+
+def test_svg_keeps_text_as_text_without_reading_it_as_mathematics() -> None:
+    assert b"Text $kept$ as text" in style.file_bytes(drawn(), "svg", "Title")
+
+
+def test_pdf_embeds_truetype() -> None:
+    content = style.file_bytes(drawn(), "pdf", "Title")
+    assert b"/CIDFontType2" in content
+    assert b"/Type3" not in content
+
+
+@pytest.mark.parametrize("kind", style.FORMATS)
+def test_no_file_tells_a_date(kind: str) -> None:
+    content = style.file_bytes(drawn(), kind, "Title").lower()
+    for word in (b"creationdate", b"moddate", b"dc:date", b"creation time"):
+        assert word not in content
+
+
+@pytest.mark.parametrize("kind", style.FORMATS)
+def test_the_users_settings_change_nothing_and_come_back(kind: str) -> None:
+    plain = style.file_bytes(drawn(), kind, "Title")
+    with mpl.rc_context({"savefig.bbox": "tight", "pdf.fonttype": 3, "svg.fonttype": "path", "path.simplify": False}):
+        assert style.file_bytes(drawn(), kind, "Title") == plain
+        assert mpl.rcParams["pdf.fonttype"] == 3
+
+
+def test_a_text_is_as_wide_as_measured() -> None:
+    sheet = Sheet(200, 40, style.PRINT_FONTS)
+    text = sheet.text(10, 20, "Strength is adequate", size=8, weight="bold")
+    width_pt = text.get_window_extent().width * 72 / style.PNG_DPI
+    assert sheet.text_width("Strength is adequate", 8, "bold") == pytest.approx(width_pt, abs=0.5)
+
+
+def test_wrapping_breaks_at_spaces_and_never_loses_a_word() -> None:
+    sheet = Sheet(200, 40, style.PRINT_FONTS)
+    words = "The strength of the force feedback is adequate"
+    lines = sheet.wrap(words, 60, 8)
+    assert " ".join(lines) == words
+    assert len(lines) > 1
+    assert all(sheet.text_width(line, 8) <= 60 for line in lines)
+    assert sheet.wrap("Incomprehensibilities", 20, 8) == ["Incomprehensibilities"]
