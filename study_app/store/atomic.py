@@ -109,7 +109,8 @@ def sync_folder(path: Path) -> None:
 def cannot_write(path: Path, error: OSError) -> StoreError:
     """Return the one-line error for ``path``: what, why, and what to do."""
     return StoreError(
-        f"{path} cannot be written ({cause(error)}): free space, mend permissions, or choose another results folder"
+        f"{path} cannot be written ({cause(error)}): free space, mend permissions, close what holds it, or choose "
+        "another results folder"
     )
 
 

@@ -25,6 +25,8 @@ from study_app.store.atomic import cannot_read, cannot_write, sync_folder, write
 
 Line: TypeAlias = dict[str, Any]
 
+_OWN = ("n", "at")
+
 
 class SessionClock:
     """Seconds since one origin on a monotonic clock; the wall clock is read once, so setting it changes nothing.
@@ -84,6 +86,7 @@ class Journal:
         """Write one line and wait for the disk; return the line as a reader will see it.
 
         ``t_s`` is when it happened, by default now. Infinite and undefined numbers become null, numpy numbers plain.
+        Fields cannot be called ``n`` or ``at``, which are the journal's own.
 
         Raises
         ------
@@ -92,6 +95,8 @@ class Journal:
         """
         if self._file.closed:
             raise StoreError(f"{self.path} is closed: {event!r} came after the session's end and was not recorded")
+        if not fields.keys().isdisjoint(_OWN):
+            raise ValueError(f"{event}: fields {_OWN} are the journal's own")
         moment = self.clock.seconds() if t_s is None else t_s
         line = {
             "n": self._lines + 1,

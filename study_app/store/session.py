@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import shutil
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -75,7 +75,7 @@ class SessionStore:
         tables are made from the journal. ``behind`` says why, and the next call tries again.
         """
         try:
-            for path, content in self._tables():
+            for path, content in table_files(self.place, self._lines):
                 if self._written.get(path) != content:
                     write_file(path, content)
                     self._written[path] = content
@@ -120,12 +120,13 @@ class SessionStore:
     ) -> None:
         self.close()
 
-    def _tables(self) -> tuple[tuple[Path, bytes], ...]:
-        study = self.place.study
-        return (
-            (self.folder.table(study, "responses"), tables.csv_bytes(RESPONSES, tables.responses(self._lines))),
-            (self.folder.table(study, "trials"), tables.csv_bytes(TRIALS, tables.trials(self._lines))),
-        )
+
+def table_files(place: Place, lines: Sequence[Line]) -> tuple[tuple[Path, bytes], ...]:
+    """Return the session's tables as files: paths and contents, from the journal's lines alone."""
+    return (
+        (place.folder.table(place.study, "responses"), tables.csv_bytes(RESPONSES, tables.responses(lines))),
+        (place.folder.table(place.study, "trials"), tables.csv_bytes(TRIALS, tables.trials(lines))),
+    )
 
 
 def begin(
@@ -185,13 +186,29 @@ def begin(
         "protocol_hash": protocol_hash(source),
         "version": study_app.__version__,
     }
-    session_receipt = {
+    started = {**facts, "device": device.get("name"), "limits": protocol.limits.model_dump(mode="json")}
+    first_receipt = {
         "format": 1,
         "status": receipt.UNFINISHED,
         "reason": "",
         "started_at": clock.at(0),
         "ended_at": None,
         **facts,
+        **_surroundings(protocol, device, screens, clock),
+    }
+    _claim(place)
+    try:
+        return _open(place, clock, key, first_receipt, started, protocol)
+    except BaseException:
+        _unclaim(place)
+        raise
+
+
+def _surroundings(
+    protocol: Protocol, device: Mapping[str, Any], screens: Mapping[str, Any], clock: SessionClock
+) -> dict[str, Any]:
+    """Return the receipt's part about what the session ran with."""
+    return {
         "generator": receipt.GENERATOR,
         "versions": receipt.versions(),
         "device": dict(device),
@@ -199,13 +216,6 @@ def begin(
         "clock": {"origin_ns": clock.origin_ns, "origin_at": clock.at(0)},
         "protocol": receipt.without_conditions(protocol),
     }
-    started = {**facts, "device": device.get("name"), "limits": protocol.limits.model_dump(mode="json")}
-    _claim(place)
-    try:
-        return _open(place, clock, key, session_receipt, started, protocol)
-    except BaseException:
-        _unclaim(place)
-        raise
 
 
 def _make_folder(path: Path) -> None:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
 from typing import Any
@@ -109,6 +110,23 @@ def start(tmp_path: Path, protocol: Protocol, clock: SessionClock) -> Callable[.
         return begin(participant=participant, **(arguments | given))
 
     return begun
+
+
+@pytest.fixture
+def files_up_to() -> Callable[[int], AbstractContextManager[None]]:
+    """Let the system refuse to write any file beyond so many bytes, as a full disk does."""
+    resource = pytest.importorskip("resource", reason="sizes of files are limited through the resource module")
+
+    @contextmanager
+    def limited(size: int) -> Iterator[None]:
+        soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+        try:
+            yield
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+    return limited
 
 
 def summary_of_trial() -> dict[str, Any]:

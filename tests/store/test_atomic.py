@@ -1,7 +1,7 @@
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 import pytest
@@ -9,18 +9,7 @@ import pytest
 from study_app.errors import StoreError
 from study_app.store.atomic import append_line, create_folder, is_there, write_file
 
-resource = pytest.importorskip("resource", reason="limits of file size are set through the resource module")
-
-
-@contextmanager
-def files_up_to(size: int) -> Iterator[None]:
-    """Let the system refuse to write any file beyond ``size`` bytes, as a full disk does."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+FullDisk = Callable[[int], AbstractContextManager[None]]
 
 
 def names_in(folder: Path) -> list[str]:
@@ -35,7 +24,9 @@ def test_a_file_is_written_and_replaced_whole(tmp_path: Path) -> None:
     assert names_in(tmp_path) == ["table.csv"]
 
 
-def test_a_write_that_fails_in_the_middle_leaves_the_old_file_and_nothing_beside(tmp_path: Path) -> None:
+def test_a_write_that_fails_in_the_middle_leaves_the_old_file_and_nothing_beside(
+    tmp_path: Path, files_up_to: FullDisk
+) -> None:
     path = tmp_path / "table.csv"
     write_file(path, b"old\n")
     with files_up_to(1000), pytest.raises(StoreError, match=r"table\.csv cannot be written \(File too large\)"):
@@ -69,7 +60,7 @@ def test_a_folder_is_created_once_with_all_its_files(tmp_path: Path) -> None:
     assert names_in(tmp_path) == ["blinding"]
 
 
-def test_a_folder_that_cannot_be_filled_is_not_created(tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_filled_is_not_created(tmp_path: Path, files_up_to: FullDisk) -> None:
     with files_up_to(1000), pytest.raises(StoreError, match="blinding cannot be written"):
         create_folder(tmp_path / "blinding", {"key": b"x" * 5000})
     assert names_in(tmp_path) == []
@@ -85,7 +76,7 @@ def test_lines_are_appended_after_a_torn_one_without_losing_either(tmp_path: Pat
     assert path.read_bytes() == b"1\ntor\n2\n3\n"
 
 
-def test_a_line_that_does_not_fit_is_taken_back(tmp_path: Path) -> None:
+def test_a_line_that_does_not_fit_is_taken_back(tmp_path: Path, files_up_to: FullDisk) -> None:
     path = tmp_path / "reveals.jsonl"
     append_line(path, b"1\n")
     with files_up_to(100), pytest.raises(StoreError, match=r"reveals\.jsonl cannot be written"):

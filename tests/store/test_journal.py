@@ -1,7 +1,11 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 import time
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
 from typing import Any
@@ -13,8 +17,6 @@ from hypothesis import strategies as st
 
 from study_app.errors import StoreError
 from study_app.store.journal import Journal, SessionClock, plain, read, scan
-
-resource = pytest.importorskip("resource", reason="limits of file size are set through the resource module")
 
 AWKWARD = 'comma, "quote",\nnew line\r\n\ttab 🌊 \u2028\x85 =SUM(A1)' + "é" * 10_000
 
@@ -124,21 +126,20 @@ def test_a_folder_that_is_not_there_is_named(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("mended", [True, False], ids=["taken back at once", "taken back before the next line"])
 def test_after_a_full_disk_it_goes_on_where_it_was(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *, mended: bool
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    files_up_to: Callable[[int], AbstractContextManager[None]],
+    *,
+    mended: bool,
 ) -> None:
     path = tmp_path / "journal.jsonl"
     journal = Journal.create(path)
     first = journal.append("choice", value=1)
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (500, hard))
-    try:
-        with monkeypatch.context() as patched:
-            if not mended:
-                patched.setattr(journal, "_take_back", _refuse)
-            with pytest.raises(StoreError, match=r"journal\.jsonl cannot be written \(File too large\)"):
-                journal.append("note", text=AWKWARD)
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    with monkeypatch.context() as patched:
+        if not mended:
+            patched.setattr(journal, "_take_back", _refuse)
+        with files_up_to(500), pytest.raises(StoreError, match=r"journal\.jsonl cannot be written \(File too large\)"):
+            journal.append("note", text=AWKWARD)
     assert read(path) == [first]
     assert (scan(path).torn_bytes == 0) == mended
     second = journal.append("choice", value=2)
@@ -156,6 +157,39 @@ def test_after_its_end_it_takes_nothing(tmp_path: Path) -> None:
     journal.close()
     with pytest.raises(StoreError, match="'note' came after the session's end"):
         journal.append("note", text="late")
+
+
+def test_a_field_cannot_take_the_place_of_a_lines_number_or_time(tmp_path: Path) -> None:
+    with Journal.create(tmp_path / "journal.jsonl") as journal:
+        for own in ("n", "at"):
+            with pytest.raises(ValueError, match="are the journal's own"):
+                journal.append("note", **{own: 1})
+    assert read(tmp_path / "journal.jsonl") == []
+
+
+KILLED = """
+import sys
+from pathlib import Path
+from study_app.store.journal import Journal
+journal = Journal.create(Path(sys.argv[1]))
+count = 0
+while True:
+    count += 1
+    journal.append("choice", value=count, text="x" * (count % 977))
+    print(count, flush=True)
+"""
+
+
+def test_what_was_acknowledged_survives_a_kill_at_any_moment(tmp_path: Path) -> None:
+    path = tmp_path / "journal.jsonl"
+    with subprocess.Popen([sys.executable, "-c", KILLED, str(path)], stdout=subprocess.PIPE, text=True) as program:
+        assert program.stdout
+        acknowledged = [int(program.stdout.readline()) for _ in range(200)]
+        program.kill()
+        acknowledged += [int(line) for line in program.stdout if line.endswith("\n")]
+    values = [line["value"] for line in read(path)]
+    assert values[: len(acknowledged)] == acknowledged
+    assert len(values) <= len(acknowledged) + 1
 
 
 def test_setting_the_wall_clock_back_moves_no_time(tmp_path: Path) -> None:

@@ -5,8 +5,8 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,9 @@ from study_app.store.session import SessionStore
 SOURCE_HASH = hashlib.sha256(b"[study]\nname = 'brackish'\n").hexdigest()
 
 
+FullDisk = Callable[[int], AbstractContextManager[None]]
+
+
 def names_in(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.iterdir())
 
@@ -29,18 +32,6 @@ def every_byte(folder: Path) -> dict[str, bytes | None]:
     """Everything under ``folder``: files with their bytes, folders with None."""
     paths = sorted(folder.rglob("*"))
     return {str(path.relative_to(folder)): path.read_bytes() if path.is_file() else None for path in paths}
-
-
-@contextmanager
-def files_up_to(size: int) -> Iterator[None]:
-    """Let the system refuse to write any file beyond ``size`` bytes, as a full disk does."""
-    resource = pytest.importorskip("resource")
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
 def test_everything_is_there_before_the_first_trial(tmp_path: Path, start: Callable[..., SessionStore]) -> None:
@@ -172,7 +163,7 @@ def test_a_read_only_results_folder_is_one_line(tmp_path: Path, start: Callable[
 
 
 def test_a_disk_that_fills_while_beginning_leaves_no_session(
-    tmp_path: Path, start: Callable[..., SessionStore]
+    tmp_path: Path, start: Callable[..., SessionStore], files_up_to: FullDisk
 ) -> None:
     start("P001").finish("complete")
     before = every_byte(tmp_path / "study")
