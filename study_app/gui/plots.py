@@ -1,0 +1,223 @@
+"""Live plots in the program's own look: pyqtgraph draws the curves, everything else about it is switched off.
+
+Horizontal grid only, few ticks, curves named at their ends and told apart by stroke as well as colour.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pyqtgraph as pg
+from numpy.typing import NDArray
+from PySide6.QtCore import QPointF, Qt
+from PySide6.QtGui import QColor, QPen
+from PySide6.QtWidgets import QFrame
+
+from study_app.gui.theme import LIGHT, Theme, font
+from study_app.gui.themed import Themed
+
+Floats = NDArray[np.float64]
+
+MINUS = "\u2212"
+THIN_SPACE = "\u2009"
+STROKE = 2.0
+NOTHING = QPen(QColor(0, 0, 0, 0))
+# Dash and gap in stroke widths: x solid, y long dashes, z dots.
+DASHES: tuple[tuple[float, float] | None, ...] = (None, (6.0, 3.0), (1.0, 1.6))
+NAMES = ("x right", "y up", "z near")
+
+
+def number(value: float) -> str:
+    """Return a tick's number with a real minus and thin groups: "−20", "10 000"."""
+    text = f"{abs(value):,.6g}".replace(",", THIN_SPACE)
+    return f"{MINUS}{text}" if value < 0 else text
+
+
+def pen(colour: str, width: float = STROKE, dash: tuple[float, float] | None = None) -> QPen:
+    """Return a cosmetic pen: its width is px whatever the plot's scale."""
+    made = QPen(QColor(colour), width)
+    made.setCosmetic(True)
+    made.setCapStyle(Qt.PenCapStyle.FlatCap)
+    made.setJoinStyle(Qt.PenJoinStyle.RoundJoin)
+    if dash is not None:
+        made.setDashPattern(list(dash))
+    return made
+
+
+class Plot(Themed, pg.PlotWidget):
+    """An empty plot: no menu, no buttons, no mouse, no frame; horizontal grid lines at the ticks of y."""
+
+    def __init__(self) -> None:
+        super().__init__(background=LIGHT.surface)
+        self.setFrameShape(QFrame.Shape.NoFrame)
+        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+        self.setMenuEnabled(False)
+        self.hideButtons()
+        self.setMouseEnabled(x=False, y=False)
+        self.getPlotItem().setContentsMargins(0, 0, 0, 0)
+        self.getViewBox().setDefaultPadding(0)
+        self._grid: list[Any] = []
+        for side in ("left", "bottom"):
+            axis = self.getAxis(side)
+            axis.setStyle(
+                tickLength=0,
+                tickFont=font("small", tabular=True),
+                tickTextOffset=10,
+                tickAlpha=0,
+                hideOverlappingLabels=False,
+            )
+            axis.setPen(NOTHING)
+            axis.setTickPen(NOTHING)
+        self.getAxis("left").setWidth(52)
+        self.getAxis("bottom").setHeight(28)
+
+    def show_ticks(self, side: str, ticks: list[tuple[float, str]]) -> None:
+        """Write ``ticks`` (place, text) at an axis; those of y also get a grid line."""
+        self.getAxis(side).setTicks([ticks])
+        if side == "left":
+            for line in self._grid:
+                self.removeItem(line)
+            self._grid = [pg.InfiniteLine(place, angle=0, pen=pen(self.theme.grid, 1)) for place, _ in ticks]
+            for line in self._grid:
+                line.setZValue(-10)
+                self.addItem(line)
+
+    def wear(self, theme: Theme) -> None:
+        """Take the colours of ``theme``."""
+        super().wear(theme)
+        self.setBackground(theme.surface)
+        for side in ("left", "bottom"):
+            self.getAxis(side).setTextPen(QColor(theme.text3))
+        for line in self._grid:
+            line.setPen(pen(theme.grid, 1))
+
+
+class TracePlot(Plot):
+    """Three curves over the last seconds, named at their newest ends.
+
+    Parameters
+    ----------
+    span_s
+        Seconds shown.
+    reach
+        Values from −reach to reach are shown; where a curve goes beyond, the plot widens.
+    """
+
+    def __init__(self, span_s: float, reach: float) -> None:
+        super().__init__()
+        self._span_s = span_s
+        self._reach = 0.0
+        self.curves = [pg.PlotCurveItem(antialias=True) for _ in NAMES]
+        self.ends = [pg.TextItem(name, anchor=(0, 0.5)) for name in NAMES]
+        for item in (*self.curves, *self.ends):
+            self.addItem(item)
+        for end in self.ends:
+            end.textItem.setFont(font("small", weight=600))
+            end.setVisible(False)
+        self.setXRange(-1.02 * span_s, 0.08 * span_s, padding=0)
+        self.show_ticks("bottom", [(-t, "0 s" if t == 0 else f"{MINUS}{t} s") for t in range(0, int(span_s) + 1, 2)])
+        self._show_reach(reach)
+        self.wear(LIGHT)
+
+    def _show_reach(self, reach: float) -> None:
+        step = next(step for step in (5, 10, 20, 25, 50, 100, 200, 500, 1000) if reach / step <= 3.01 or step == 1000)
+        rows = max(1, int(np.ceil(reach / step - 1e-9)))
+        self._reach = rows * step
+        self.setYRange(-1.08 * self._reach, 1.08 * self._reach, padding=0)
+        self.show_ticks("left", [(k * step, number(k * step)) for k in range(-rows, rows + 1)])
+
+    def show_traces(self, times_s: Floats, values: Floats) -> None:
+        """Draw ``values`` (n, 3) over ``times_s`` (n,), zero being now."""
+        if len(values) and float(np.nanmax(np.abs(values))) > 1.08 * self._reach:
+            self._show_reach(float(np.nanmax(np.abs(values))))
+        for axis, curve in enumerate(self.curves):
+            curve.setData(times_s, values[:, axis])
+        for end in self.ends:
+            end.setVisible(len(values) > 0)
+        if len(values):
+            heights = _apart(values[-1], 0.17 * self._reach)
+            for end, height in zip(self.ends, heights, strict=True):
+                end.setPos(QPointF(0.01 * self._span_s, height))
+
+    def wear(self, theme: Theme) -> None:
+        """Take the colours of ``theme``."""
+        super().wear(theme)
+        colours = (theme.trace_x, theme.trace_y, theme.trace_z)
+        for curve, end, colour, dash in zip(self.curves, self.ends, colours, DASHES, strict=True):
+            curve.setPen(pen(colour, STROKE, dash))
+            end.setColor(QColor(colour))
+
+
+class LatenessPlot(Plot):
+    """Ticks of the servo by how late they began, both axes logarithmic; 99th percentile and limit marked."""
+
+    def __init__(self, limit_us: float) -> None:
+        super().__init__()
+        self._limit = float(np.log10(limit_us))
+        self._decades = (0, 0)
+        self.bars = pg.BarGraphItem(x=[], height=[], width=0.05, y0=0.0)
+        self.p99_line = pg.PlotCurveItem()
+        self.limit_line = pg.InfiniteLine(self._limit, angle=90)
+        self.p99_name = pg.TextItem("", anchor=(0.5, 1))
+        self.limit_name = pg.TextItem(f"limit {number(limit_us)}", anchor=(1, 0))
+        for item in (self.bars, self.p99_line, self.limit_line, self.p99_name, self.limit_name):
+            self.addItem(item)
+        for name in (self.p99_name, self.limit_name):
+            name.textItem.setFont(font("small", weight=600, tabular=True))
+        self._show_decades(max(3, int(np.ceil(self._limit + 0.1))), 4)
+        self.wear(LIGHT)
+
+    def _show_decades(self, across: int, up: int) -> None:
+        if (across, up) == self._decades:
+            return
+        self._decades = (across, up)
+        self.setXRange(-0.02 * across, 1.08 * across, padding=0)
+        self.setYRange(-0.3, up + 0.55, padding=0)
+        self.show_ticks("bottom", [(k, number(10.0**k)) for k in range(across + 1)])
+        self.show_ticks("left", [(k, number(10.0**k)) for k in range(up + 1)])
+        self.limit_name.setPos(self._limit - 0.01 * across, up + 0.55)
+
+    def show_histogram(self, edges_us: Floats, counts: NDArray[np.int64], p99_us: float | None) -> None:
+        """Draw ``counts`` (bins,) between ``edges_us`` (bins + 1,) and the 99th percentile [µs]."""
+        edges = np.log10(edges_us)
+        filled = counts > 0
+        up = max(4, int(np.ceil(np.log10(max(1, counts.max(initial=0))))))
+        self._show_decades(max(int(np.ceil(edges[-1] - 1e-9)), int(np.ceil(self._limit + 0.1))), up)
+        heights = np.log10(np.maximum(counts[filled], 1)) + 0.3
+        width = (edges[1] - edges[0]) * 0.72
+        self.bars.setOpts(x=(edges[:-1] + edges[1:])[filled] / 2, height=heights, width=width, y0=-0.3)
+        self.p99_name.setVisible(p99_us is not None)
+        self.p99_line.setVisible(p99_us is not None)
+        if p99_us is not None:
+            at = float(np.log10(max(p99_us, 1.0)))
+            near = counts[np.abs((edges[:-1] + edges[1:]) / 2 - at) < 0.12]
+            top = min(up, float(np.log10(max(1, near.max(initial=1)))) + 0.9)
+            self.p99_line.setData([at, at], [-0.3, top])
+            self.p99_name.setPos(at, top)
+            self.p99_name.setText(f"p99 {number(round(p99_us))}")
+
+    def wear(self, theme: Theme) -> None:
+        """Take the colours of ``theme``."""
+        super().wear(theme)
+        self.bars.setOpts(brush=QColor(theme.accent), pen=QPen(Qt.PenStyle.NoPen))
+        self.p99_line.setPen(pen(theme.text, 1.4))
+        self.p99_name.setColor(QColor(theme.text))
+        self.limit_line.setPen(pen(theme.bad, 1.4, (4.0, 3.0)))
+        self.limit_name.setColor(QColor(theme.bad))
+
+
+def _apart(places: Floats, least: float) -> list[float]:
+    """Return ``places`` moved as little as their order allows so that names there do not touch."""
+    order = np.argsort(places)
+    moved = places[order].astype(float)
+    for _ in range(8):
+        for i in range(len(moved) - 1):
+            lack = least - (moved[i + 1] - moved[i])
+            if lack > 0:
+                moved[i] -= lack / 2
+                moved[i + 1] += lack / 2
+    back = np.empty_like(moved)
+    back[order] = moved
+    return [float(place) for place in back]
