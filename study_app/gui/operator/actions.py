@@ -1,0 +1,163 @@
+"""What the operator can do with the session: pause, repeat a trial for a reason, end; and the two questions."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QButtonGroup, QDialog, QHBoxLayout, QLineEdit, QVBoxLayout, QWidget
+
+from study_app.gui.cards import Card
+from study_app.gui.controls import ActionButton, Radio
+from study_app.gui.labels import label
+from study_app.gui.operator.view import OperatorView
+from study_app.gui.theme import Theme, font
+from study_app.gui.themed import wear
+
+
+class Actions(Card):
+    """The bar of buttons at the bottom."""
+
+    pause_asked = Signal()
+    resume_asked = Signal()
+    repeat_asked = Signal()
+    end_asked = Signal()
+    close_asked = Signal()
+
+    def __init__(self) -> None:
+        super().__init__(padding=14)
+        self.pause = ActionButton("pause", "Pause", key="P")
+        self.repeat = ActionButton("repeat", "Repeat trial …", key="R")
+        self.hint = label("", "label", "text2", wraps=True)
+        self.hint.setFont(font("label", weight=400))
+        self.end = ActionButton("cross", "End session …", role="danger")
+        self.close_session = ActionButton("check", "Close session", role="primary")
+        self._resumes = False
+        row = QHBoxLayout()
+        row.setSpacing(14)
+        row.addWidget(self.pause)
+        row.addWidget(self.repeat)
+        row.addSpacing(6)
+        row.addWidget(self.hint, 1)
+        row.addWidget(self.end)
+        row.addWidget(self.close_session)
+        self.close_session.hide()
+        self.column.addLayout(row)
+        self.pause.clicked.connect(self._pause_or_resume)
+        self.repeat.clicked.connect(self.repeat_asked)
+        self.end.clicked.connect(self.end_asked)
+        self.close_session.clicked.connect(self.close_asked)
+
+    def show_view(self, view: OperatorView) -> None:
+        """Offer what is possible now and say what it does."""
+        self._resumes = view.may_resume
+        self.pause.show_action(*(("play", "Resume") if self._resumes else ("pause", "Pause")))
+        self.pause.setEnabled(view.may_pause or view.may_resume)
+        self.repeat.setEnabled(view.may_repeat)
+        for button in (self.pause, self.repeat, self.end):
+            button.setVisible(not view.over)
+        self.close_session.setVisible(view.over)
+        self.hint.setText(_hint(view))
+
+    def _pause_or_resume(self) -> None:
+        (self.resume_asked if self._resumes else self.pause_asked).emit()
+
+
+def _hint(view: OperatorView) -> str:
+    if view.over:
+        return "The journal is closed and the tables are written."
+    if view.state == "trouble":
+        return "The force is off. Everything answered before is on disk."
+    if view.state == "force off":
+        return "The force comes back only when you ask for it."
+    if view.state == "paused":
+        return "A trial that was under way starts again."
+    return "Repeating asks for a reason and keeps both recordings." if view.may_repeat else ""
+
+
+class Question(QDialog):
+    """A question with a way back; the window behind goes on living while it is open."""
+
+    def __init__(self, parent: QWidget, theme: Theme, title: str, explanation: str) -> None:
+        super().__init__(parent)
+        self.setWindowTitle(title)
+        self.setModal(True)
+        self.column = QVBoxLayout(self)
+        self.column.setContentsMargins(28, 24, 28, 24)
+        self.column.setSpacing(12)
+        self.column.addWidget(label(title, "title_dense"))
+        said = label(explanation, "body", "text2", wraps=True)
+        said.setMinimumWidth(420)
+        self.column.addWidget(said)
+        self._theme = theme
+
+    def add_buttons(self, back: str, go_on: ActionButton) -> None:
+        """Put the way back at the left and the step that goes on at the right."""
+        self.back = ActionButton("", back)
+        self.go_on = go_on
+        self.back.clicked.connect(self.reject)
+        self.go_on.clicked.connect(self.accept)
+        self.back.setAutoDefault(False)
+        self.go_on.setDefault(True)
+        row = QHBoxLayout()
+        row.addWidget(self.back)
+        row.addStretch()
+        row.addWidget(self.go_on)
+        self.column.addSpacing(8)
+        self.column.addLayout(row)
+        wear(self, self._theme)
+
+
+class RepeatQuestion(Question):
+    """Why the trial is to come again."""
+
+    def __init__(self, parent: QWidget, theme: Theme, setting: str) -> None:
+        super().__init__(
+            parent,
+            theme,
+            "Repeat this trial?",
+            f"{setting} starts again from its beginning. What was recorded stays, with your reason beside it.",
+        )
+        self.reason = QLineEdit()
+        self.reason.setFont(font("body"))
+        self.reason.setPlaceholderText("Reason, such as: phone rang")
+        self.reason.setAccessibleName("Reason")
+        self.column.addWidget(self.reason)
+        self.add_buttons("Go on as it is", ActionButton("repeat", "Repeat trial", role="primary"))
+        self.go_on.setEnabled(False)
+        self.reason.textChanged.connect(lambda text: self.go_on.setEnabled(bool(text.strip())))
+
+
+class EndQuestion(Question):
+    """Whether, and why, the session ends now."""
+
+    STATUSES = (
+        ("withdrawn", "The participant withdraws"),
+        ("aborted", "I end it for another reason"),
+    )
+
+    def __init__(self, parent: QWidget, theme: Theme, answers: str) -> None:
+        super().__init__(
+            parent,
+            theme,
+            "End this session now?",
+            f"{answers} answers are on disk and stay there. The force is switched off when the session ends.",
+        )
+        self._choices = QButtonGroup(self)
+        for index, (_, words) in enumerate(self.STATUSES):
+            choice = Radio(words)
+            choice.setFont(font("body"))
+            self._choices.addButton(choice, index)
+            self.column.addWidget(choice)
+        self._choices.button(1).setChecked(True)
+        self.reason = QLineEdit()
+        self.reason.setFont(font("body"))
+        self.reason.setPlaceholderText("Reason (may stay empty)")
+        self.reason.setAccessibleName("Reason")
+        self.column.addWidget(self.reason)
+        self.add_buttons("Go on with the session", ActionButton("cross", "End session", role="danger"))
+        self.go_on.setDefault(False)
+        self.back.setDefault(True)
+
+    @property
+    def status(self) -> str:
+        """Return "withdrawn" or "aborted"."""
+        return self.STATUSES[self._choices.checkedId()][0]

@@ -1,0 +1,46 @@
+"""What went wrong and what to do, above everything else in the middle; away while all is well."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QRectF, Qt
+from PySide6.QtGui import QColor, QPainter, QPaintEvent
+from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+
+from study_app.gui.cards import Icon
+from study_app.gui.labels import label
+from study_app.gui.theme import RADIUS_CARD
+from study_app.gui.themed import Themed
+
+WHAT_TO_DO = "The force is off and every answer so far is on disk. End the session, mend the cause, then begin anew."
+
+
+class Banner(Themed, QWidget):
+    """A tinted strip with a sign, what happened and what to do."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.what = label("", "strong", "bad", wraps=True)
+        words = QVBoxLayout()
+        words.setSpacing(4)
+        words.addWidget(self.what)
+        words.addWidget(label(WHAT_TO_DO, "label", "text", wraps=True))
+        row = QHBoxLayout(self)
+        row.setContentsMargins(20, 14, 20, 14)
+        row.setSpacing(14)
+        row.addWidget(Icon("warning", "bad", 24), 0, Qt.AlignmentFlag.AlignTop)
+        row.addLayout(words, 1)
+        self.hide()
+
+    def show_trouble(self, what: str) -> None:
+        """Say ``what`` happened; nothing hides the strip."""
+        if what != self.what.text():
+            self.what.setText(what[:1].upper() + what[1:])
+        self.setVisible(bool(what))
+
+    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+        """Paint the tint."""
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QColor(self.theme.bad_bg))
+        painter.drawRoundedRect(QRectF(self.rect()), RADIUS_CARD, RADIUS_CARD)

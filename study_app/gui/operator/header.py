@@ -1,0 +1,115 @@
+"""The head of the operator's window: which session, in which state, how long already."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QRectF, Qt, Signal
+from PySide6.QtGui import QColor, QPainter, QPaintEvent
+from PySide6.QtWidgets import QHBoxLayout, QPushButton, QVBoxLayout, QWidget
+
+from study_app.gui.cards import Bar, Chip, Logo, Tone
+from study_app.gui.icons import draw_icon
+from study_app.gui.labels import figures, label
+from study_app.gui.operator.view import OperatorView, State, minutes
+from study_app.gui.themed import Themed
+
+STATES: dict[State, tuple[Tone, str]] = {
+    "preparing": ("neutral", "clock"),
+    "running": ("accent", "play"),
+    "paused": ("warn", "pause"),
+    "force off": ("warn", "stop"),
+    "trouble": ("bad", "warning"),
+    "ended": ("ok", "check"),
+}
+SAVED_RECENTLY_S = 2.0
+
+
+class ThemeButton(Themed, QPushButton):
+    """Changes between light and dark; a moon in light, a sun in dark."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setFixedSize(40, 40)
+        self.setProperty("role", "plain")
+        self.setToolTip("Light or dark")
+        self.setAccessibleName("Change between light and dark theme")
+
+    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+        """Paint the button and the sign of the other theme."""
+        super().paintEvent(event)
+        name = "sun" if self.theme.dark else "moon"
+        draw_icon(QPainter(self), name, QRectF(10, 10, 20, 20), self.theme.text2)
+
+
+class Header(Themed, QWidget):
+    """The strip at the top; ``theme_asked`` when the operator wants the other theme."""
+
+    theme_asked = Signal()
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setFixedHeight(64)
+        self.study = label("", "card")
+        self.who = figures("", "label", "text2")
+        self.state = Chip("neutral", "clock", "Preparing")
+        self.blind = Chip("neutral", "lock", "Double-blind")
+        self.saved = Chip("neutral", "ring", "Nothing to save yet")
+        self.clock = figures("0:00", "card")
+        self.clock.setAlignment(Qt.AlignmentFlag.AlignRight)
+        self.expected = figures("", "small", "text2")
+        self.expected.setAlignment(Qt.AlignmentFlag.AlignRight)
+        self.bar = Bar()
+        self.bar.setFixedWidth(120)
+        self.percent = figures("", "small", "text2")
+        self.theme_button = ThemeButton()
+        self.theme_button.clicked.connect(self.theme_asked)
+        self._lay_out()
+
+    def _lay_out(self) -> None:
+        row = QHBoxLayout(self)
+        row.setContentsMargins(24, 8, 24, 8)
+        row.setSpacing(12)
+        row.addWidget(Logo())
+        row.addLayout(_column(self.study, self.who))
+        row.addSpacing(28)
+        for chip in (self.state, self.blind, self.saved):
+            row.addWidget(chip)
+        row.addStretch()
+        row.addLayout(_column(self.clock, self.expected))
+        row.addLayout(_column(self.bar, self.percent))
+        row.addSpacing(8)
+        row.addWidget(self.theme_button)
+
+    def show_view(self, view: OperatorView) -> None:
+        """Show the session's head."""
+        self.study.setText(view.study)
+        self.who.setText(view.who)
+        tone, icon = STATES[view.state]
+        if view.state == "ended" and view.state_word != "Complete":
+            tone, icon = "neutral", "cross"
+        self.state.show_state(tone, icon, view.state_word)
+        if view.saved_ago_s is None:
+            self.saved.show_state("neutral", "ring", "Nothing to save yet")
+        elif view.over or view.saved_ago_s > SAVED_RECENTLY_S:
+            self.saved.show_state("ok", "check", "All saved to disk")
+        else:
+            self.saved.show_state("ok", "check", "Saved to disk now")
+        self.clock.setText(minutes(view.elapsed_s))
+        self.expected.setText(f"of about {max(1, round(view.expected_s / 60))} min")
+        self.bar.show_share(view.share)
+        self.percent.setText(f"{view.share:.0%}".replace("%", " %"))
+
+    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+        """Paint the strip and the hairline under it."""
+        painter = QPainter(self)
+        painter.fillRect(self.rect(), QColor(self.theme.surface))
+        painter.fillRect(0, self.height() - 1, self.width(), 1, QColor(self.theme.border))
+
+
+def _column(*widgets: QWidget) -> QVBoxLayout:
+    column = QVBoxLayout()
+    column.setSpacing(2)
+    column.addStretch()
+    for widget in widgets:
+        column.addWidget(widget)
+    column.addStretch()
+    return column

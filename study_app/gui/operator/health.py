@@ -1,0 +1,142 @@
+"""Is the session healthy: ticks, lateness, screen frames and the hand's recent path, kept in rings. No Qt here."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+LATENESS_WINDOW_S = 60
+RATE_WINDOW_TICKS = 2000
+TRACE_WINDOW_S = 10.0
+TRACE_STEP_S = 0.02
+BINS_PER_DECADE = 14
+LOWEST_US, LEAST_HIGHEST_US = 1.0, 1000.0
+
+
+@dataclass(frozen=True, slots=True)
+class Vitals:
+    """Figures of the tiles; a rate or percentile is None while too little has been measured."""
+
+    rate_hz: float | None = None
+    lateness_p99_s: float | None = None
+    overruns: int = 0
+    ticks: int = 0
+    frames: int = 0
+    frames_late: int = 0
+    frame_rate_hz: float | None = None
+
+
+class ServoHealth:
+    """Takes telemetry and painted frames as they come; gives figures, a histogram and traces when asked.
+
+    ``overruns`` is the servo's own count, set by whoever asks it.
+
+    Parameters
+    ----------
+    rate_hz
+        Ticks a second that the servo was asked for.
+    refresh_hz
+        Frames a second that the participant's screen says it shows.
+    """
+
+    def __init__(self, rate_hz: float, refresh_hz: float = 60.0) -> None:
+        self.rate_hz = rate_hz
+        self.refresh_hz = refresh_hz
+        self._lateness_ns = np.zeros(int(LATENESS_WINDOW_S * rate_hz), np.int64)
+        self._latenesses = 0
+        self._recent = np.zeros((RATE_WINDOW_TICKS, 2), np.int64)  # tick, time [ns]
+        self._ticks = 0
+        self.overruns = 0
+        self._frame_gaps_ns = np.zeros(240, np.int64)
+        self._last_frame_ns = 0
+        self._frames = 0
+        self._frames_late = 0
+        rows = round(TRACE_WINDOW_S / TRACE_STEP_S) + 2
+        self._path = np.full((rows, 4), np.nan)  # t [s], x, y, z [m]
+        self._path_rows = 0
+
+    def take(self, samples: Any) -> None:
+        """Take new telemetry samples, in order (a recarray of ``layout.SAMPLE``)."""
+        count = len(samples)
+        if count == 0:
+            return
+        _into_ring(self._lateness_ns, self._latenesses, np.asarray(samples.lateness_ns))
+        _into_ring(self._recent, self._ticks, np.column_stack((samples.tick, samples.time_ns)))
+        self._latenesses += count
+        self._ticks += count
+
+    def hand(self, at_s: float, position_m: Any) -> None:
+        """Take where the hand is [m, hand frame]; more often than a trace can show is ignored."""
+        if self._path_rows and at_s < self._path[(self._path_rows - 1) % len(self._path), 0] + TRACE_STEP_S:
+            return
+        self._path[self._path_rows % len(self._path)] = (at_s, *position_m)
+        self._path_rows += 1
+
+    def frame(self, painted_ns: int) -> None:
+        """Take the time at which a frame of the tank was painted; a gap over 1.5 refreshes is a late frame."""
+        if self._last_frame_ns:
+            gap = painted_ns - self._last_frame_ns
+            self._frame_gaps_ns[self._frames % len(self._frame_gaps_ns)] = gap
+            self._frames += 1
+            self._frames_late += gap > 1.5e9 / self.refresh_hz
+        self._last_frame_ns = painted_ns
+
+    def frames_rest(self) -> None:
+        """Say that the tank is not shown now, so that the gap until it is shown again is no late frame."""
+        self._last_frame_ns = 0
+
+    def vitals(self) -> Vitals:
+        """Return the figures as of now."""
+        gaps = self._frame_gaps_ns[: min(self._frames, len(self._frame_gaps_ns))]
+        return Vitals(
+            rate_hz=self._rate(),
+            lateness_p99_s=float(np.percentile(self._kept(), 99)) * 1e-9 if self._latenesses else None,
+            overruns=self.overruns,
+            ticks=self._ticks,
+            frames=self._frames,
+            frames_late=self._frames_late,
+            frame_rate_hz=1e9 / float(np.median(gaps)) if len(gaps) else None,
+        )
+
+    def lateness_histogram(self) -> tuple[Floats, NDArray[np.int64]]:
+        """Return bin edges [µs] (bins + 1,), even in their logarithm, and ticks per bin (bins,) of the last minute."""
+        micros = np.clip(self._kept() * 1e-3, LOWEST_US, None)
+        highest = max(LEAST_HIGHEST_US, float(micros.max(initial=0.0)))
+        decades = int(np.ceil(np.log10(highest / LOWEST_US) - 1e-9))
+        edges = np.logspace(np.log10(LOWEST_US), decades, decades * BINS_PER_DECADE + 1)
+        counts, _ = np.histogram(np.log10(micros), np.log10(edges))
+        return edges, counts
+
+    def trace(self, now_s: float) -> tuple[Floats, Floats]:
+        """Return times before now [s] (n,), oldest first, and positions [m] (n, 3) of the last ten seconds."""
+        kept = min(self._path_rows, len(self._path))
+        path = np.roll(self._path, -(self._path_rows % len(self._path)), axis=0)[len(self._path) - kept :]
+        path = path[path[:, 0] >= now_s - TRACE_WINDOW_S]
+        return path[:, 0] - now_s, path[:, 1:]
+
+    def _kept(self) -> NDArray[np.int64]:
+        return self._lateness_ns[: min(self._latenesses, len(self._lateness_ns))]
+
+    def _rate(self) -> float | None:
+        kept = min(self._ticks, len(self._recent))
+        if kept < 2:
+            return None
+        newest = self._recent[(self._ticks - 1) % len(self._recent)]
+        oldest = self._recent[(self._ticks - kept) % len(self._recent)]
+        ticks, time_ns = newest - oldest
+        return float(ticks) * 1e9 / float(time_ns) if time_ns > 0 else None
+
+
+def _into_ring(ring: NDArray[Any], written: int, rows: NDArray[Any]) -> None:
+    """Write ``rows`` after ``written`` earlier ones into ``ring``, over the oldest."""
+    skipped = max(0, len(rows) - len(ring))
+    rows = rows[skipped:]
+    start = (written + skipped) % len(ring)
+    first = min(len(rows), len(ring) - start)
+    ring[start : start + first] = rows[:first]
+    ring[: len(rows) - first] = rows[first:]

@@ -1,0 +1,156 @@
+"""Device card, and the operator's notes and marks, which go into the journal with their time."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QPlainTextEdit, QVBoxLayout, QWidget
+
+from study_app.gui.cards import Card, Chip, Icon
+from study_app.gui.controls import ActionButton
+from study_app.gui.labels import Elided, figures, label
+from study_app.gui.operator.view import NOTES_SHOWN, DeviceView, OperatorView, minutes
+from study_app.gui.theme import font
+
+ICONS = {"falcon": "device", "mouse": "mouse", "simulated": "fast_forward"}
+
+
+class DeviceCard(Card):
+    """What the participant feels with, and whether it answers."""
+
+    def __init__(self) -> None:
+        super().__init__(padding=16, gap=10)
+        self.icon = Icon("device", "text2", 22)
+        self.name = label("", "card")
+        self.chip = Chip("neutral", "ring", "Waiting", small=True)
+        row = QHBoxLayout()
+        row.setSpacing(10)
+        row.addWidget(self.icon)
+        row.addWidget(self.name)
+        row.addStretch()
+        row.addWidget(self.chip)
+        self.column.addLayout(row)
+        self._grid = QGridLayout()
+        self._grid.setVerticalSpacing(8)
+        self.column.addLayout(self._grid)
+        self.rows: list[tuple[Elided, QLabel]] = []
+
+    def show_device(self, device: DeviceView) -> None:
+        """Show the device's name, state and rows."""
+        self.icon.show_icon(ICONS[device.kind], "text2")
+        self.name.setText(device.name)
+        self.chip.show_state(*(("ok", "check", "Ready") if device.ready else ("bad", "warning", "Fault")))
+        while len(self.rows) < len(device.rows):
+            name, value = Elided("label", "text2"), figures("", "label")
+            value.setFont(font("label", weight=600, tabular=True))
+            value.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+            self._grid.addWidget(name, len(self.rows), 0)
+            self._grid.addWidget(value, len(self.rows), 1)
+            self.rows.append((name, value))
+        for (name, value), (word, said) in zip(self.rows, device.rows, strict=True):
+            name.show_text(word)
+            value.setText(said)
+
+
+class NoteField(QPlainTextEdit):
+    """Where a note is written; Enter keeps it, Shift+Enter begins a line."""
+
+    entered = Signal()
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setPlaceholderText("Write a note …")
+        self.setAccessibleName("Note")
+        self.setFont(font("label", weight=400))
+        self.setTabChangesFocus(True)
+        self.setMinimumHeight(52)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
+        """Keep the note on Enter; leave Esc to the window."""
+        plain = not event.modifiers() & Qt.KeyboardModifier.ShiftModifier
+        if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and plain:
+            self.entered.emit()
+        elif event.key() == Qt.Key.Key_Escape:
+            self.clearFocus()
+            event.ignore()
+        else:
+            super().keyPressEvent(event)
+
+
+class NotesCard(Card):
+    """The last notes and marks, a field for the next, and two buttons."""
+
+    note_written = Signal(str)
+    mark_set = Signal()
+
+    def __init__(self) -> None:
+        super().__init__("Notes and marks", label("kept in the journal", "small", "text2"), padding=16, gap=10)
+        self.lines = [_NoteRow() for _ in range(NOTES_SHOWN)]
+        self.none = label("Nothing noted yet.", "label", "text2")
+        self._list = QWidget()
+        rows = QVBoxLayout(self._list)
+        rows.setContentsMargins(0, 0, 0, 0)
+        rows.setSpacing(6)
+        for widget in (self.none, *self.lines):
+            rows.addWidget(widget)
+        rows.addStretch()
+        self.field = NoteField()
+        self.add = ActionButton("pen", "Add note", key="N")
+        self.mark = ActionButton("flag", "Mark", key="M")
+        self.column.addWidget(self._list)
+        self.column.addWidget(self.field, 1)
+        self.column.addWidget(label("Enter keeps it with the time", "small", "text3"))
+        buttons = QHBoxLayout()
+        buttons.setSpacing(12)
+        buttons.addWidget(self.add, 1)
+        buttons.addWidget(self.mark, 1)
+        self.column.addLayout(buttons)
+        self.field.entered.connect(self._keep)
+        self.add.clicked.connect(self._add)
+        self.mark.clicked.connect(self.mark_set)
+
+    def show_view(self, view: OperatorView) -> None:
+        """Show the newest notes, newest first."""
+        self.none.setVisible(not view.notes)
+        for index, row in enumerate(self.lines):
+            row.setVisible(index < len(view.notes))
+            if index < len(view.notes):
+                row.show_note(view.notes[index].kind, minutes(view.notes[index].at_s), view.notes[index].text)
+        for button in (self.add, self.mark):
+            button.setEnabled(not view.over)
+        self.field.setEnabled(not view.over)
+
+    def _add(self) -> None:
+        if self.field.toPlainText().strip():
+            self._keep()
+        else:
+            self.field.setFocus(Qt.FocusReason.ShortcutFocusReason)
+
+    def _keep(self) -> None:
+        text = self.field.toPlainText().strip()
+        if text:
+            self.field.clear()
+            self.note_written.emit(text)
+
+
+class _NoteRow(QWidget):
+    """One line: sign, time, text; a long text ends in "…" and is whole in the tip."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.sign = Icon("pen", "text2", 16)
+        self.time = figures("", "label", "text2")
+        self.text = Elided("label")
+        self.text.setFont(font("label", weight=400))
+        row = QHBoxLayout(self)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(8)
+        row.addWidget(self.sign)
+        row.addWidget(self.time)
+        row.addWidget(self.text, 1)
+
+    def show_note(self, kind: str, at: str, text: str) -> None:
+        """Show a note or mark."""
+        self.sign.show_icon(*(("flag", "warn") if kind == "mark" else ("pen", "text2")))
+        self.time.setText(at)
+        self.text.show_text(" ".join(text.split()) or "Mark")

@@ -1,0 +1,202 @@
+"""How far a session has come, told by its journal: the operator sees what is on disk, never more.
+
+``SessionProgress`` is folded over the journal's events in the order in which they were written. No Qt here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from study_app.protocol.model import Protocol
+from study_app.protocol.schedule import PageStep, Schedule, Trial
+
+# A block of more trials than this is one row of the rail ("Delay settings 1 to 7"), so that a day's study fits it.
+ROWS_PER_BLOCK = 4
+
+
+@dataclass(frozen=True, slots=True)
+class NoteLine:
+    """A note or mark as the operator wrote it, ``at_s`` on the session's clock."""
+
+    at_s: float
+    kind: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class SessionProgress:
+    """What the journal of a session of ``protocol`` says so far.
+
+    ``step`` indexes the schedule's steps (−1 before the first); ``durations_s`` holds the steps left behind;
+    ``answers`` counts the answered items of each trial, ``trials_done`` says of each trial whether it kept the
+    protocol's limits.
+    """
+
+    protocol: Protocol
+    schedule: Schedule
+    step: int = -1
+    step_since_s: float = 0.0
+    durations_s: Mapping[int, float] = field(default_factory=dict)
+    trial_since_s: float | None = None
+    trial_lasted_s: float | None = None
+    trials_done: Mapping[int, bool] = field(default_factory=dict)
+    answers: Mapping[int, int] = field(default_factory=dict)
+    notes: tuple[NoteLine, ...] = ()
+    repeats: int = 0
+    paused: bool = False
+    force_off: bool = False
+    broke: str = ""
+    ended: str = ""
+    ended_s: float = 0.0
+    saved_s: float | None = None
+
+    @property
+    def trial(self) -> Trial | None:
+        """The trial under way or being answered; None on a page of text and before the first step."""
+        if self.step < 0:
+            return None
+        step = self.schedule.steps[self.step]
+        return step if isinstance(step, Trial) else None
+
+    @property
+    def marks(self) -> int:
+        """How many marks were set."""
+        return sum(note.kind == "mark" for note in self.notes)
+
+    @property
+    def trials_within_limits(self) -> int:
+        """How many finished trials kept the protocol's limits of lateness, gap and delay error."""
+        return sum(self.trials_done.values())
+
+    def after(self, event: str, at_s: float, fields: Mapping[str, Any]) -> SessionProgress:
+        """Return the progress once ``event`` is on disk; events that say nothing about progress only count as saved."""
+        told = _TELLERS.get(event)
+        progress = told(self, at_s, fields) if told else self
+        return replace(progress, saved_s=at_s)
+
+
+def _enter(progress: SessionProgress, at_s: float, step: int) -> SessionProgress:
+    if step == progress.step:
+        return progress
+    durations = dict(progress.durations_s)
+    if progress.step >= 0:
+        durations[progress.step] = at_s - progress.step_since_s
+    return replace(progress, step=step, step_since_s=at_s, durations_s=durations)
+
+
+def _page_shown(progress: SessionProgress, at_s: float, fields: Mapping[str, Any]) -> SessionProgress:
+    for index in range(max(progress.step, 0), len(progress.schedule.steps)):
+        step = progress.schedule.steps[index]
+        if isinstance(step, PageStep) and step.page_id == fields["page"]:
+            return replace(_enter(progress, at_s, index), trial_since_s=None, trial_lasted_s=None)
+    return progress
+
+
+def _trial_started(progress: SessionProgress, at_s: float, fields: Mapping[str, Any]) -> SessionProgress:
+    steps = progress.schedule.steps
+    index = next(i for i, step in enumerate(steps) if isinstance(step, Trial) and step.number == fields["trial"])
+    return replace(_enter(progress, at_s, index), trial_since_s=at_s, trial_lasted_s=None, paused=False)
+
+
+def _trial_ended(progress: SessionProgress, at_s: float, fields: Mapping[str, Any]) -> SessionProgress:
+    lasted = at_s - progress.trial_since_s if progress.trial_since_s is not None else None
+    progress = replace(progress, trial_lasted_s=lasted)
+    if fields["outcome"] not in {"complete", "timeout"}:
+        return progress
+    limits = progress.protocol.limits
+    within = all(
+        fields.get(name) is None or fields[name] <= limit
+        for name, limit in (
+            ("lateness_p99_ms", limits.lateness_ms),
+            ("worst_gap_ms", limits.worst_gap_ms),
+            ("delay_error_p95_ms", limits.delay_error_ms),
+        )
+    )
+    return replace(progress, trials_done={**progress.trials_done, fields["trial"]: within})
+
+
+def _responses(progress: SessionProgress, _at_s: float, fields: Mapping[str, Any]) -> SessionProgress:
+    return replace(progress, answers={**progress.answers, fields["trial"]: len(fields["items"])})
+
+
+def _note(progress: SessionProgress, at_s: float, fields: Mapping[str, Any]) -> SessionProgress:
+    return replace(progress, notes=(*progress.notes, NoteLine(at_s, fields["kind"], fields["text"])))
+
+
+def _repeat(progress: SessionProgress, _at_s: float, fields: Mapping[str, Any]) -> SessionProgress:
+    return replace(
+        progress,
+        repeats=progress.repeats + 1,
+        answers={trial: count for trial, count in progress.answers.items() if trial != fields["trial"]},
+        trials_done={trial: within for trial, within in progress.trials_done.items() if trial != fields["trial"]},
+    )
+
+
+def _ended(progress: SessionProgress, at_s: float, fields: Mapping[str, Any]) -> SessionProgress:
+    durations = dict(progress.durations_s)
+    if progress.step >= 0:
+        durations[progress.step] = at_s - progress.step_since_s
+    return replace(progress, ended=fields["status"], ended_s=at_s, paused=False, durations_s=durations)
+
+
+_TELLERS = {
+    "page_shown": _page_shown,
+    "trial_started": _trial_started,
+    "trial_ended": _trial_ended,
+    "responses": _responses,
+    "paused": lambda progress, _at_s, _fields: replace(progress, paused=True),
+    "resumed": lambda progress, _at_s, _fields: replace(progress, paused=False),
+    "force_stopped": lambda progress, _at_s, _fields: replace(progress, force_off=True),
+    "force_restored": lambda progress, _at_s, _fields: replace(progress, force_off=False),
+    "note": _note,
+    "repeat": _repeat,
+    "broke": lambda progress, _at_s, fields: replace(progress, broke=str(fields["what"])),
+    "session_ended": _ended,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """One row of the rail: the schedule's steps ``first`` to ``last`` under one neutral ``label``."""
+
+    label: str
+    first: int
+    last: int
+
+
+def operator_language(protocol: Protocol) -> str:
+    """Return the language in which the operator reads a study's own texts: English, or the study's first."""
+    return "en" if "en" in protocol.study.languages else protocol.study.languages[0]
+
+
+def stages(protocol: Protocol, schedule: Schedule) -> tuple[Stage, ...]:
+    """Return the rows of the rail: pages and settings one by one, longer blocks as one row."""
+    language = operator_language(protocol)
+    rows: list[Stage] = []
+    index = 0
+    while index < len(schedule.steps):
+        step = schedule.steps[index]
+        if isinstance(step, PageStep):
+            rows.append(Stage(protocol.text(protocol.pages[step.page_id].title, language), index, index))
+            index += 1
+            continue
+        last = index
+        while last + 1 < len(schedule.steps) and _same_block(step, schedule.steps[last + 1]):
+            last += 1
+        rows.extend(_block_rows(protocol, schedule, index, last, language))
+        index = last + 1
+    return tuple(rows)
+
+
+def _same_block(trial: Trial, other: PageStep | Trial) -> bool:
+    return isinstance(other, Trial) and other.block == trial.block
+
+
+def _block_rows(protocol: Protocol, schedule: Schedule, first: int, last: int, language: str) -> list[Stage]:
+    trials = [step for step in schedule.steps[first : last + 1] if isinstance(step, Trial)]
+    if len(trials) <= ROWS_PER_BLOCK:
+        return [Stage(trial.label(protocol, language), first + i, first + i) for i, trial in enumerate(trials)]
+    label = protocol.text(protocol.blocks[trials[0].block].setting_label, language)
+    return [Stage(f"{label} {trials[0].index} to {trials[-1].index}", first, last)]

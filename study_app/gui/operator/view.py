@@ -1,0 +1,327 @@
+"""What the operator's window shows, as one frozen value: widgets only draw it. No Qt here.
+
+Sessions are double-blind: nothing here says a liquid, a parameter, a delay, a force or what a limiter did.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from study_app.gui.operator.health import Vitals
+from study_app.gui.operator.progress import NoteLine, SessionProgress, Stage, operator_language
+from study_app.protocol.model import Explore, Protocol
+from study_app.protocol.schedule import Trial
+
+State = Literal["preparing", "running", "paused", "force off", "trouble", "ended"]
+Verdict = Literal["ok", "late", "open"]
+StepState = Literal["done", "now", "open"]
+
+THIN_SPACE = "\u2009"
+NOTES_SHOWN = 3
+
+
+@dataclass(frozen=True, slots=True)
+class StepRow:
+    """A row of the rail; ``note`` is its duration, "now" or how far it is."""
+
+    label: str
+    state: StepState
+    note: str
+
+
+@dataclass(frozen=True, slots=True)
+class Tile:
+    """A number with its unit, a verdict and a line that says what the verdict compares with."""
+
+    title: str
+    value: str
+    unit: str
+    verdict: Verdict
+    line: str
+
+
+@dataclass(frozen=True, slots=True)
+class TrialTime:
+    """Time in the task: ``most_s`` None where the task has no end of its own."""
+
+    elapsed_s: float
+    least_s: float | None
+    most_s: float | None
+
+    @property
+    def words(self) -> str:
+        """Return "1:08 of 2:00", or "1:08"."""
+        elapsed = minutes(self.elapsed_s)
+        return f"{elapsed} of {minutes(self.most_s)}" if self.most_s else elapsed
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceView:
+    """The device's card: its name, whether it answers, and rows of (label, value)."""
+
+    name: str
+    kind: Literal["falcon", "mouse", "simulated"]
+    ready: bool
+    rows: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class OperatorView:
+    """Everything on the operator's window except the two plots' points."""
+
+    study: str
+    who: str
+    state: State
+    state_word: str
+    trouble: str
+    saved_ago_s: float | None
+    elapsed_s: float
+    expected_s: float
+    part_line: str
+    heading: str
+    setting_line: str
+    trial_time: TrialTime | None
+    steps: tuple[StepRow, ...]
+    counts: tuple[tuple[str, str], ...]
+    tiles: tuple[Tile, ...]
+    device: DeviceView
+    notes: tuple[NoteLine, ...]
+    force_on: bool
+    may_pause: bool
+    may_resume: bool
+    may_repeat: bool
+    over: bool
+
+    @property
+    def share(self) -> float:
+        """Share of the expected time that has passed, 0 to 1."""
+        return min(1.0, self.elapsed_s / self.expected_s) if self.expected_s > 0 else 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Session:
+    """What stays the same through a session and is shown: who, with what, by which limits."""
+
+    protocol: Protocol
+    stages: tuple[Stage, ...]
+    who: str
+    expected_s: float
+    answers_of: int
+    lateness_limit_s: float
+    device_name: str
+    device_kind: Literal["falcon", "mouse", "simulated"]
+    device_rows: tuple[tuple[str, str], ...]
+
+    @property
+    def language(self) -> str:
+        """The language of the operator's window, English, where the study has it; else the study's first."""
+        return operator_language(self.protocol)
+
+
+def operator_view(
+    session: Session,
+    progress: SessionProgress,
+    vitals: Vitals,
+    *,
+    now_s: float,
+    force_on: bool,
+    trouble: str = "",
+    rate_hz: float = 1000.0,
+) -> OperatorView:
+    """Return what the operator sees at ``now_s`` on the session's clock; ``trouble`` is what no journal could say."""
+    trouble = progress.broke or trouble
+    state = _state(progress, force_on=force_on, trouble=trouble)
+    trial = progress.trial
+    answering = trial is not None and progress.trial_lasted_s is not None
+    return OperatorView(
+        study=session.protocol.study.name,
+        who=session.who,
+        state=state,
+        state_word=_state_word(state, progress),
+        trouble=trouble,
+        saved_ago_s=None if progress.saved_s is None else max(0.0, now_s - progress.saved_s),
+        elapsed_s=progress.ended_s if progress.ended else now_s,
+        expected_s=session.expected_s,
+        part_line=_part_line(session, trial),
+        heading=_heading(session, progress),
+        setting_line=_setting_line(session, progress, answering=answering),
+        trial_time=_trial_time(session, progress, now_s),
+        steps=tuple(_step_row(stage, progress) for stage in session.stages),
+        counts=_counts(session, progress),
+        tiles=_tiles(vitals, rate_hz, session.lateness_limit_s),
+        device=DeviceView(
+            session.device_name,
+            session.device_kind,
+            not trouble,
+            (*session.device_rows, ("Safety faults", "1" if trouble else "0")),
+        ),
+        notes=progress.notes[-NOTES_SHOWN:][::-1],
+        force_on=force_on,
+        may_pause=state == "running" and progress.step >= 0,
+        may_resume=state in {"paused", "force off"},
+        may_repeat=trial is not None and state == "running",
+        over=state == "ended",
+    )
+
+
+def minutes(seconds: float) -> str:
+    """Return 68 s as "1:08"; an hour and more as "1:02:03"."""
+    whole = max(0, int(seconds))
+    hours, rest = divmod(whole, 3600)
+    if hours:
+        return f"{hours}:{rest // 60:02d}:{rest % 60:02d}"
+    return f"{rest // 60}:{rest % 60:02d}"
+
+
+def grouped(number: int) -> str:
+    """Return 45918 as "45 918" with a thin space."""
+    return f"{number:,}".replace(",", THIN_SPACE)
+
+
+def duration_words(seconds: float) -> str:
+    """Return a lateness or age with the unit that suits it: "62 µs", "1.4 ms"."""
+    micros = seconds * 1e6
+    return f"{micros:.0f} µs" if micros < 1000 else f"{micros / 1000:.2g} ms"
+
+
+def _state(progress: SessionProgress, *, force_on: bool, trouble: str) -> State:
+    if progress.ended:
+        return "ended"
+    if trouble:
+        return "trouble"
+    if progress.step < 0:
+        return "preparing"
+    if not force_on:
+        return "force off"
+    return "paused" if progress.paused else "running"
+
+
+def _state_word(state: State, progress: SessionProgress) -> str:
+    if state == "ended":
+        return {
+            "complete": "Complete",
+            "withdrawn": "Withdrawn",
+            "aborted": "Ended early",
+            "broken": "Ended after a fault",
+        }.get(progress.ended, progress.ended.capitalize())
+    return {
+        "preparing": "Preparing",
+        "running": "Running",
+        "paused": "Paused",
+        "force off": "Paused, force is off",
+        "trouble": "Stopped by a fault",
+    }[state]
+
+
+def _part_line(session: Session, trial: Trial | None) -> str:
+    if trial is None:
+        return session.protocol.text(session.protocol.study.title, session.language)
+    block = session.protocol.blocks[trial.block]
+    title = session.protocol.text(block.title, session.language)
+    parts = session.protocol.parts
+    return f"Part {trial.part} of {parts}  ·  {title}" if trial.part and parts > 1 else title
+
+
+def _heading(session: Session, progress: SessionProgress) -> str:
+    if progress.ended:
+        return {"complete": "Session complete"}.get(progress.ended, "Session ended")
+    if progress.step < 0:
+        return "Getting ready"
+    trial = progress.trial
+    if trial is None:
+        return next(s.label for s in session.stages if s.first <= progress.step <= s.last)
+    if trial.phase != "main":
+        return trial.label(session.protocol, session.language)
+    main = [other.number for other in progress.schedule.trials if other.phase == "main"]
+    return f"Trial {main.index(trial.number) + 1} of {len(main)}"
+
+
+def _setting_line(session: Session, progress: SessionProgress, *, answering: bool) -> str:
+    if progress.ended:
+        return "Everything answered is on disk"
+    trial = progress.trial
+    if trial is None:
+        return "The participant reads" if progress.step >= 0 else "The first page opens in a moment"
+    block = session.protocol.blocks[trial.block]
+    task = session.protocol.tasks[block.task]
+    doing = "free exploration" if isinstance(task, Explore) else "reaching targets"
+    if answering:
+        doing = "answering statements"
+    if trial.phase != "main":
+        return doing.capitalize()
+    return f"{trial.label(session.protocol, session.language)}  ·  {doing}"
+
+
+def _trial_time(session: Session, progress: SessionProgress, now_s: float) -> TrialTime | None:
+    trial = progress.trial
+    if trial is None or progress.ended:
+        return None
+    block = session.protocol.blocks[trial.block]
+    task = session.protocol.tasks[block.task]
+    elapsed = progress.trial_lasted_s
+    if elapsed is None:
+        elapsed = now_s - (progress.trial_since_s if progress.trial_since_s is not None else now_s)
+    if isinstance(task, Explore):
+        return TrialTime(elapsed, task.min_s, task.max_s)
+    return TrialTime(elapsed, None, task.duration_s or task.timeout_s)
+
+
+def _step_row(stage: Stage, progress: SessionProgress) -> StepRow:
+    many = stage.last - stage.first + 1
+    spent = sum(progress.durations_s.get(step, 0.0) for step in range(stage.first, stage.last + 1))
+    if progress.step > stage.last or progress.ended == "complete":
+        return StepRow(stage.label, "done", minutes(spent))
+    if stage.first <= progress.step <= stage.last:
+        place = f"{progress.step - stage.first + 1} of {many}" if many > 1 else "now"
+        return StepRow(stage.label, "now", "" if progress.ended else place)
+    return StepRow(stage.label, "open", "")
+
+
+def _counts(session: Session, progress: SessionProgress) -> tuple[tuple[str, str], ...]:
+    return (
+        ("Answers on disk", f"{sum(progress.answers.values())} of {session.answers_of}"),
+        ("Trials within limits", f"{progress.trials_within_limits} of {len(progress.trials_done)}"),
+        ("Marks, repeats", f"{progress.marks}, {progress.repeats}"),
+    )
+
+
+def _tiles(vitals: Vitals, rate_hz: float, limit_s: float) -> tuple[Tile, ...]:
+    rate = vitals.rate_hz
+    p99 = vitals.lateness_p99_s
+    p99_value, _, p99_unit = duration_words(p99).partition(" ") if p99 is not None else ("–", "", "")
+    screen = f", {vitals.frame_rate_hz:.1f} Hz" if vitals.frame_rate_hz else ""
+    return (
+        Tile(
+            "Servo rate",
+            "–" if rate is None else f"{rate:.1f}",
+            "Hz",
+            "open" if rate is None else _verdict(abs(rate - rate_hz) <= 0.01 * rate_hz),
+            f"asked for {rate_hz:.0f} Hz",
+        ),
+        Tile(
+            "Lateness, p99",
+            p99_value,
+            p99_unit,
+            "open" if p99 is None else _verdict(p99 <= limit_s),
+            f"limit {duration_words(limit_s)}",
+        ),
+        Tile(
+            "Overruns",
+            grouped(vitals.overruns),
+            "",
+            "open" if vitals.ticks == 0 else _verdict(vitals.overruns <= vitals.ticks * 1e-4),
+            f"of {grouped(vitals.ticks)} ticks",
+        ),
+        Tile(
+            "Screen frames late",
+            grouped(vitals.frames_late),
+            "",
+            "open" if vitals.frames == 0 else _verdict(vitals.frames_late <= 0.01 * vitals.frames),
+            f"of {grouped(vitals.frames)}{screen}",
+        ),
+    )
+
+
+def _verdict(within: bool) -> Verdict:
+    return "ok" if within else "late"

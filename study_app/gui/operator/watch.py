@@ -1,0 +1,44 @@
+"""A journal that the operator's window looks over the shoulder of: what is on disk counts as progress, nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from study_app.gui.operator.progress import SessionProgress
+from study_app.session.runner import JournalPort
+
+
+class WatchedJournal:
+    """Passes everything on to the store, and folds what it has kept into ``progress``.
+
+    Parameters
+    ----------
+    store
+        The open session.
+    progress
+        The progress before the first event.
+    clock
+        Seconds since the session's origin.
+    """
+
+    def __init__(self, store: JournalPort, progress: SessionProgress, clock: Callable[[], float]) -> None:
+        self.progress = progress
+        self._store = store
+        self._clock = clock
+
+    def append(self, event: str, *, t_s: float | None = None, **fields: Any) -> None:
+        """Put an event into the journal (StoreError: nothing has changed)."""
+        self._store.append(event, t_s=t_s, **fields)
+        self.progress = self.progress.after(event, self._clock() if t_s is None else t_s, fields)
+
+    def write_tables(self) -> None:
+        """Bring the tables up to date."""
+        self._store.write_tables()
+
+    def finish(self, status: str, reason: str = "") -> None:
+        """Close the session (StoreError: the last table or line could not be written; it counts as ended here)."""
+        try:
+            self._store.finish(status, reason)
+        finally:
+            self.progress = self.progress.after("session_ended", self._clock(), {"status": status, "reason": reason})

@@ -1,0 +1,239 @@
+"""The operator's window: left where we are, in the middle whether it is healthy, right what can be done.
+
+It draws an ``OperatorView`` and two plots, and says what the operator asks for; it knows no runner and no servo.
+"""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QSize, Qt, Signal
+from PySide6.QtGui import QCloseEvent, QResizeEvent, QShowEvent
+from PySide6.QtWidgets import QGridLayout, QLayout, QMainWindow, QScrollArea, QVBoxLayout, QWidget
+
+from study_app.gui.operator.actions import Actions, EndQuestion, RepeatQuestion
+from study_app.gui.operator.banner import Banner
+from study_app.gui.operator.header import Header
+from study_app.gui.operator.health import ServoHealth
+from study_app.gui.operator.notes import DeviceCard, NotesCard
+from study_app.gui.operator.plots import HiddenForceCard, LatenessCard, PositionCard
+from study_app.gui.operator.rail import Rail
+from study_app.gui.operator.stop import EscapeHold, StopPanel
+from study_app.gui.operator.tiles import Tiles
+from study_app.gui.operator.view import OperatorView
+from study_app.gui.theme import DARK, LIGHT, Theme
+from study_app.gui.themed import wear
+
+FULL = QSize(1600, 900)
+LEAST = QSize(1024, 640)
+WIDE = 1320
+SIDE_WIDTH, STOP_HEIGHT = 350, 250
+
+
+class OperatorWindow(QMainWindow):
+    """The cockpit.
+
+    Parameters
+    ----------
+    study
+        Name for the window's title.
+    lateness_limit_s
+        The protocol's limit of the 99th percentile of lateness [s].
+    reach_m
+        Half of the longest edge of the tank [m], for the scale of the position plot.
+    pointer
+        Whether positions are of the mouse pointer.
+    """
+
+    stop_asked = Signal()
+    fade_in_asked = Signal()
+    pause_asked = Signal()
+    resume_asked = Signal()
+    repeat_asked = Signal(str)
+    end_asked = Signal(str, str)
+    note_written = Signal(str)
+    mark_set = Signal()
+    close_asked = Signal()
+    theme_changed = Signal(object)
+
+    def __init__(
+        self, study: str, *, lateness_limit_s: float, reach_m: float, pointer: bool, theme: Theme = LIGHT
+    ) -> None:
+        super().__init__()
+        self.setWindowTitle(f"{study} – operator")
+        self.setMinimumSize(LEAST)
+        self.theme = theme
+        self.may_close = False
+        self._narrow: bool | None = None
+        self._view: OperatorView | None = None
+        self.header = Header()
+        self.banner = Banner()
+        self.rail = Rail()
+        self.tiles = Tiles()
+        self.lateness = LatenessCard(lateness_limit_s)
+        self.force = HiddenForceCard()
+        self.position = PositionCard(reach_m, pointer=pointer)
+        self.device = DeviceCard()
+        self.notes = NotesCard()
+        self.stop = StopPanel()
+        self.buttons = Actions()
+        self.question: RepeatQuestion | EndQuestion | None = None
+        self._escape = EscapeHold(self)
+        self._lay_out()
+        self._arrange(narrow=False)
+        self._connect()
+        self.resize(FULL)
+        wear(self, theme)
+
+    def _lay_out(self) -> None:
+        for card, least in ((self.lateness, 240), (self.force, 240), (self.position, 200)):
+            card.setMinimumHeight(least)
+        self._middle = QGridLayout()
+        self._middle.setContentsMargins(0, 0, 0, 0)
+        self._middle.setSpacing(10)
+        self._middle.setColumnStretch(0, 1)
+        self._middle.setColumnStretch(1, 1)
+        side = QVBoxLayout()
+        side.setContentsMargins(0, 0, 0, 0)
+        side.setSpacing(10)
+        side.addWidget(self.device)
+        side.addWidget(self.notes, 1)
+        self.stop.setFixedSize(SIDE_WIDTH, STOP_HEIGHT)
+        self._middle_area = _scrolled(self._middle)
+        self._side_area = _scrolled(side)
+        self._side_area.setFixedWidth(SIDE_WIDTH)
+        self._body = QGridLayout()
+        self._body.setContentsMargins(21, 21, 21, 17)
+        self._body.setHorizontalSpacing(18)
+        self._body.setVerticalSpacing(10)
+        right = QVBoxLayout()
+        right.setSpacing(10)
+        right.addWidget(self._side_area, 1)
+        right.addWidget(self.stop)
+        self._body.addLayout(right, 0, 2, 2, 1)
+        self._body.setColumnStretch(1, 1)
+        self._body.setRowStretch(0, 1)
+        whole = QWidget()
+        whole.setProperty("role", "window")
+        layout = QVBoxLayout(whole)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(0)
+        layout.addWidget(self.header)
+        layout.addLayout(self._body, 1)
+        self.setCentralWidget(whole)
+        whole.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
+        whole.setFocus()
+
+    def _arrange(self, *, narrow: bool) -> None:
+        """Place the parts for a wide or a narrow window; the force stop stays where it is in both."""
+        if narrow == self._narrow:
+            return
+        self._narrow = narrow
+        self.rail.narrow(narrow)
+        self.tiles.narrow(narrow)
+        self.buttons.hint.setVisible(not narrow)
+        self._body.addWidget(self.rail, 0, 0, 1 if narrow else 2, 1)
+        self._body.addWidget(self._middle_area, 0, 1)
+        self._body.addWidget(self.buttons, 1, 0 if narrow else 1, 1, 2 if narrow else 1)
+        across = 2 if narrow else 1
+        self._middle.addWidget(self.banner, 0, 0, 1, 2)
+        self._middle.addWidget(self.tiles, 1, 0, 1, 2)
+        self._middle.addWidget(self.lateness, 2, 0, 1, across)
+        self._middle.addWidget(self.force, *((4, 0) if narrow else (2, 1)), 1, across)
+        self._middle.addWidget(self.position, 3, 0, 1, 2)
+        self._middle.setRowStretch(2, 30)
+        self._middle.setRowStretch(3, 26)
+
+    def _connect(self) -> None:
+        self.header.theme_asked.connect(self._change_theme)
+        self.stop.stop_asked.connect(self.stop_asked)
+        self.stop.fade_in_asked.connect(self.fade_in_asked)
+        self._escape.held.connect(self.stop_asked)
+        self.buttons.pause_asked.connect(self.pause_asked)
+        self.buttons.resume_asked.connect(self.resume_asked)
+        self.buttons.repeat_asked.connect(self.ask_to_repeat)
+        self.buttons.end_asked.connect(self.ask_to_end)
+        self.buttons.close_asked.connect(self.close)
+        self.notes.note_written.connect(self.note_written)
+        self.notes.mark_set.connect(self.mark_set)
+
+    def show_view(self, view: OperatorView) -> None:
+        """Show everything but the plots."""
+        if view == self._view:
+            return
+        self._view = view
+        for part in (self.header, self.rail, self.tiles, self.notes, self.stop, self.buttons):
+            part.show_view(view)
+        self.device.show_device(view.device)
+        self.banner.show_trouble("" if view.over else view.trouble)
+        self.may_close = view.over
+
+    def show_traces(self, health: ServoHealth, now_s: float) -> None:
+        """Draw the hand's position (30 times a second)."""
+        self.position.show_health(health, now_s)
+
+    def show_lateness(self, health: ServoHealth) -> None:
+        """Draw the histogram (twice a second)."""
+        self.lateness.show_health(health)
+
+    def ask_to_repeat(self) -> None:
+        """Ask for the reason of a repetition; nothing happens without one."""
+        if self._view is None or not self._view.may_repeat or self.question is not None:
+            return
+        question = RepeatQuestion(self, self.theme, self._view.setting_line.split("  ·  ")[0])
+        self._open(question)
+        question.accepted.connect(lambda: self.repeat_asked.emit(question.reason.text().strip()))
+        question.open()
+
+    def ask_to_end(self) -> None:
+        """Ask whether and why the session is to end now."""
+        if self._view is None or self._view.over or self.question is not None:
+            return
+        question = EndQuestion(self, self.theme, dict(self._view.counts)["Answers on disk"])
+        self._open(question)
+        question.accepted.connect(lambda: self.end_asked.emit(question.status, question.reason.text().strip()))
+        question.open()
+
+    def _open(self, question: RepeatQuestion | EndQuestion) -> None:
+        self.question = question
+        question.finished.connect(self._question_answered)
+
+    def _question_answered(self) -> None:
+        if self.question is not None:
+            self.question.deleteLater()
+        self.question = None
+
+    def _change_theme(self) -> None:
+        self.theme = LIGHT if self.theme.dark else DARK
+        wear(self, self.theme)
+        self.theme_changed.emit(self.theme)
+
+    def showEvent(self, event: QShowEvent) -> None:  # noqa: N802 - Qt's name
+        """Watch for Esc held, whichever part has the focus."""
+        super().showEvent(event)
+        handle = self.windowHandle()
+        handle.removeEventFilter(self._escape)
+        handle.installEventFilter(self._escape)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
+        """Give way in a small window; only the middle and the notes ever scroll."""
+        super().resizeEvent(event)
+        self._arrange(narrow=self.width() < WIDE)
+
+    def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802 - Qt's name
+        """Close at once when the session is over; else leave it to who listens, with the window open."""
+        if self.may_close:
+            event.accept()
+        else:
+            event.ignore()
+        self.close_asked.emit()
+
+
+def _scrolled(layout: QLayout) -> QScrollArea:
+    """Return ``layout`` in a frame that scrolls only where the window is too low for it."""
+    inside = QWidget()
+    inside.setLayout(layout)
+    area = QScrollArea()
+    area.setWidgetResizable(True)
+    area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+    area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+    area.setWidget(inside)
+    return area

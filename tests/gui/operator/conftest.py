@@ -1,0 +1,92 @@
+"""A demo session told event by event, as the journal would tell it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pytest
+
+from study_app.gui.operator.health import ServoHealth
+from study_app.gui.operator.progress import SessionProgress, stages
+from study_app.gui.operator.view import OperatorView, Session, operator_view
+from study_app.haptics.layout import SAMPLE, records
+from study_app.protocol.load import load
+from study_app.protocol.model import Protocol
+from study_app.protocol.schedule import Schedule, build_schedule
+
+
+@dataclass
+class Told:
+    """A session told so far; ``now_s`` moves with every event."""
+
+    protocol: Protocol
+    schedule: Schedule
+    session: Session
+    progress: SessionProgress = field(init=False)
+    now_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        self.progress = SessionProgress(self.protocol, self.schedule)
+
+    def tell(self, event: str, after_s: float = 0.0, **fields: Any) -> None:
+        self.now_s += after_s
+        self.progress = self.progress.after(event, self.now_s, fields)
+
+    def welcome(self) -> None:
+        self.tell("session_started")
+        self.tell("page_shown", 1.0, page="welcome")
+
+    def start(self, number: int, attempt: int = 1) -> None:
+        self.tell("trial_started", 10.0, trial=number, attempt=attempt)
+
+    def end(self, number: int, outcome: str = "complete", **measured: float) -> None:
+        self.tell("trial_ended", 20.0, trial=number, attempt=1, outcome=outcome, **measured)
+
+    def answer(self, number: int) -> None:
+        items = self.schedule.trials[number - 1].items
+        self.tell("responses", 5.0, trial=number, attempt=1, items=[{"item": item} for item in items])
+
+    def view(self, health: ServoHealth | None = None, *, force_on: bool = True, trouble: str = "") -> OperatorView:
+        vitals = (health or ServoHealth(1000.0)).vitals()
+        return operator_view(self.session, self.progress, vitals, now_s=self.now_s, force_on=force_on, trouble=trouble)
+
+
+@pytest.fixture
+def told() -> Told:
+    protocol = load("demo")
+    schedule = build_schedule(protocol, "P007", 357711)
+    session = Session(
+        protocol=protocol,
+        stages=stages(protocol, schedule),
+        who="Participant P007  ·  session 1  ·  seed 357711",
+        expected_s=180.0,
+        answers_of=protocol.responses_per_participant(),
+        lateness_limit_s=protocol.limits.lateness_ms / 1000,
+        device_name="Mouse",
+        device_kind="mouse",
+        device_rows=(("Force sent, share of 6 N limit", "hidden"),),
+    )
+    return Told(protocol, schedule, session)
+
+
+def ticks(count: int, *, first: int = 0, lateness_ns: int = 15_000) -> Any:
+    """Return samples of a servo at 1 kHz."""
+    samples = records(SAMPLE, count)
+    samples.tick = np.arange(first, first + count)
+    samples.time_ns = samples.tick * 1_000_000
+    samples.lateness_ns = lateness_ns
+    return samples
+
+
+@pytest.fixture
+def health() -> ServoHealth:
+    measured = ServoHealth(1000.0)
+    measured.take(ticks(3000))
+    for frame in range(120):
+        measured.frame(1 + frame * 16_666_667)
+    for step in range(200):
+        at = step * 0.02
+        measured.hand(at, (0.02 * np.sin(at), 0.01 * np.cos(at), 0.005))
+    return measured

@@ -1,0 +1,168 @@
+"""The operator's view as a value: pure, neutral, and true to the journal."""
+
+from __future__ import annotations
+
+import dataclasses
+
+from study_app.gui.operator.view import duration_words, grouped, minutes
+
+SECRETS = ("thin", "thick", "prompt", "200")
+
+
+def words(view):
+    """Return every text of a view, its notes left out."""
+    found = []
+
+    def walk(value):
+        if isinstance(value, str):
+            found.append(value)
+        elif isinstance(value, tuple):
+            for part in value:
+                walk(part)
+        elif dataclasses.is_dataclass(value):
+            for part in dataclasses.fields(value):
+                walk(getattr(value, part.name))
+
+    walk(view)
+    return found
+
+
+def test_a_session_starts_by_preparing(told):
+    view = told.view()
+    assert view.state == "preparing"
+    assert not view.may_pause
+    assert not view.may_repeat
+
+
+def test_a_trial_is_counted_among_the_main_ones_with_its_neutral_name(told):
+    told.welcome()
+    told.start(1)
+    view = told.view()
+    assert view.heading == "Trial 1 of 4"
+    assert view.setting_line.startswith("Liquid setting 1")
+    assert view.part_line.startswith("Part 1 of 2")
+    assert view.state == "running"
+    assert view.may_pause
+    assert view.may_repeat
+
+
+def test_the_steps_show_what_is_done_now_and_open(told):
+    told.welcome()
+    told.start(1)
+    states = [row.state for row in told.view().steps]
+    assert states[:2] == ["done", "now"]
+    assert set(states[2:]) == {"open"}
+
+
+def test_time_in_the_trial_stands_still_while_statements_are_answered(told):
+    told.welcome()
+    told.start(1)
+    told.end(1)
+    told.now_s += 33.0
+    view = told.view()
+    assert view.trial_time.elapsed_s == 20.0
+    assert "answering" in view.setting_line
+
+
+def test_exploring_shows_least_and_most_time(told):
+    told.welcome()
+    told.start(1)
+    told.now_s += 12.0
+    time = told.view().trial_time
+    assert (time.least_s, time.most_s) == (5.0, 30.0)
+    assert time.words == "0:12 of 0:30"
+
+
+def test_a_paused_session_can_resume_but_not_repeat(told):
+    told.welcome()
+    told.start(1)
+    told.end(1, outcome="interrupted")
+    told.tell("paused", by="participant")
+    view = told.view()
+    assert view.state == "paused"
+    assert view.may_resume
+    assert not view.may_repeat
+
+
+def test_a_stopped_force_is_a_state_of_its_own(told):
+    told.welcome()
+    told.start(1)
+    told.tell("force_stopped", by="operator")
+    told.tell("paused", by="operator")
+    view = told.view(force_on=False)
+    assert view.state == "force off"
+    assert view.may_resume
+
+
+def test_trouble_is_said_and_nothing_but_the_end_is_offered(told):
+    told.welcome()
+    told.tell("broke", what="the device 'mouse' stopped answering")
+    view = told.view(force_on=False)
+    assert view.state == "trouble"
+    assert "stopped answering" in view.trouble
+    assert not view.device.ready
+    assert [view.may_pause, view.may_resume, view.may_repeat] == [False, False, False]
+
+
+def test_trouble_that_no_journal_could_keep_is_said_too(told):
+    told.welcome()
+    assert told.view(trouble="no space left").state == "trouble"
+
+
+def test_the_end_is_said_with_its_status(told):
+    told.welcome()
+    told.tell("session_ended", 4.0, status="withdrawn", reason="")
+    told.now_s += 100.0
+    view = told.view()
+    assert view.over
+    assert view.state_word == "Withdrawn"
+    assert view.elapsed_s == 5.0
+
+
+def test_a_complete_session_has_every_step_done(told):
+    told.welcome()
+    told.tell("session_ended", 4.0, status="complete", reason="")
+    assert {row.state for row in told.view().steps} == {"done"}
+
+
+def test_counts_are_of_what_is_on_disk(told):
+    told.welcome()
+    told.start(1)
+    told.end(1)
+    told.answer(1)
+    told.tell("note", kind="mark", text="")
+    counts = dict(told.view().counts)
+    assert counts["Answers on disk"] == "2 of 8"
+    assert counts["Trials within limits"] == "1 of 1"
+    assert counts["Marks, repeats"] == "1, 0"
+
+
+def test_tiles_judge_by_the_asked_rate_and_the_protocols_limit(told, health):
+    tiles = told.view(health).tiles
+    assert [tile.verdict for tile in tiles] == ["ok", "ok", "ok", "ok"]
+    assert tiles[0].value == "1000.0"
+    assert (tiles[1].value, tiles[1].unit) == ("15", "µs")
+
+
+def test_unmeasured_tiles_claim_nothing(told):
+    assert {tile.verdict for tile in told.view().tiles} == {"open"}
+
+
+def test_no_word_of_a_view_names_a_condition_a_force_or_a_limiter(told, health):
+    told.welcome()
+    for trial in told.schedule.trials:
+        told.start(trial.number)
+        said = " ".join(words(told.view(health))).lower().split()
+        for secret in SECRETS:
+            assert secret not in said
+        told.end(trial.number)
+        told.answer(trial.number)
+    assert "hidden" in " ".join(words(told.view(health)))
+
+
+def test_times_and_numbers_read_as_people_write_them():
+    assert minutes(68) == "1:08"
+    assert minutes(3723) == "1:02:03"
+    assert grouped(45918) == "45\u2009918"
+    assert duration_words(62e-6) == "62 µs"
+    assert duration_words(1.4e-3) == "1.4 ms"
