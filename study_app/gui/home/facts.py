@@ -1,0 +1,145 @@
+"""What the home window says of protocols and sessions, as values. No Qt here."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+
+from study_app.errors import ProtocolError, StoreError
+from study_app.protocol.describe import expected_duration_s
+from study_app.protocol.load import load, shipped
+from study_app.protocol.model import Protocol
+from study_app.store.layout import StudyFolder
+from study_app.store.participants import participants
+
+LANGUAGES = {"en": "English", "nl": "Dutch", "de": "German", "fr": "French", "es": "Spanish", "it": "Italian"}
+
+
+@dataclass(frozen=True, slots=True)
+class StudyFacts:
+    """A protocol as a card shows it; ``source`` is the name or path it is loaded by."""
+
+    source: str
+    protocol: Protocol
+    title: str
+    description: str
+    languages: str
+    extent: str
+    duration: str
+    force: str
+
+
+@dataclass(frozen=True, slots=True)
+class BrokenFacts:
+    """A protocol file that cannot be used, and the first thing wrong with it."""
+
+    source: str
+    problem: str
+
+
+@dataclass(frozen=True, slots=True)
+class SessionFacts:
+    """A session as a row shows it."""
+
+    participant: str
+    session: int
+    study: str
+    started: datetime
+    status: str
+    validity: str | None
+    answers: int
+    answers_of: int | None
+    simulated: bool
+    pilot: bool
+
+    @property
+    def needs_care(self) -> bool:
+        """Whether it was begun and never ended."""
+        return self.status in {"unfinished", "damaged"}
+
+
+def sources() -> tuple[str, ...]:
+    """Return the names of the protocols at hand: those beside us, then those that ship with the program."""
+    own = {path.stem for path in Path("protocols").glob("*.toml")}
+    return tuple(sorted({*own, *shipped()}, key=lambda name: (name == "demo", name)))
+
+
+def study_facts(source: str) -> StudyFacts | BrokenFacts:
+    """Load the protocol ``source`` and say what a researcher chooses by."""
+    try:
+        protocol = load(source)
+    except ProtocolError as error:
+        count = len(error.problems)
+        others = f" (and {count - 1} more: liquid-study check {source})" if count > 1 else ""
+        return BrokenFacts(source, f"{error.problems[0]}{others}")
+    language = "en" if "en" in protocol.study.languages else protocol.study.languages[0]
+    settings = sum(len(block.conditions) * block.repetitions for block in protocol.main_blocks)
+    return StudyFacts(
+        source=source,
+        protocol=protocol,
+        title=protocol.text(protocol.study.title, language),
+        description=" ".join(protocol.study.description.split()),
+        languages=", ".join(sorted(LANGUAGES.get(code, code) for code in protocol.study.languages)),
+        extent=", ".join(
+            (
+                counted(protocol.parts, "part"),
+                counted(settings, "setting"),
+                counted(protocol.responses_per_participant(), "answer"),
+            )
+        ),
+        duration=f"about {max(1, round(expected_duration_s(protocol) / 60))} min",
+        force=f"a mouse will do; at most {protocol.device.force_limit_n:g} N",
+    )
+
+
+def sessions(results: Path, answers_of: dict[str, int]) -> tuple[SessionFacts, ...]:
+    """Return the sessions in all study folders under ``results``: those that need care first, then the newest.
+
+    ``answers_of`` says how many answers a whole session of a study has. Folders that hold no study are passed over.
+    """
+    found: list[SessionFacts] = []
+    for data in sorted(results.glob("*/data")):
+        try:
+            rows = participants(StudyFolder(data.parent))
+        except StoreError:
+            continue  # not ours, or not readable: the commands say why when asked about that folder
+        found += [
+            SessionFacts(
+                participant=row["participant"],
+                session=int(row["session"]),
+                study=row["study"],
+                started=datetime.fromisoformat(row["session_started_at"]),
+                status=row["status"],
+                validity=row["validity"],
+                answers=int(row["responses"]),
+                answers_of=answers_of.get(row["study"]),
+                simulated=bool(row["simulated"]),
+                pilot=bool(row["pilot"]),
+            )
+            for row in rows
+        ]
+    return tuple(sorted(found, key=lambda session: (not session.needs_care, -session.started.timestamp())))
+
+
+def held(found: Iterable[SessionFacts], study: str) -> str:
+    """Return how many sessions of a study there are: "4 sessions, 3 complete"."""
+    own = [session for session in found if session.study == study and not session.simulated and not session.pilot]
+    if not own:
+        return "no session yet"
+    complete = sum(session.status == "complete" for session in own)
+    return f"{counted(len(own), 'session')}, {complete} complete"
+
+
+def counted(number: int, word: str) -> str:
+    """Return "1 part", "2 parts"."""
+    return f"{number} {word}" if number == 1 else f"{number} {word}s"
+
+
+def started_words(started: datetime, now: datetime) -> str:
+    """Return when a session began as people say it: "Today 09:31", "Yesterday 16:11", "18 Nov 15:20"."""
+    days = (now.date() - started.date()).days
+    day = {0: "Today", 1: "Yesterday"}.get(days, f"{started.day} {started:%b}")
+    year = "" if started.year == now.year else f" {started.year}"
+    return f"{day}{year} {started:%H:%M}"

@@ -1,0 +1,134 @@
+"""Rehearsing a protocol from the home window: asked here, run as a program of its own, so that nothing here waits."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from PySide6.QtCore import QProcess
+from PySide6.QtWidgets import QDialog, QHBoxLayout, QProgressBar, QVBoxLayout, QWidget
+
+from study_app.gui.controls import ActionButton, Number
+from study_app.gui.home.facts import StudyFacts
+from study_app.gui.labels import label, set_ink
+from study_app.gui.theme import LIGHT, Theme
+from study_app.gui.themed import wear
+
+MAX_PARTICIPANTS = 200
+ARGUMENTS = ("-m", "study_app", "rehearse")
+
+
+def rehearsal_folder(results: Path, study: str) -> Path:
+    """Return a folder for a rehearsal that does not exist yet, apart from every participant's data."""
+    number = 1
+    while (folder := results / f"{study}-rehearsal-{number}").exists():
+        number += 1
+    return folder
+
+
+class RehearsalDialog(QDialog):
+    """How many simulated participants, and then how far it is; Cancel stops it and keeps whole sessions.
+
+    Parameters
+    ----------
+    facts
+        The protocol.
+    results
+        Folder that holds the studies' folders; the rehearsal gets one of its own.
+    """
+
+    def __init__(
+        self, facts: StudyFacts, results: Path, *, theme: Theme = LIGHT, parent: QWidget | None = None
+    ) -> None:
+        super().__init__(parent)
+        self.setWindowTitle("Rehearse")
+        self.setModal(True)
+        self.setMinimumWidth(520)
+        self._facts = facts
+        self.folder = rehearsal_folder(results, facts.protocol.study.name)
+        self.participants = Number(1, MAX_PARTICIPANTS, 5)
+        self.seed = Number(0, 2_147_483_647, 1)
+        self.said = label(
+            "Whole sessions run faster than real time, with simulated participants. "
+            f"They are marked as simulated and kept apart, in {self.folder}.",
+            "body",
+            "text2",
+            wraps=True,
+        )
+        self.progress = QProgressBar()
+        self.progress.setRange(0, 0)
+        self.progress.setTextVisible(False)
+        self.progress.setFixedHeight(8)
+        self.progress.hide()
+        self.start = ActionButton("fast_forward", "Rehearse", role="primary")
+        self.cancel = ActionButton("", "Cancel")
+        self.process = QProcess(self)
+        self.process.setProcessChannelMode(QProcess.ProcessChannelMode.MergedChannels)
+        self._told = ""
+        self._lay_out()
+        wear(self, theme)
+        self.start.clicked.connect(self._start)
+        self.cancel.clicked.connect(self.reject)
+        self.process.readyRead.connect(self._listen)
+        self.process.finished.connect(self._finished)
+
+    def _lay_out(self) -> None:
+        column = QVBoxLayout(self)
+        column.setContentsMargins(28, 24, 28, 24)
+        column.setSpacing(12)
+        column.addWidget(label(f"Rehearse {self._facts.title}", "title_dense"))
+        column.addWidget(self.said)
+        row = QHBoxLayout()
+        row.setSpacing(16)
+        for name, field in (("Simulated participants", self.participants), ("Seed", self.seed)):
+            field.setAccessibleName(name)
+            one = QVBoxLayout()
+            one.addWidget(label(name, "label", "text2"))
+            one.addWidget(field)
+            row.addLayout(one, 1)
+        column.addLayout(row)
+        column.addWidget(self.progress)
+        foot = QHBoxLayout()
+        foot.addWidget(self.cancel)
+        foot.addStretch()
+        foot.addWidget(self.start)
+        column.addSpacing(6)
+        column.addLayout(foot)
+
+    def _start(self) -> None:
+        if self.process.state() != QProcess.ProcessState.NotRunning:
+            return
+        for field in (self.participants, self.seed, self.start):
+            field.setEnabled(False)
+        self.progress.show()
+        self.said.setText("Rehearsing …")
+        words = ("--participants", str(self.participants.value()), "--seed", str(self.seed.value()))
+        where = ("--results", str(self.folder))
+        self.process.start(sys.executable, [*ARGUMENTS, self._facts.source, *words, *where])
+
+    def _listen(self) -> None:
+        self._told += bytes(self.process.readAll().data()).decode(errors="replace")
+        lines = self._told.strip().splitlines()
+        if lines:
+            self.said.setText(lines[-1])
+
+    def _finished(self, code: int, _status: QProcess.ExitStatus) -> None:
+        self._listen()
+        self.progress.hide()
+        if code == 0:
+            self.accept()
+            return
+        lines = self._told.strip().splitlines()
+        self.said.setText(lines[-1] if lines else f"The rehearsal ended with exit code {code}.")
+        set_ink(self.said, "bad")
+        self.cancel.setText("Close")
+
+    def reject(self) -> None:
+        """Stop the rehearsal, if it runs, and close."""
+        if self.process.state() != QProcess.ProcessState.NotRunning:
+            self.process.finished.disconnect(self._finished)
+            self.process.terminate()
+            if not self.process.waitForFinished(2000):
+                self.process.kill()
+                self.process.waitForFinished(2000)
+        super().reject()

@@ -1,0 +1,125 @@
+"""The sessions that were held: who, which study, when, how it ended, and how much of it is there."""
+
+from __future__ import annotations
+
+from datetime import datetime
+
+from PySide6.QtCore import QRectF, Qt
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
+from PySide6.QtWidgets import QGridLayout, QScrollArea, QVBoxLayout, QWidget
+
+from study_app.gui.cards import Card, Chip, Tone
+from study_app.gui.home.facts import SessionFacts, started_words
+from study_app.gui.labels import Elided, figures, label
+from study_app.gui.theme import RADIUS_CONTROL, font
+from study_app.gui.themed import Themed, dress
+
+ROW_HEIGHT = 43
+SHOWN = 200
+COLUMNS = (("Participant", 110), ("Study", 130), ("Started", 140), ("Status", 160), ("Validity", 130), ("Answers", 80))
+
+STATUS: dict[str, tuple[Tone, str, str]] = {
+    "complete": ("ok", "check", "Complete"),
+    "unfinished": ("warn", "clock", "Interrupted"),
+    "withdrawn": ("neutral", "cross", "Withdrawn"),
+    "aborted": ("neutral", "cross", "Ended early"),
+    "broken": ("bad", "warning", "Stopped by fault"),
+    "damaged": ("bad", "warning", "Journal damaged"),
+}
+VALIDITY: dict[str | None, tuple[Tone, str, str]] = {
+    "valid": ("ok", "check", "Valid"),
+    "invalid": ("warn", "warning", "Out of limits"),
+    None: ("neutral", "ring", "Open"),
+}
+
+
+def _columns(widget: QWidget) -> QGridLayout:
+    grid = QGridLayout(widget)
+    grid.setContentsMargins(12, 0, 12, 0)
+    grid.setHorizontalSpacing(8)
+    for column, (_, width) in enumerate(COLUMNS):
+        grid.setColumnMinimumWidth(column, width if column in {3, 4} else width // 2)
+        grid.setColumnStretch(column, width)
+    return grid
+
+
+class SessionLine(Themed, QWidget):
+    """One session."""
+
+    def __init__(self, facts: SessionFacts, now: datetime) -> None:
+        super().__init__()
+        self._tinted = facts.needs_care
+        self.setFixedHeight(ROW_HEIGHT)
+        who = Elided("body")
+        who.setFont(font("label", weight=600, scale=1.08))
+        who.show_text(facts.participant if facts.session == 1 else f"{facts.participant}, session {facts.session}")
+        kind = ", simulated" if facts.simulated else ", pilot" if facts.pilot else ""
+        study, when = Elided("label", "text2"), Elided("label", "text2")
+        study.show_text(facts.study + kind)
+        when.setFont(font("label", weight=400, tabular=True))
+        when.show_text(started_words(facts.started, now))
+        whole = f" of {facts.answers_of}" if facts.answers_of is not None else ""
+        self.status = Chip(*STATUS.get(facts.status, ("neutral", "ring", facts.status.capitalize())), small=True)
+        self.validity = Chip(*VALIDITY[facts.validity], small=True)
+        self.answers = figures(f"{facts.answers}{whole}", "label")
+        grid = _columns(self)
+        for column, cell in enumerate((who, study, when, self.status, self.validity, self.answers)):
+            grid.addWidget(cell, 0, column)
+        self.setAccessibleName(f"{facts.participant}, {facts.study}, {self.status.word}, {self.answers.text()} answers")
+
+    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+        """Paint the tint of a row that needs care, and the hairline under the row."""
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        if self._tinted:
+            painter.setPen(Qt.PenStyle.NoPen)
+            painter.setBrush(QColor(self.theme.hover))
+            painter.drawRoundedRect(QRectF(self.rect()).adjusted(0, 1, 0, -2), RADIUS_CONTROL, RADIUS_CONTROL)
+        painter.setPen(QPen(QColor(self.theme.grid), 1))
+        painter.drawLine(12, self.height() - 1, self.width() - 12, self.height() - 1)
+
+
+class SessionsCard(Card):
+    """The table, newest first; a row that needs care stands above all."""
+
+    def __init__(self) -> None:
+        self.where = Elided("small", "text2")
+        super().__init__(gap=8, padding=20)
+        self.column.setContentsMargins(14, self.column.contentsMargins().top(), 14, 14)
+        title = label("Sessions", "card")
+        head = QWidget()
+        grid = _columns(head)
+        grid.addWidget(title, 0, 0, 1, 2)
+        self.where.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        grid.addWidget(self.where, 0, 2, 1, 4)
+        for column, (name, _) in enumerate(COLUMNS):
+            grid.addWidget(label(name, "small", "text2"), 1, column)
+        grid.setVerticalSpacing(10)
+        self.column.addWidget(head)
+        self.lines: list[SessionLine] = []
+        self.none = label("No session yet. The first one appears here when it begins.", "body", "text2", wraps=True)
+        self.none.setContentsMargins(12, 12, 12, 12)
+        inside = QWidget()
+        self._rows = QVBoxLayout(inside)
+        self._rows.setContentsMargins(0, 0, 0, 0)
+        self._rows.setSpacing(0)
+        self._rows.addWidget(self.none)
+        self._rows.addStretch()
+        area = QScrollArea()
+        area.setWidgetResizable(True)
+        area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        area.setWidget(inside)
+        self.column.addWidget(area, 1)
+        self.setMinimumHeight(200)
+
+    def show_sessions(self, found: tuple[SessionFacts, ...], where: str, now: datetime) -> None:
+        """Show these sessions in place of those before; ``where`` names the results folder."""
+        self.where.show_text(f"in {where}")
+        for line in self.lines:
+            line.setParent(None)
+            line.deleteLater()
+        self.lines = [SessionLine(facts, now) for facts in found[:SHOWN]]
+        self.none.setVisible(not self.lines)
+        for index, line in enumerate(self.lines):
+            dress(line, self.theme)
+            self._rows.insertWidget(index, line)

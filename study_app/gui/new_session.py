@@ -1,0 +1,260 @@
+"""The questions before a session. Nothing is created until Begin; Cancel leaves everything as it was."""
+
+from __future__ import annotations
+
+import secrets
+from dataclasses import dataclass
+from pathlib import Path
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QGuiApplication, QIntValidator
+from PySide6.QtWidgets import (
+    QDialog,
+    QFileDialog,
+    QGridLayout,
+    QHBoxLayout,
+    QLabel,
+    QLineEdit,
+    QVBoxLayout,
+    QWidget,
+)
+
+from study_app.devices import list_devices
+from study_app.errors import StoreError
+from study_app.gui.cards import Icon, Rule
+from study_app.gui.controls import ActionButton, Check, Choice, Number
+from study_app.gui.home.facts import LANGUAGES, StudyFacts
+from study_app.gui.labels import label, set_ink
+from study_app.gui.theme import LIGHT, Theme, font
+from study_app.gui.themed import wear
+from study_app.store.description import check_study
+from study_app.store.layout import MAX_SESSION, StudyFolder, check_participant, check_unused, suggest_id
+
+MAX_SEED = 999_999
+DEVICE_WORDS = {"mouse": "Mouse (seen, not felt)", "scripted": "Scripted hand (moves by itself)"}
+
+
+@dataclass(frozen=True, slots=True)
+class NewSession:
+    """What the operator chose; ``results`` is the study's folder, ``screen`` counts from 1."""
+
+    source: str
+    participant: str
+    session: int
+    seed: int
+    operator: str
+    language: str
+    device: str
+    windowed: bool
+    screen: int
+    results: Path
+
+
+def draw_seed() -> int:
+    """Return a seed that nobody chose, short enough to be read aloud."""
+    return secrets.randbelow(MAX_SEED) + 1
+
+
+class NewSessionDialog(QDialog):
+    """Asks who, with which seed, in which language, on which device and screen.
+
+    Parameters
+    ----------
+    facts
+        The protocol to run.
+    results
+        Folder that holds the studies' folders; the study's own is suggested.
+    """
+
+    def __init__(
+        self, facts: StudyFacts, results: Path, *, theme: Theme = LIGHT, parent: QWidget | None = None
+    ) -> None:
+        super().__init__(parent)
+        self.facts = facts
+        self.setWindowTitle("New session")
+        self.setModal(True)
+        self.setMinimumWidth(640)
+        self.results = _path_field(results / facts.protocol.study.name)
+        self.participant = _field("Participant")
+        self.session = Number(1, MAX_SESSION, 1)
+        self.seed = _field("Seed")
+        self.operator = _field("Operator")
+        self.language = Choice()
+        self.device = Choice()
+        self.screen_choice = Choice()
+        self.windowed = Check("In a window instead of full-screen")
+        self.verdict_icon = Icon("check", "ok", 18)
+        self.verdict = label("", "label", "ok", wraps=True)
+        self.begin = ActionButton("play", "Begin", role="primary", height=46)
+        self.cancel = ActionButton("", "Cancel", height=46)
+        self._fill()
+        self._lay_out()
+        wear(self, theme)
+        self._check()
+        self.participant.setFocus()
+        self.participant.selectAll()
+
+    def _fill(self) -> None:
+        study = self.facts.protocol.study
+        self.participant.setText(suggest_id(StudyFolder(Path(self.results.text()))))
+        self.session.setAccessibleName("Session")
+        self.seed.setText(str(draw_seed()))
+        self.seed.setValidator(QIntValidator(0, 2_147_483_647, self))
+        self.operator.setPlaceholderText("Initials, such as AK")
+        self.operator.setMaxLength(40)
+        for code in study.languages:
+            self.language.addItem(LANGUAGES.get(code, code), code)
+        for name in list_devices():
+            self.device.addItem(DEVICE_WORDS.get(name, name), name)
+        screens = QGuiApplication.screens()
+        for number, screen in enumerate(screens, start=1):
+            size = screen.size()
+            words = f"Screen {number}: {size.width()} × {size.height()}, {screen.refreshRate():.0f} Hz"
+            self.screen_choice.addItem(words, number)
+        self.screen_choice.setCurrentIndex(len(screens) - 1)
+        self.windowed.setChecked(len(screens) == 1)
+        for name, widget in (("Language", self.language), ("Device", self.device), ("Screen", self.screen_choice)):
+            widget.setAccessibleName(name)
+        fields: tuple[QWidget, ...] = (self.session, self.language, self.device, self.screen_choice, self.windowed)
+        for field in fields:
+            field.setFont(font("body"))
+        self.participant.textChanged.connect(self._check)
+        self.session.valueChanged.connect(self._check)
+        self.seed.textChanged.connect(self._check)
+        self.results.textChanged.connect(self._check)
+        self.begin.clicked.connect(self.accept)
+        self.cancel.clicked.connect(self.reject)
+        self.begin.setDefault(True)
+        self.cancel.setAutoDefault(False)
+
+    def _lay_out(self) -> None:
+        column = QVBoxLayout(self)
+        column.setContentsMargins(32, 28, 32, 24)
+        column.setSpacing(10)
+        column.addWidget(label("New session", "title_dense"))
+        about = f"{self.facts.title}  ·  {self.facts.extent}  ·  {self.facts.duration}"
+        column.addWidget(label(about, "body", "text2", wraps=True))
+        column.addSpacing(6)
+        grid = QGridLayout()
+        grid.setHorizontalSpacing(16)
+        grid.setVerticalSpacing(6)
+        for place in (0, 1):
+            grid.setColumnStretch(place, 1)
+        another = ActionButton("repeat", "Draw another", height=40)
+        another.setAutoDefault(False)
+        another.clicked.connect(lambda: self.seed.setText(str(draw_seed())))
+        change = ActionButton("", "Change …", height=40)
+        change.setAutoDefault(False)
+        change.clicked.connect(self._choose_folder)
+        verdict = QHBoxLayout()
+        verdict.setSpacing(8)
+        verdict.addWidget(self.verdict_icon, 0, Qt.AlignmentFlag.AlignTop)
+        verdict.addWidget(self.verdict, 1)
+        _put(grid, 0, 0, "Participant", self.participant, hint="letters and digits, no name")
+        _put(grid, 0, 1, "Session", self.session)
+        grid.addLayout(verdict, 2, 0, 1, 2)
+        _put(grid, 4, 0, "Seed", _beside(self.seed, another), hint="decides every order; recorded")
+        _put(grid, 4, 1, "Operator", self.operator)
+        _put(grid, 6, 0, "Language of the participant's pages", self.language)
+        _put(grid, 6, 1, "Device", self.device)
+        _put(grid, 8, 0, "Participant's screen", self.screen_choice)
+        grid.addWidget(self.windowed, 9, 1)
+        _put(grid, 10, 0, "Results folder of this study", _beside(self.results, change), across=2)
+        column.addLayout(grid)
+        column.addSpacing(10)
+        column.addWidget(Rule())
+        foot = QHBoxLayout()
+        foot.setSpacing(16)
+        foot.addWidget(self.cancel)
+        foot.addWidget(label("Nothing is created until you begin.", "label", "text2"))
+        foot.addStretch()
+        foot.addWidget(self.begin)
+        column.addSpacing(4)
+        column.addLayout(foot)
+
+    def _choose_folder(self) -> None:
+        chosen = QFileDialog.getExistingDirectory(self, "Results folder of this study", self.results.text())
+        if chosen:
+            self.results.setText(chosen)
+
+    def _check(self) -> None:
+        """Say at once whether this can begin, and if not, why and what to do."""
+        fault = self._fault()
+        if fault:
+            self._say(fault, good=False)
+        else:
+            self._say(f"{self.participant.text().strip()} is free, session {self.session.value()}", good=True)
+
+    def _fault(self) -> str:
+        """Return why this cannot begin; nothing is touched to find out."""
+        if not self.results.text().strip():
+            return "choose a results folder"
+        participant, folder = self.participant.text().strip(), StudyFolder(Path(self.results.text().strip()))
+        try:
+            check_participant(participant)
+            check_study(folder, self.facts.protocol.study.name)
+            check_unused(folder, participant, self.session.value())
+        except StoreError as error:
+            return str(error)
+        return "" if self.seed.hasAcceptableInput() else "the seed is a whole number from 0 to 2147483647"
+
+    def _say(self, words: str, *, good: bool) -> None:
+        self.verdict.setText(words[:1].upper() + words[1:])
+        set_ink(self.verdict, "ok" if good else "bad")
+        self.verdict_icon.show_icon(*(("check", "ok") if good else ("warning", "bad")))
+        self.begin.setEnabled(good)
+
+    def chosen(self) -> NewSession:
+        """Return what was chosen."""
+        return NewSession(
+            source=self.facts.source,
+            participant=self.participant.text().strip(),
+            session=self.session.value(),
+            seed=int(self.seed.text()),
+            operator=self.operator.text().strip(),
+            language=self.language.currentData(),
+            device=self.device.currentData(),
+            windowed=self.windowed.isChecked(),
+            screen=self.screen_choice.currentData(),
+            results=Path(self.results.text().strip()),
+        )
+
+
+def _field(name: str) -> QLineEdit:
+    field = QLineEdit()
+    field.setFont(font("body", tabular=True))
+    field.setAccessibleName(name)
+    return field
+
+
+def _path_field(path: Path) -> QLineEdit:
+    field = _field("Results folder of this study")
+    field.setText(str(path))
+    return field
+
+
+def _beside(field: QWidget, button: QWidget) -> QWidget:
+    both = QWidget()
+    row = QHBoxLayout(both)
+    row.setContentsMargins(0, 0, 0, 0)
+    row.setSpacing(8)
+    row.addWidget(field, 1)
+    row.addWidget(button)
+    return both
+
+
+def _put(
+    grid: QGridLayout, row: int, place: int, name: str, field: QWidget, *, hint: str = "", across: int = 1
+) -> QLabel:
+    """Put a field under its name, with a hint behind the name."""
+    named = label(name, "label", "text2")
+    head = QHBoxLayout()
+    head.setContentsMargins(0, 6 if row else 0, 0, 0)
+    head.addWidget(named)
+    head.addStretch()
+    if hint:
+        head.addWidget(label(hint, "small", "text3"))
+    named.setBuddy(field)
+    grid.addLayout(head, row, place, 1, across)
+    grid.addWidget(field, row + 1, place, 1, across)
+    return named

@@ -1,0 +1,98 @@
+"""What the home window says of protocols and sessions."""
+
+from __future__ import annotations
+
+from datetime import datetime, timedelta
+
+from study_app.gui.home.facts import BrokenFacts, StudyFacts, held, sessions, sources, started_words, study_facts
+from study_app.protocol.load import load, source_bytes
+from study_app.store.session import begin
+
+
+def start(results, participant, status=None, *, simulated=False):
+    protocol = load("demo")
+    store = begin(
+        results / "demo",
+        protocol,
+        source_bytes("demo"),
+        participant,
+        seed=1,
+        operator="AK",
+        language="en",
+        device={"name": "scripted"},
+        screens={},
+        simulated=simulated,
+    )
+    if status is None:
+        store.close()
+    else:
+        store.finish(status)
+
+
+def test_the_shipped_protocols_are_at_hand_the_demo_last():
+    assert sources()[-1] == "demo"
+    assert "rek2024" in sources()
+
+
+def test_a_protocol_is_told_by_what_one_chooses_by():
+    facts = study_facts("rek2024")
+    assert isinstance(facts, StudyFacts)
+    assert facts.extent == "2 parts, 10 settings, 62 answers"
+    assert facts.languages == "Dutch, English"
+    assert "8 N" in facts.force
+    assert facts.duration.startswith("about ")
+
+
+def test_a_broken_protocol_names_its_first_problem(tmp_path):
+    broken = tmp_path / "own.toml"
+    broken.write_text("format = 1\nsequence = [")
+    facts = study_facts(str(broken))
+    assert isinstance(facts, BrokenFacts)
+    assert "line 2" in facts.problem
+
+
+def test_sessions_that_need_care_stand_first_then_the_newest(tmp_path):
+    start(tmp_path, "P001", "complete")
+    start(tmp_path, "P002")
+    start(tmp_path, "P003", "withdrawn")
+    found = sessions(tmp_path, {"demo": 8})
+    assert [(row.participant, row.status) for row in found] == [
+        ("P002", "unfinished"),
+        ("P003", "withdrawn"),
+        ("P001", "complete"),
+    ]
+    assert (found[0].answers, found[0].answers_of) == (0, 8)
+
+
+def test_simulated_sessions_are_not_counted_as_held(tmp_path):
+    start(tmp_path, "P001", "complete", simulated=True)
+    found = sessions(tmp_path, {})
+    assert held(found, "demo") == "no session yet"
+    assert found[0].simulated
+
+
+def test_held_sessions_are_counted_with_their_ends(tmp_path):
+    start(tmp_path, "P001", "complete")
+    start(tmp_path, "P002")
+    found = sessions(tmp_path, {})
+    assert held(found, "demo") == "2 sessions, 1 complete"
+    assert held(found, "rek2024") == "no session yet"
+
+
+def test_a_folder_that_holds_something_else_is_passed_over(tmp_path):
+    start(tmp_path, "P001", "complete")
+    (tmp_path / "holiday" / "data" / "sub-x" / "ses-01").mkdir(parents=True)
+    (tmp_path / "holiday" / "data" / "sub-x" / "ses-01" / "journal.jsonl").write_text("[]\nno journal\n")
+    assert [row.participant for row in sessions(tmp_path, {}) if row.study == "demo"] == ["P001"]
+
+
+def test_no_folder_no_sessions(tmp_path):
+    assert sessions(tmp_path / "none", {}) == ()
+
+
+def test_times_are_said_as_people_say_them():
+    now = datetime(2024, 11, 20, 15, 0).astimezone()
+    assert started_words(now, now) == "Today 15:00"
+    assert started_words(now - timedelta(hours=20), now) == "Yesterday 19:00"
+    assert started_words(datetime(2024, 11, 18, 9, 5).astimezone(), now) == "18 Nov 09:05"
+    assert started_words(datetime(2023, 3, 1, 9, 5).astimezone(), now) == "1 Mar 2023 09:05"

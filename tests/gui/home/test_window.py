@@ -1,0 +1,144 @@
+"""The home window: cards, sessions, and the ways into a session or a rehearsal."""
+
+from __future__ import annotations
+
+import pytest
+from PySide6.QtCore import QProcess, Qt
+from PySide6.QtWidgets import QApplication, QPushButton
+
+from study_app.gui.home import HomeWindow
+from study_app.gui.home.cards import BrokenCard, StudyCard
+from study_app.gui.home.facts import study_facts
+from study_app.gui.home.rehearsal import RehearsalDialog, rehearsal_folder
+from study_app.gui.theme import DARK
+from study_app.protocol.load import load, source_bytes
+from study_app.store.session import begin
+
+# The platform without a screen cannot limit a dialog's size, and says so.
+pytestmark = pytest.mark.qt_log_ignore("propagateSizeHints")
+
+
+@pytest.fixture
+def results(tmp_path):
+    folder = tmp_path / "results"
+    with begin(
+        folder / "demo",
+        load("demo"),
+        source_bytes("demo"),
+        "P001",
+        seed=1,
+        operator="",
+        language="en",
+        device={"name": "mouse"},
+        screens={},
+        simulated=False,
+    ) as store:
+        store.finish("complete")
+    return folder
+
+
+@pytest.fixture
+def home(qtbot, results):
+    window = HomeWindow(results)
+    qtbot.addWidget(window)
+    window.show()
+    qtbot.waitUntil(lambda: bool(window.sessions.lines))
+    return window
+
+
+def study_cards(home):
+    return [card for card in home.grid.cards if isinstance(card, StudyCard)]
+
+
+def test_every_protocol_has_a_card_and_one_is_the_next_step(home):
+    cards = study_cards(home)
+    assert {card.facts.protocol.study.name for card in cards} >= {"rek2024", "demo"}
+    assert [card.new.property("role") for card in cards].count("primary") == 1
+
+
+def test_sessions_are_listed_with_status_and_answers(home):
+    line = home.sessions.lines[0]
+    assert line.status.word == "Complete"
+    assert line.answers.text() == "0 of 8"
+    demo = next(card for card in study_cards(home) if card.facts.protocol.study.name == "demo")
+    assert demo.held.text() == "1 session, 1 complete"
+
+
+def test_an_empty_results_folder_says_so(qtbot, tmp_path):
+    window = HomeWindow(tmp_path / "none")
+    qtbot.addWidget(window)
+    window.show_sessions()
+    assert not window.sessions.none.isHidden()
+    assert window.sessions.lines == []
+    assert not (tmp_path / "none").exists()
+
+
+def test_new_session_opens_the_questions_and_passes_the_answers_on(home, qtbot):
+    card = study_cards(home)[0]
+    qtbot.mouseClick(card.new, Qt.MouseButton.LeftButton)
+    with qtbot.waitSignal(home.session_asked) as asked:
+        qtbot.mouseClick(home.dialog.begin, Qt.MouseButton.LeftButton)
+    assert asked.args[0].source == card.facts.source
+    assert asked.args[0].participant == "P001"
+
+
+def test_a_protocol_opened_from_elsewhere_gets_a_card(home, tmp_path, monkeypatch):
+    own = tmp_path / "own.toml"
+    own.write_bytes(source_bytes("demo").replace(b'name = "demo"', b'name = "own"'))
+    chosen = [(str(own), ""), (str(tmp_path / "broken.toml"), "")]
+    (tmp_path / "broken.toml").write_text("format = 1\n")
+    monkeypatch.setattr("study_app.gui.home.window.QFileDialog.getOpenFileName", lambda *_arguments: chosen.pop(0))
+    home.open_protocol.click()
+    assert study_cards(home)[0].facts.protocol.study.name == "own"
+    home.open_protocol.click()
+    assert isinstance(home.grid.cards[0], BrokenCard)
+
+
+def test_the_theme_changes(home, qtbot):
+    qtbot.mouseClick(home.rail.switch, Qt.MouseButton.LeftButton)
+    assert home.sessions.lines[0].theme is DARK
+    assert home.rail.switch.text() == "Light theme"
+
+
+def test_a_small_window_cuts_nothing_off_sideways(home):
+    home.resize(home.minimumSize())
+    QApplication.processEvents()
+    inside = home._area.widget()
+    assert inside.width() <= home._area.viewport().width()
+    assert inside.minimumSizeHint().width() <= home._area.viewport().width()
+
+
+def test_no_button_is_dead(home):
+    home.show_studies()
+    for button in home.findChildren(QPushButton):
+        if button is not home.rail.home:  # the place one is at
+            assert button.receivers("2clicked(bool)") or button.receivers("2clicked()"), button.text()
+
+
+def test_rehearsals_get_a_folder_of_their_own(tmp_path):
+    assert rehearsal_folder(tmp_path, "demo").name == "demo-rehearsal-1"
+    (tmp_path / "demo-rehearsal-1").mkdir()
+    assert rehearsal_folder(tmp_path, "demo").name == "demo-rehearsal-2"
+
+
+def test_a_failed_rehearsal_says_why_and_stays(qtbot, tmp_path, monkeypatch):
+    dialog = RehearsalDialog(study_facts("demo"), tmp_path)
+    qtbot.addWidget(dialog)
+    dialog.open()
+    monkeypatch.setattr("study_app.gui.home.rehearsal.ARGUMENTS", ("-c", "import sys; sys.exit('no room left')"))
+    with qtbot.waitSignal(dialog.process.finished, timeout=20_000):
+        qtbot.mouseClick(dialog.start, Qt.MouseButton.LeftButton)
+    assert dialog.isVisible()
+    assert dialog.said.text() == "no room left"
+
+
+def test_cancelling_a_rehearsal_stops_it(qtbot, tmp_path, monkeypatch):
+    dialog = RehearsalDialog(study_facts("demo"), tmp_path)
+    qtbot.addWidget(dialog)
+    dialog.open()
+    monkeypatch.setattr("study_app.gui.home.rehearsal.ARGUMENTS", ("-c", "import time; time.sleep(600)"))
+    with qtbot.waitSignal(dialog.process.started, timeout=20_000):
+        qtbot.mouseClick(dialog.start, Qt.MouseButton.LeftButton)
+    qtbot.mouseClick(dialog.cancel, Qt.MouseButton.LeftButton)
+    assert dialog.process.state() == QProcess.ProcessState.NotRunning
+    assert not dialog.isVisible()

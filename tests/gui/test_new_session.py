@@ -1,0 +1,130 @@
+"""The questions before a session: checked as they are answered, and nothing created before Begin."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import Qt
+
+from study_app.gui.home.facts import study_facts
+from study_app.gui.new_session import MAX_SEED, NewSessionDialog, draw_seed
+
+# The platform without a screen cannot limit a dialog's size, and says so.
+pytestmark = pytest.mark.qt_log_ignore("propagateSizeHints")
+
+
+@pytest.fixture
+def results(tmp_path: Path) -> Path:
+    return tmp_path / "results"
+
+
+@pytest.fixture
+def dialog(qtbot, results):
+    made = NewSessionDialog(study_facts("rek2024"), results)
+    qtbot.addWidget(made)
+    made.open()
+    return made
+
+
+def use(results: Path, participant: str, session: int = 1) -> None:
+    (results / "rek2024" / "data" / f"sub-{participant}" / f"ses-{session:02d}").mkdir(parents=True)
+
+
+def files(folder: Path) -> list[Path]:
+    return sorted(folder.rglob("*"))
+
+
+def test_a_free_id_is_suggested(qtbot, results):
+    use(results, "P001")
+    use(results, "P004")
+    made = NewSessionDialog(study_facts("rek2024"), results)
+    qtbot.addWidget(made)
+    assert made.participant.text() == "P005"
+    assert made.begin.isEnabled()
+    assert "free" in made.verdict.text()
+
+
+@pytest.mark.parametrize("wrong", ["P-007", "P 7", "", "P_7", "Zoë", "x" * 33])
+def test_an_id_no_file_name_can_take_is_refused_as_it_is_typed(dialog, wrong):
+    dialog.participant.setText(wrong)
+    assert not dialog.begin.isEnabled()
+    assert repr(wrong) in dialog.verdict.text()
+    assert "P007" in dialog.verdict.text()
+
+
+@pytest.mark.parametrize("kept", ["test", "Pilot"])
+def test_ids_kept_for_pilots_are_refused(dialog, kept):
+    dialog.participant.setText(kept)
+    assert not dialog.begin.isEnabled()
+
+
+def test_a_used_id_is_refused_with_the_ways_to_go_on_until_one_is_taken(dialog, results):
+    use(results, "P007")
+    dialog.participant.setText("P007")
+    assert not dialog.begin.isEnabled()
+    for way in ("new session number (2)", "resume", "another id"):
+        assert way in dialog.verdict.text()
+    dialog.session.setValue(2)
+    assert dialog.begin.isEnabled()
+
+
+def test_a_folder_of_another_study_is_refused(dialog, tmp_path):
+    other = tmp_path / "other"
+    other.mkdir()
+    (other / "dataset_description.json").write_text('{"name": "otherstudy"}')
+    dialog.results.setText(str(other))
+    assert not dialog.begin.isEnabled()
+    assert "otherstudy" in dialog.verdict.text()
+
+
+def test_no_seed_no_session(dialog):
+    dialog.seed.setText("")
+    assert not dialog.begin.isEnabled()
+    dialog.seed.setText("12")
+    assert dialog.begin.isEnabled()
+
+
+def test_seeds_are_drawn_anew(dialog):
+    seen = {draw_seed() for _ in range(50)}
+    assert len(seen) > 40
+    assert all(1 <= seed <= MAX_SEED for seed in seen)
+    assert int(dialog.seed.text()) in range(1, MAX_SEED + 1)
+
+
+def test_cancel_creates_nothing(dialog, results, qtbot):
+    dialog.participant.setText("P009")
+    with qtbot.waitSignal(dialog.rejected):
+        qtbot.mouseClick(dialog.cancel, Qt.MouseButton.LeftButton)
+    assert files(results.parent) == []
+
+
+def test_begin_creates_nothing_by_itself_and_gives_what_was_chosen(dialog, results, qtbot):
+    dialog.participant.setText(" P009 ")
+    dialog.session.setValue(3)
+    dialog.seed.setText("4711")
+    dialog.operator.setText("AK")
+    dialog.language.setCurrentIndex(dialog.language.findData("nl"))
+    dialog.device.setCurrentIndex(dialog.device.findData("scripted"))
+    dialog.windowed.setChecked(True)
+    with qtbot.waitSignal(dialog.accepted):
+        qtbot.mouseClick(dialog.begin, Qt.MouseButton.LeftButton)
+    chosen = dialog.chosen()
+    assert (chosen.participant, chosen.session, chosen.seed, chosen.operator) == ("P009", 3, 4711, "AK")
+    assert (chosen.language, chosen.device, chosen.windowed, chosen.screen) == ("nl", "scripted", True, 1)
+    assert chosen.results == results / "rek2024"
+    assert files(results.parent) == []
+
+
+def test_enter_begins_only_what_can_begin(dialog, qtbot):
+    dialog.participant.setText("P-9")
+    with qtbot.assertNotEmitted(dialog.accepted):
+        qtbot.keyClick(dialog.participant, Qt.Key.Key_Return)
+    dialog.participant.setText("P9")
+    with qtbot.waitSignal(dialog.accepted):
+        qtbot.keyClick(dialog.participant, Qt.Key.Key_Return)
+
+
+def test_every_field_has_a_name_for_those_who_cannot_see_it(dialog):
+    fields = (dialog.participant, dialog.session, dialog.seed, dialog.operator, dialog.language, dialog.device)
+    assert all(field.accessibleName() for field in (*fields, dialog.screen_choice, dialog.results))
