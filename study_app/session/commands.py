@@ -25,13 +25,19 @@ class ShowPage:
 
 @dataclass(frozen=True, slots=True)
 class StartTrial:
-    """Load the scene of ``condition`` and follow the task. Neither condition nor delay is ever printed or logged."""
+    """Load the scene of ``condition`` and follow the task.
+
+    The tank stays for ``linger_s`` after the task, so that its end is seen. That goes by the longest delay of the
+    block, the same for all its trials: neither the participant nor any time on the disk can tell the delay from it.
+    Condition and delays are never printed or logged.
+    """
 
     trial: int
     attempt: int
     task: Explore | Reach
     condition: str = field(repr=False)
     delay_s: float = field(repr=False)
+    linger_s: float = field(repr=False)
 
 
 @dataclass(frozen=True, slots=True)

@@ -37,6 +37,8 @@ from study_app.session.events import (
 )
 from study_app.session.state import Answer, Phase, SessionState
 
+END_SHOWN_S = 0.1  # a closed ring is seen for so long before the next page
+
 Commands: TypeAlias = tuple[Command, ...]
 Result: TypeAlias = tuple[SessionState, Commands]
 
@@ -181,14 +183,16 @@ def _enter(state: SessionState, index: int, done: Commands = ()) -> Result:
 def _start_trial(state: SessionState, done: Commands) -> Result:
     state = replace(state, phase=Phase.TASK, answers={})
     trial, protocol = state.trial, state.plan.protocol
+    block = protocol.blocks[trial.block]
     condition = state.plan.condition(trial)
     told = {name: getattr(trial, name) for name in ("block", "phase", "part", "index", "of", "code")}
     start = StartTrial(
         trial=trial.number,
         attempt=state.attempt,
-        task=protocol.tasks[protocol.blocks[trial.block].task],
+        task=protocol.tasks[block.task],
         condition=condition,
         delay_s=protocol.delay_s(condition),
+        linger_s=max(protocol.delay_s(name) for name in block.conditions) + END_SHOWN_S,
     )
     written = Write("trial_started", {**_which(state), **told})
     return state, (*done, written, WriteTables(), start, _show(state))

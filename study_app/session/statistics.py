@@ -60,7 +60,13 @@ class TrialStatistics:
         self._ages_ns.append(painted_ns - shown_ns)
 
     def summary(self, samples_dropped: int) -> dict[str, Any]:
-        """Return the measured columns of the trial row; None where nothing was measured."""
+        """Return the measured columns of the trial row, to six decimals; None where nothing was measured."""
+        return {
+            name: round(value, 6) if isinstance(value, float) else value
+            for name, value in self._columns(samples_dropped).items()
+        }
+
+    def _columns(self, samples_dropped: int) -> dict[str, Any]:
         times = np.concatenate([np.empty(0, _TIMES), *self._times]).view(np.recarray)
         timed = timing(times, self._rate_hz)
         ticks = timed.ticks

@@ -1,0 +1,155 @@
+"""SIMULATED participants, for rehearsals: they read, explore, reach for what they see lit, and answer what they felt.
+
+What such a participant knows is what a person would know: the pages, the tank as it was drawn (as late as that was),
+and the force on the hand. Nothing here knows a condition.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from study_app.devices.scripted import ScriptedDevice
+from study_app.protocol.answers import Felt
+from study_app.protocol.model import Explore, Reach
+from study_app.session.pages import TextPage
+from study_app.session.runner import TankView
+from study_app.session.strokes import exploration
+
+Draw = Callable[[], float]
+
+SECONDS_PER_WORD = 0.12
+REACTION_S = (0.2, 0.35)  # from seeing a target lit to moving
+ANSWER_S = (0.8, 2.6)
+CHANGES_MIND = 0.08
+AIM_ERROR = 0.3  # of a target's radius, at most, along each axis
+CORRECTION_S = 0.35  # the hand was still for so long outside the target before it tries again
+
+
+def reading_s(page: TextPage) -> float:
+    """Return how long it takes to read a page [s]."""
+    return 1.0 + SECONDS_PER_WORD * sum(len(paragraph.split()) for paragraph in (page.title, *page.paragraphs))
+
+
+@dataclass(slots=True)
+class Senses:
+    """What reached hand and eyes in one trial; ``scale`` is scene metres per hand metre."""
+
+    scale: float
+    forces_n: list[Any] = field(default_factory=list)
+    velocities_mps: list[Any] = field(default_factory=list)
+    ages_s: list[float] = field(default_factory=list)
+
+    def feel(self, samples: Any) -> None:
+        """Take what the hand felt (recarray of ``layout.SAMPLE``), where there was a liquid."""
+        wet = samples[samples["scene"] != 0]
+        self.forces_n.append(wet["device_force_n"])
+        self.velocities_mps.append(wet["velocity_mps"])
+
+    def see(self, painted_ns: int, view: TankView) -> None:
+        """Take a frame that was seen."""
+        self.ages_s.append((painted_ns - view.sample_time_ns) * 1e-9)
+
+    def felt(self) -> Felt:
+        """Return the features that an opinion is made of."""
+        force_n = np.concatenate([np.zeros((1, 3)), *self.forces_n])
+        velocity_mps = np.concatenate([np.zeros((1, 3)), *self.velocities_mps]) / self.scale
+        norm_n, speed_mps = _norm(force_n), _norm(velocity_mps)
+        power_w = np.einsum("ij,ij->i", force_n, velocity_mps)
+        effort_w = float(np.abs(power_w).sum())
+        changes_n = _norm(np.diff(force_n, axis=0))
+        return Felt(
+            force_mean_n=float(norm_n.mean()),
+            force_peak_n=float(norm_n.max()),
+            speed_rms_mps=float(np.sqrt((speed_mps**2).mean())),
+            push_share=float(power_w[power_w > 0].sum()) / effort_w if effort_w > 0 else 0.0,
+            roughness_n=float(np.sqrt((changes_n**2).mean())) if len(changes_n) else 0.0,
+            delay_s=sum(self.ages_s) / len(self.ages_s) if self.ages_s else 0.0,
+        )
+
+
+class Explorer:
+    """Moves about for a while that it likes, then wants to go on."""
+
+    def __init__(self, task: Explore, device: ScriptedDevice, draw: Draw, now_s: float) -> None:
+        stay_s = task.min_s + (0.1 + 0.2 * draw()) * max(task.min_s, 5.0)
+        self._leave_s = now_s + min(stay_s, task.max_s)
+        device.follow(*exploration(draw, device.workspace_m, stay_s))
+
+    def act(self, now_s: float, _view: TankView) -> bool:
+        """Return whether the space bar is pressed."""
+        return now_s >= self._leave_s
+
+
+class Reacher:
+    """Reaches for the target that is seen lit, and tries again where the ball is seen to have come to rest outside."""
+
+    def __init__(self, task: Reach, device: ScriptedDevice, draw: Draw) -> None:
+        self._task = task
+        self._device = device
+        self._draw = draw
+        self._seen: int | None = None
+        self._move_s = 0.0
+        self._outside_since_s: float | None = None
+
+    def act(self, now_s: float, view: TankView) -> bool:
+        """Move the hand as what is seen asks for; the space bar is never pressed."""
+        lit = view.task.lit
+        if lit is None:
+            return False
+        if lit != self._seen:
+            self._seen = lit
+            self._move_s = now_s + _between(self._draw, *REACTION_S)
+            self._outside_since_s = None
+        elif self._move_s and now_s >= self._move_s:
+            self._reach_for(lit)
+        elif not self._move_s and not self._device.moving:
+            self._correct(now_s, view, lit)
+        return False
+
+    def _correct(self, now_s: float, view: TankView, lit: int) -> None:
+        if math.dist(view.position_m.tolist(), self._task.targets_m[lit]) <= self._task.radius_m:
+            self._outside_since_s = None
+        elif self._outside_since_s is None:
+            self._outside_since_s = now_s
+        elif now_s - self._outside_since_s >= CORRECTION_S:
+            self._outside_since_s = None
+            self._reach_for(lit)
+
+    def _reach_for(self, target: int) -> None:
+        self._move_s = 0.0
+        error_m = AIM_ERROR * self._task.radius_m
+        x, y, z = (place + error_m * _between(self._draw, -1, 1) for place in self._task.targets_m[target])
+        self._device.reach_to(x, y, z)
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """``value`` for ``item``, ``after_s`` after the choice before."""
+
+    item: str
+    value: int
+    after_s: float
+
+
+def choices(answers: dict[str, int], draw: Draw, points: int) -> list[Choice]:
+    """Return how answers are given: one after the other, sometimes first the point beside."""
+    given: list[Choice] = []
+    for item, value in answers.items():
+        if draw() < CHANGES_MIND:
+            beside = value - 1 if value == points else value + 1
+            given.append(Choice(item, beside, _between(draw, *ANSWER_S)))
+        given.append(Choice(item, value, _between(draw, *ANSWER_S)))
+    return given
+
+
+def _between(draw: Draw, low: float, high: float) -> float:
+    return low + (high - low) * draw()
+
+
+def _norm(vectors: Any) -> Any:
+    return np.sqrt(np.einsum("ij,ij->i", vectors, vectors))
