@@ -74,6 +74,20 @@ def delays(study: Study, block: Block | None = None, *, fonts: Sequence[str] | N
     ).figure
 
 
+def render(study: Study, block: Block, form: str) -> bytes:
+    """Return the figure of a block as a file of ``form`` (png, svg or pdf).
+
+    Raises
+    ------
+    AnalysisError
+        No session was completed.
+    """
+    draw = liquids if block.kind == "liquids" else delays
+    return style.file_bytes(
+        draw(study, block, fonts=style.fonts_for(form)), form, f"{study.name}: {captions.title(block)}"
+    )
+
+
 def plot(folder: Path, to: Path) -> tuple[Path, ...]:
     """Write every figure of a study as PNG, SVG and PDF, each with its caption as text, into the folder ``to``.
 
@@ -95,14 +109,9 @@ def plot(folder: Path, to: Path) -> tuple[Path, ...]:
         for block in blocks:
             name = kind if len(blocks) == 1 else f"{kind}-{block.id}"
             for form in style.FORMATS:
-                figure = _draw(study, block, style.fonts_for(form))
-                files[f"{name}.{form}"] = style.file_bytes(figure, form, f"{study.name}: {captions.title(block)}")
+                files[f"{name}.{form}"] = render(study, block, form)
             files[f"{name}.txt"] = f"{captions.caption(study, block)}\n".encode()
     return write_files(Path(to), files)
-
-
-def _draw(study: Study, block: Block, fonts: Sequence[str]) -> Figure:
-    return (liquids if block.kind == "liquids" else delays)(study, block, fonts=fonts)
 
 
 def _only(study: Study, kind: Kind) -> Block:

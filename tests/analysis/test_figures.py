@@ -215,6 +215,9 @@ def test_no_text_leaves_the_figure_or_touches_another(rek: Results, fonts, opene
             assert box.y1 <= height, word
         for (word, box), (other, beside) in combinations(boxes, 2):
             assert not box.overlaps(beside), (word, other)
+        for text in figure.texts:
+            if not text.get_text().startswith("n "):
+                assert not any(text.get_window_extent().overlaps(axes.bbox) for axes in figure.axes), text.get_text()
 
 
 def test_labels_are_at_least_as_large_as_a_journal_asks(rek: Results) -> None:
