@@ -29,11 +29,11 @@ class Felt:
     ----------
     force_mean_n, force_peak_n
         Mean and largest norm of the force sent [N].
-    speed_mean_mps
-        Mean speed of the hand [m/s].
+    speed_rms_mps
+        Root mean square of the hand's (estimated, not differenced) speed [m/s].
     push_share
-        Share, 0 to 1, of the force's total effort that lay along the motion: Σ of positive F·v over Σ |F·v|. Drag alone
-        gives 0, a wake that carries the hand more.
+        Share, 0 to 1, of the force's power that went along the motion: Σ of positive F·v over Σ |F·v|. Drag alone gives
+        0, a wake that carries the hand more.
     roughness_n
         Root mean square of the change of the force from one tick to the next [N].
     delay_s
@@ -42,7 +42,7 @@ class Felt:
 
     force_mean_n: float
     force_peak_n: float
-    speed_mean_mps: float
+    speed_rms_mps: float
     push_share: float
     roughness_n: float
     delay_s: float
@@ -67,6 +67,7 @@ class _Impression:
     """The trial in the rater's own terms, each from 0 to 1."""
 
     present: float
+    resisting: float
     thick: float
     carried: float
     abrupt: float
@@ -110,13 +111,14 @@ def _rise(value: float, middle: float, width: float) -> float:
 
 def _impression(felt: Felt, person: Rater) -> _Impression:
     force = felt.force_mean_n * person.strength
-    resistance = force / max(felt.speed_mean_mps, 0.02)
+    resistance = force / max(felt.speed_rms_mps, 0.01) ** 2  # quadratic drag: the same however fast the hand
     peak = felt.force_peak_n / max(felt.force_mean_n, 0.05)
     return _Impression(
         present=_rise(force, 0.15, 0.1),
-        thick=_rise(resistance, 12.0, 3.0),
-        carried=_rise(felt.push_share, 0.12, 0.08),
-        abrupt=_rise(peak, 6.0, 2.0),
+        resisting=_rise(resistance, 25.0, 10.0),
+        thick=_rise(resistance, 85.0, 20.0),
+        carried=_rise(felt.push_share, 0.12, 0.06),
+        abrupt=_rise(peak, 8.0, 2.0),
         rough=_rise(felt.roughness_n, 0.15, 0.05),
         noticed=_rise(felt.delay_s, person.threshold_s, 0.02),
         bothered=_rise(felt.delay_s, person.threshold_s + 0.03, 0.03),
@@ -135,9 +137,9 @@ OPINIONS: dict[str, Callable[[_Impression], float]] = {
     "strength": lambda felt: 2.5 + 3.0 * felt.present - 0.8 * felt.abrupt - 0.5 * felt.rough,
     "expected": lambda felt: 2.8 + 2.6 * felt.present - 1.2 * felt.abrupt - felt.rough,
     "like_honey": lambda felt: 1.6 + 4.2 * felt.thick * (1 - felt.carried),
-    "like_water": lambda felt: 1.6 + 4.2 * (1 - felt.thick) * (1 - 0.4 * felt.abrupt) * felt.present,
+    "like_water": lambda felt: 1.6 + 4.2 * felt.resisting * (1 - felt.thick) * (1 - 0.4 * felt.carried),
     "like_slime": lambda felt: 2.2 + 1.8 * felt.thick,
-    "like_oil": lambda felt: 2.8 + 1.0 * (1 - felt.thick) + 0.4 * felt.carried,
+    "like_oil": lambda felt: 2.6 + 1.2 * (1 - felt.thick),
     "like_tar": lambda felt: 1.4 + 3.4 * felt.thick * (1 - felt.carried),
     # what was seen
     "different": lambda felt: 1.8 + 4.4 * felt.noticed,

@@ -260,6 +260,9 @@ class Protocol(Table):
 def schema(of: type[BaseModel] = Protocol) -> dict[str, Any]:
     """Return the JSON Schema of a protocol file, for editors that complete and check while one writes."""
     described = of.model_json_schema()
+    for node in described["properties"].values():
+        if "patternProperties" in node:
+            node["additionalProperties"] = False
     for table in ("Liquid", "Block"):  # their id is the name of their table
         for part in described["$defs"].values():
             if part.get("title") == table:

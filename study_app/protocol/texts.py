@@ -36,7 +36,7 @@ def _tidy_each(value: Any) -> Any:
 
 
 Localised: TypeAlias = Annotated[
-    str | dict[Language, str],
+    str | dict[str, str],
     BeforeValidator(_tidy_each),
     Field(description="A text: one string, or one string per language of the study."),
 ]

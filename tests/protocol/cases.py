@@ -119,6 +119,24 @@ questionnaire = "short"
 """
 
 
+MORE_ITEMS = """\
+[questionnaires.more]
+intro = { en = "How much?", nl = "Hoeveel?" }
+scale = "agreement"
+[[questionnaires.more.items]]
+id = "cold"
+text = { en = "Icy.", nl = "IJzig." }
+short = { en = "Icy", nl = "IJzig" }
+
+"""
+
+MANY_LIQUIDS = (
+    "".join(f"[liquids.extra_{number}]\ndensity_kg_m3 = 1000\n" for number in range(9))
+    + "[conditions.crowd]\n"
+    + f"liquids = {[f'extra_{number}' for number in range(9)]}\n".replace("'", '"')
+)
+
+
 class Expected(NamedTuple):
     """A problem: text of the line it must point at (None: no line), its place, words of its sentence and hint."""
 
@@ -212,6 +230,11 @@ CASES = (
          ("effects", "liquids.thin.effects.2", 'did you mean "wake"?')),
     case("name of the study", 'name = "small"', 'name = "a_small"',
          ("a_small", "study.name", "small letters and digits, a letter first, no underscore")),
+    case("long name of the study", 'name = "small"', f'name = "{"a" * 41}"',
+         ("name = \"aaa", "study.name", "is longer than 40 characters")),
+    case("list for tables", "[scales.agreement]", "[[scales]]",
+         ("[[scales]]", "scales", "must be a table, not an array"),
+         ('scale = "agreement"', "questionnaires.short.scale", 'there is no scale "agreement"')),
     case("name of a table", "[conditions.is_thick]", "[conditions.isThick]",
          ("[conditions.isThick]", "conditions.isThick", "small letters, digits and underscores"),
          ("is_thick", "blocks.feel.conditions.2", 'there is no condition "is_thick"')),
@@ -274,8 +297,19 @@ CASES = (
     case("liquid twice", '["thin", "thick"]', '["thin", "thin"]', ("liquids =", "conditions.both.liquids.2", "twice")),
     case("item twice", 'id = "cold"', 'id = "warm"',
          ('id = "warm"\ntext = { en = "It is cold', "questionnaires.short.items.2.id", 'a second item "warm"')),
+    case("item without id", 'id = "cold"\n', "",
+         ('[[questionnaires.short.items]]\ntext', "questionnaires.short.items.2.id", "is missing")),
+    case("item with two texts", "[pages.hello]", MORE_ITEMS + "[pages.hello]",
+         ('id = "cold"\ntext = { en = "Icy', "questionnaires.more.items.1.id", 'item "cold" has another text')),
+    case("page named like a block", "[pages.hello.body]", "[pages.feel]\nkind = 3\n[pages.hello.body]",
+         ("[pages.feel]", "pages.feel.title", "is missing"),
+         ("[pages.feel]", "pages.feel.body", "is missing"),
+         ("kind = 3", "pages.feel.kind", '3 is not "consent"'),
+         ("[blocks.feel]", "blocks.feel", "a page has this name too")),
     # languages
-    case("language without words", 'languages = ["en", "nl"]', 'languages = ["en", "nl", "nl"]',
+    case("no languages", 'languages = ["en", "nl"]', "languages = []",
+         ("languages", "study.languages", "has 0 entries, needs at least 1")),
+    case("language twice", 'languages = ["en", "nl"]', 'languages = ["en", "nl", "nl"]',
          ("languages", "study.languages.3", '"nl" is there twice')),
     case("text in one language", 'short = { en = "Cold", nl = "Koud" }', 'short = "Cold"',
          ('short = "Cold"', "questionnaires.short.items.2.short", 'write { en = "…", nl = "…" }')),
@@ -285,7 +319,11 @@ CASES = (
          ("labels.en", "scales.agreement.labels", 'is missing in "nl"')),
     case("text in a language too many", 'nl = "Lees dit."', 'nl = "Lees dit."\nde = "Lies das."',
          ("Lies das", "pages.hello.body.de", "not a language of the study")),
+    case("language that is no code", 'nl = "Lees dit."', 'nl = "Lees dit."\nDutch = "Lees dit."',
+         ("Dutch", "pages.hello.body.Dutch", "not a language of the study")),
     # between tables
+    case("too many liquids", "[conditions.is_thin]", MANY_LIQUIDS + "[conditions.is_thin]",
+         ('liquids = ["extra_0"', "conditions.crowd.liquids", "has more than 8 liquids")),
     case("target outside", "[30, 0, 0]", "[46, 0, 0]",
          ("[46, 0, 0]", "tasks.reach.targets_mm.2", "x = 46 mm with radius 6 mm leaves the tank")),
     case("practice in a judged liquid", 'liquid = "other"', 'liquid = "thick"',

@@ -3,9 +3,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from study_app.errors import ProtocolError
+from study_app.errors import Problem, ProtocolError
+from study_app.protocol.describe import describe
 from study_app.protocol.load import load, load_scene, parse, protocol_hash, shipped, source_bytes
+from study_app.protocol.schedule import build_schedule
 from tests.protocol.cases import BROKEN, CASES, SOUND, Case
 
 
@@ -134,3 +138,32 @@ def test_an_unknown_liquid_is_named_with_the_nearest():
     with pytest.raises(ProtocolError, match='there is no liquid "hony"') as caught:
         load_scene("rek2024", "hony")
     assert 'did you mean "honey"?' in str(caught.value)
+
+
+LINES = SOUND.splitlines()
+VALUES = ["3", "-1.5", "true", '""', '"thin"', "[]", "[1, [2]]", "{}", "{ en = 1 }", '["thin"]', "1979-05-27", "inf"]
+
+
+@given(
+    st.lists(
+        st.tuples(st.integers(0, len(LINES) - 1), st.sampled_from(["drop", "double", *VALUES])), min_size=1, max_size=5
+    )
+)
+def test_whatever_is_changed_gives_a_protocol_or_a_list_of_problems(changes: list[tuple[int, str]]):
+    lines = list(LINES)
+    for number, change in changes:
+        if change == "drop":
+            lines[number] = ""
+        elif change == "double":
+            lines[number] += "\n" + lines[number]
+        elif " = " in lines[number]:
+            lines[number] = lines[number].split(" = ")[0] + " = " + change
+    problems: tuple[Problem, ...] = ()
+    try:
+        protocol = parse("\n".join(lines).encode(), "file.toml")
+    except ProtocolError as error:
+        problems = error.problems
+    else:
+        assert build_schedule(protocol, "P1", 1).trials
+        assert describe(protocol)
+    assert all(problem.message and problem.place for problem in problems)

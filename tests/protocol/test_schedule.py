@@ -110,7 +110,7 @@ def test_orders_of_many_participants_are_even():
 
 
 def test_orders_of_the_parts_are_independent():
-    """First liquid (3) and first delay (7) of 2100 participants, a 3 × 7 table: χ², 12 degrees of freedom, p = 0.001."""
+    """First liquid (3) and first delay (7) of 2100 participants, a 3 × 7 table: χ², 12 degrees of freedom, p 0.001."""
     table: Counter[tuple[str, str]] = Counter()
     for number in range(2100):
         schedule = build_schedule(REK, f"P{number}", 3)

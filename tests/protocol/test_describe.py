@@ -1,0 +1,104 @@
+from __future__ import annotations
+
+import pytest
+
+from study_app.protocol.describe import describe, expected_duration_s
+from study_app.protocol.load import load, parse
+from tests.protocol.cases import SOUND
+
+REK = load("rek2024")
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "Feeling simulated liquids (rek2024, version 1.0)",
+        "Languages          en, nl",
+        "Parts              2",
+        "Answers            62 per participant",
+        "Expected duration  about 18 min",
+        "Force limit        8 N",
+        "100 × 60 × 60 mm of the hand, drawn and felt 10 times as large",
+        "68 mm, 6.8 mm of the hand",
+        "Part 1: Baseline settings (block liquids, main)",
+        "Trials       7 trials, another order for each participant",
+        "Recorded as  D1, D2, D3, D4, D5, D6, D7",
+        "explore for 30 to 120 s",
+        "9 statements (questionnaire liquid), in the order written",
+        "for 30 s",
+        "until 12 are reached, at most 120 s",
+        "water      1000 kg/m³  drag, wake  1700    1700  0.75",
+        "honey      1400 kg/m³  drag        –       –     –",
+        "light_oil  4500 kg/m³  drag, wake  125     250   0.25",
+        "delay_125  water      seen 125 ms late",
+        "like_honey    This liquid behaves like honey.",
+        "from 1 (Completely disagree) to 7 (Completely agree)",
+    ],
+)
+def test_the_thesis_study_in_words(words: str):
+    assert words in describe(REK)
+
+
+def test_every_page_block_condition_and_item_is_told():
+    told = describe(REK)
+    for page in REK.pages.values():
+        assert REK.text(page.title, "en") in told
+    for name in (*REK.blocks, *REK.conditions, *REK.liquids, *REK.questionnaires):
+        assert name in told
+    for questionnaire in REK.questionnaires.values():
+        for item in questionnaire.items:
+            assert REK.text(item.text, "en") in told
+
+
+def test_no_line_ends_in_blanks():
+    assert all(line == line.rstrip() for line in describe(REK).splitlines())
+
+
+def edited(*edits: tuple[str, str]):
+    text = SOUND
+    for old, new in edits:
+        assert text.count(old) == 1
+        text = text.replace(old, new)
+    return parse(text.encode(), "small.toml")
+
+
+def test_what_only_some_protocols_have():
+    told = describe(
+        edited(
+            ('order = "shuffled"\nrepetitions = 2', "repetitions = 2"),
+            ('scale = "agreement"', 'scale = "agreement"\nitem_order = "shuffled"'),
+            ("labels.nl", 'cannot_judge = { en = "No idea", nl = "Geen idee" }\nlabels.nl'),
+            ('id = "cold"', 'id = "cold"\nrequired = false'),
+            ('liquids = ["thin", "thick"]', 'liquids = ["thin", "other"]'),
+            ('conditions = ["apart"]', 'conditions = ["practised"]'),
+            ('[conditions.apart]\nliquid = "other"', '[conditions.practised]\nliquid = "syrup"'),
+            (
+                "[liquids.other]",
+                "[liquids.spare]\ndensity_kg_m3 = 900\n[liquids.syrup]\ndensity_kg_m3 = 900\n[liquids.other]",
+            ),
+        )
+    )
+    assert "4 trials, every condition 2 times, in the order written: who reads the protocol can tell the codes" in told
+    assert "in another order each time" in told
+    assert 'to 7 (g), or "No idea"' in told
+    assert "(may be left out)" in told
+    assert "both       thin + other  seen 120 ms late" in told
+    assert told.count("in no condition") == 1
+
+
+def test_the_expected_duration_counts_every_trial():
+    """A third repetition adds two trials of exploring and answering."""
+    before = expected_duration_s(edited(("repetitions = 2", "repetitions = 1")))
+    assert expected_duration_s(edited(("repetitions = 2", "repetitions = 3"))) - before == pytest.approx(
+        4 * (6 + 5 + 2 * 6)
+    )
+
+
+def test_a_task_never_lasts_longer_than_its_timeout():
+    long = edited(("count = 4", "count = 400"))
+    short = edited(("count = 4", "count = 4"))
+    assert expected_duration_s(long) - expected_duration_s(short) == pytest.approx(2 * (60 - 4 * 2))
+
+
+def test_the_demo_takes_three_minutes():
+    assert expected_duration_s(load("demo")) == pytest.approx(180, abs=30)

@@ -1,0 +1,131 @@
+from __future__ import annotations
+
+import json
+import re
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from study_app.protocol.load import SceneFile
+from study_app.protocol.model import schema
+from tests.protocol.cases import SOUND, case
+
+SCHEMA = schema()
+PROTOCOLS = Path(__file__).parents[2] / "protocols"
+TYPES = {
+    "string": str,
+    "object": dict,
+    "array": list,
+    "boolean": bool,
+    "integer": int,
+    "number": int | float,
+    "null": type(None),
+}
+
+
+def complaints(value: Any, node: dict[str, Any], path: str = "") -> Iterator[str]:
+    """Validate ``value`` as an editor would: the part of JSON Schema that ours uses."""
+    if "$ref" in node:
+        yield from complaints(value, SCHEMA["$defs"][node["$ref"].rsplit("/", 1)[-1]], path)
+        return
+    for key in ("anyOf", "oneOf"):
+        if key in node and all(list(complaints(value, branch, path)) for branch in node[key]):
+            yield f"{path}: none of the alternatives"
+    if "type" in node and (
+        not isinstance(value, TYPES[node["type"]]) or (isinstance(value, bool) and node["type"] != "boolean")
+    ):
+        yield f"{path}: not {node['type']}"
+        return
+    if "const" in node and value != node["const"]:
+        yield f"{path}: not {node['const']}"
+    if "enum" in node and value not in node["enum"]:
+        yield f"{path}: not in {node['enum']}"
+    if isinstance(value, dict):
+        yield from object_complaints(value, node, path)
+    elif isinstance(value, list):
+        inner = node.get("prefixItems", [])
+        for index, entry in enumerate(value):
+            yield from complaints(
+                entry, inner[index] if index < len(inner) else node.get("items", {}), f"{path}/{index}"
+            )
+        if not node.get("minItems", 0) <= len(value) <= node.get("maxItems", 10**9):
+            yield f"{path}: {len(value)} items"
+    elif isinstance(value, str):
+        if not re.search(node.get("pattern", ""), value):
+            yield f"{path}: pattern"
+    elif isinstance(value, int | float):
+        low, high = node.get("minimum", -1e99), node.get("maximum", 1e99)
+        if not low <= value <= high or not node.get("exclusiveMinimum", -1e99) < value:
+            yield f"{path}: range"
+
+
+def object_complaints(value: dict[str, Any], node: dict[str, Any], path: str) -> Iterator[str]:
+    for name in node.get("required", ()):
+        if name not in value:
+            yield f"{path}: {name} is missing"
+    for name, entry in value.items():
+        if name in node.get("properties", {}):
+            yield from complaints(entry, node["properties"][name], f"{path}/{name}")
+            continue
+        patterns = [inner for pattern, inner in node.get("patternProperties", {}).items() if re.search(pattern, name)]
+        for inner in patterns:
+            yield from complaints(entry, inner, f"{path}/{name}")
+        if not patterns and node.get("additionalProperties") is False:
+            yield f"{path}: {name} is unknown"
+
+
+@pytest.mark.parametrize("name", sorted(path.stem for path in PROTOCOLS.glob("*.toml")))
+def test_the_schema_accepts_what_ships(name: str):
+    document = tomllib.loads((PROTOCOLS / f"{name}.toml").read_text(encoding="utf-8"))
+    assert list(complaints(document, SCHEMA)) == []
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("rate_hz = 1000", "rate = 1000"),
+        ('order = "shuffled"\nrepetitions', 'order = "shufled"\nrepetitions'),
+        ("force_limit_n = 8", "force_limit_n = 9"),
+        ("density_kg_m3 = 1400", 'density_kg_m3 = "heavy"'),
+        ('kind = "explore"', 'kind = "wander"'),
+        ("[conditions.is_thick]", "[conditions.isThick]"),
+        ('task = "reach"\n', ""),
+        ("format = 1", "format = 2"),
+    ],
+)
+def test_the_schema_refuses_what_the_program_refuses(old: str, new: str):
+    assert list(complaints(tomllib.loads(SOUND), SCHEMA)) == []
+    assert list(complaints(tomllib.loads(case("", old, new).text), SCHEMA)) != []
+
+
+def test_the_schema_is_json_and_says_which():
+    assert json.loads(json.dumps(SCHEMA)) == SCHEMA
+    assert SCHEMA["$schema"].startswith("https://json-schema.org/")
+
+
+def test_every_reference_of_the_schema_leads_somewhere():
+    references = re.findall(r'"\$ref": "#/\$defs/(\w+)"', json.dumps(SCHEMA))
+    assert references
+    assert set(references) <= set(SCHEMA["$defs"])
+
+
+def test_names_of_tables_are_not_asked_for_again():
+    assert "id" not in SCHEMA["$defs"]["Block"]["properties"]
+    assert "id" not in SCHEMA["$defs"]["Liquid"]["required"]
+    assert "id" in SCHEMA["$defs"]["Item"]["required"]
+
+
+def test_every_key_is_described():
+    """An editor shows what a key means (the models of the force model describe theirs in the table)."""
+    ours = {"StudyHead", "DeviceNeeds", "SceneDefaults", "Condition", "Scale", "Item", "Questionnaire", "PageText",
+            "Block", "Limits", "Explore", "Reach"}  # fmt: skip
+    for name in ours:
+        for key, node in SCHEMA["$defs"][name]["properties"].items():
+            assert "description" in node or key == "kind", f"{name}.{key}"
+
+
+def test_scene_files_have_a_schema_of_their_own():
+    assert "rate_hz" in schema(SceneFile)["$defs"]["SceneTable"]["properties"]
