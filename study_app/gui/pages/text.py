@@ -1,0 +1,256 @@
+"""Pages to read: consent, instructions, breaks, the debrief; the pause; trouble; the end."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QRectF, Qt
+from PySide6.QtGui import QColor, QKeyEvent, QPainter, QPaintEvent, QPen, QPixmap
+from PySide6.QtWidgets import QFrame, QLabel, QScrollArea, QVBoxLayout, QWidget
+
+from study_app.gui.icons import draw_icon
+from study_app.gui.keys import GoButton
+from study_app.gui.pages.base import PageWidget, page_scale
+from study_app.gui.progress import ProgressLine
+from study_app.gui.theme import PARTICIPANT, RADIUS_CARD, font
+from study_app.session.events import Continue, ResumeAsked
+from study_app.session.pages import EndPage, PausePage, TextPage, TroublePage
+
+if TYPE_CHECKING:
+    from study_app.protocol.words import Words
+
+ICONS = {"consent": "pen", "instructions": "drop", "break": "clock", "debrief": "check"}
+COLUMN = 700.0  # a line that reads well [logical px at scale 1]
+LINE_PERCENT = 150
+SCROLLBAR = 16
+VEIL = 0.80  # how much of the page under a pause is hidden
+
+
+def paragraphs_html(paragraphs: tuple[str, ...], gap: float) -> str:
+    """Return paragraphs with room between their lines, for a QLabel."""
+    style = f"line-height: {LINE_PERCENT}%; margin: 0 0 {round(gap)}px 0"
+    return "".join(f'<p style="{style}">{html.escape(text)}</p>' for text in paragraphs)
+
+
+class Badge(QWidget):
+    """An icon in a disc: what kind of page this is, before a word is read."""
+
+    def __init__(self, icon: str, colour: str, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._icon = icon
+        self._colour = colour
+        self.set_scale(1.0)
+
+    def set_scale(self, scale: float) -> None:
+        """Grow with the page."""
+        side = round(56 * scale)
+        self.setFixedSize(side, side)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802
+        """Draw the disc and the icon."""
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        disc = QRectF(self.rect()).adjusted(1, 1, -1, -1)
+        painter.setPen(QPen(QColor(PARTICIPANT.border), 1))
+        painter.setBrush(QColor(PARTICIPANT.surface))
+        painter.drawEllipse(disc)
+        inset = disc.width() * 0.27
+        draw_icon(painter, self._icon, disc.adjusted(inset, inset, -inset, -inset), self._colour)
+        painter.end()
+
+
+class Column(QWidget):
+    """Badge, title and paragraphs under each other; scrolls only if a small window cannot show them all."""
+
+    def __init__(
+        self, icon: str, title: str, paragraphs: tuple[str, ...], colour: str = PARTICIPANT.accent, *, parent: QWidget
+    ) -> None:
+        super().__init__(parent)
+        self._paragraphs = paragraphs
+        self._badge = Badge(icon, colour)
+        self._title = QLabel(title)
+        self._title.setWordWrap(True)
+        self._body = QLabel()
+        self._body.setWordWrap(True)
+        self._body.setTextFormat(Qt.TextFormat.RichText)
+        self._layout = QVBoxLayout(self)
+        self._layout.setContentsMargins(0, 0, 0, 0)
+        self._layout.addWidget(self._badge)
+        self._layout.addWidget(self._title)
+        self._layout.addWidget(self._body)
+        self._layout.addStretch(1)
+        for label, ink in ((self._title, PARTICIPANT.text), (self._body, PARTICIPANT.text2)):
+            label.setStyleSheet(f"color: {ink}; background: transparent;")
+
+    def set_scale(self, scale: float) -> None:
+        """Grow with the page."""
+        self._badge.set_scale(scale)
+        self._title.setFont(font("display", scale=scale))
+        self._body.setFont(font("statement", scale=scale * 1.125))
+        self._body.setText(paragraphs_html(self._paragraphs, 10 * scale))
+        self._layout.setSpacing(round(14 * scale))
+
+    def needed(self, width: int) -> int:
+        """Return the height [px] that the texts need in a column of ``width``."""
+        return self._layout.heightForWidth(width)
+
+
+class ReadingPage(PageWidget):
+    """A progress line, a column of text in the middle, and perhaps one button."""
+
+    def __init__(
+        self,
+        column: tuple[str, str, tuple[str, ...], str],
+        words: Words,
+        clock: Callable[[], float],
+        *,
+        button: tuple[str, str] | None = None,
+        progress: ProgressLine | None = None,
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(words, clock, parent)
+        icon, title, paragraphs, colour = column
+        self.setAccessibleName(title)
+        self.setAccessibleDescription("\n".join(paragraphs))
+        self._progress = progress
+        if progress is not None:
+            progress.setParent(self)
+        self._scroll = QScrollArea(self)
+        self._scroll.setFrameShape(QFrame.Shape.NoFrame)
+        self._scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self._scroll.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self._column = Column(icon, title, paragraphs, colour, parent=self._scroll)
+        self._scroll.setWidget(self._column)
+        self._scroll.viewport().setAutoFillBackground(False)
+        self._column.setAutoFillBackground(False)
+        self._content = QRectF()
+        self.button = GoButton(*button, parent=self) if button is not None else None
+        if self.button is not None:
+            self.button.clicked.connect(self.go_on)
+
+    def go_on(self) -> None:
+        """Do what the page's button says."""
+
+    def lay_out(self, scale: float) -> None:
+        """Put the column into the middle, a little above it, the button under its left edge."""
+        margin = round((40 if self.width() >= 1100 else 24) * scale)
+        top = round(20 * scale)
+        if self._progress is not None:
+            self._progress.set_scale(scale)
+            self._progress.setGeometry(margin, top, self.width() - 2 * margin, self._progress.height())
+            top += self._progress.height()
+        width = min(round(COLUMN * scale), self.width() - 2 * margin)
+        self._column.set_scale(scale)
+        foot = 0
+        if self.button is not None:
+            self.button.set_scale(scale)
+            foot = self.button.height() + round(28 * scale)
+        room = self.height() - top - round(48 * scale) - foot
+        needed = self._column.needed(width)
+        height = min(needed, room)
+        self._column.setFixedSize(width, needed)
+        y = top + round(24 * scale) + round((room - height) * 0.42)
+        x = (self.width() - width) // 2
+        self._scroll.setGeometry(x, y, width + (SCROLLBAR if needed > height else 0), height)
+        policy = Qt.ScrollBarPolicy
+        self._scroll.setVerticalScrollBarPolicy(
+            policy.ScrollBarAlwaysOn if needed > height else policy.ScrollBarAlwaysOff
+        )
+        self._content = QRectF(x, y, width, height + foot)
+        if self.button is not None:
+            self.button.move(x - 4, y + height + round(28 * scale))
+
+
+class TextWidget(ReadingPage):
+    """Consent, instructions, a break or the debrief.
+
+    Space or Enter goes on; a consent asks for more: its button, or Enter.
+    """
+
+    def __init__(self, page: TextPage, words: Words, clock: Callable[[], float], parent: QWidget | None = None) -> None:
+        self._consent = page.kind == "consent"
+        key = words.enter_key if self._consent else words.space_key
+        progress = ProgressLine(page.progress, words, 0.0) if page.progress is not None else None
+        column = (ICONS[page.kind], page.title, page.paragraphs, PARTICIPANT.accent)
+        super().__init__(column, words, clock, button=(page.button, key), progress=progress, parent=parent)
+
+    def focus_first(self) -> None:
+        """Leave the consent's button alone: Space must not agree by itself."""
+        if self._consent or self.button is None:
+            self.setFocus()
+        else:
+            self.button.setFocus()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802
+        """Go on with Enter, and but for a consent with Space."""
+        enter = event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter)
+        space = event.key() == Qt.Key.Key_Space and not self._consent
+        if (enter or space) and not event.isAutoRepeat():
+            self.go_on()
+        else:
+            super().keyPressEvent(event)
+
+    def go_on(self) -> None:
+        """Tell that the participant goes on."""
+        self.event_made.emit(Continue(self._clock()))
+
+
+class PauseWidget(ReadingPage):
+    """The pause, over the page that it interrupts; after a force stop it says that the force is off."""
+
+    def __init__(
+        self,
+        page: PausePage,
+        words: Words,
+        clock: Callable[[], float],
+        *,
+        under: QPixmap | None = None,
+        parent: QWidget | None = None,
+    ) -> None:
+        self.under = under
+        if page.force_off:
+            column = ("stop", words.force_off_title, (words.force_off_body,), PARTICIPANT.bad)
+            label = words.force_on
+        else:
+            column = ("pause", words.pause_title, (words.pause_body,), PARTICIPANT.accent)
+            label = words.resume
+        super().__init__(column, words, clock, button=(label, words.enter_key), parent=parent)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802
+        """Go on with Enter; Space alone could still be the key of the page before."""
+        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter) and not event.isAutoRepeat():
+            self.go_on()
+        else:
+            super().keyPressEvent(event)
+
+    def go_on(self) -> None:
+        """Ask to go on with the session."""
+        self.event_made.emit(ResumeAsked(self._clock()))
+
+    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802
+        """Paint the page below as a shade, and a card on it."""
+        super().paintEvent(event)
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        if self.under is not None and not self.under.isNull():
+            painter.setOpacity(1 - VEIL)
+            painter.drawPixmap(self.rect(), self.under)
+            painter.setOpacity(1.0)
+        space = 40 * page_scale(self.width(), self.height())
+        painter.setPen(QPen(QColor(PARTICIPANT.border), 1))
+        painter.setBrush(QColor(PARTICIPANT.window))
+        painter.drawRoundedRect(self._content.adjusted(-space, -space, space, space), 2 * RADIUS_CARD, 2 * RADIUS_CARD)
+        painter.end()
+
+
+class NoticeWidget(ReadingPage):
+    """Something broke, or the session is over: a calm sentence and nothing to do."""
+
+    def __init__(
+        self, page: TroublePage | EndPage, words: Words, clock: Callable[[], float], parent: QWidget | None = None
+    ) -> None:
+        ended = isinstance(page, EndPage)
+        icon, colour = ("check", PARTICIPANT.ok) if ended else ("info", PARTICIPANT.warn)
+        super().__init__((icon, page.title, (page.paragraph,), colour), words, clock, parent=parent)

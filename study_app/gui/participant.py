@@ -1,0 +1,229 @@
+"""The participant's window: one page at a time, whole before it is seen; Esc pauses, and held it stops the force."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QEvent, QSize, Qt, QTimer, Signal
+from PySide6.QtGui import QCloseEvent, QColor, QKeyEvent, QPainter, QPaintEvent, QPixmap, QResizeEvent, QScreen
+from PySide6.QtWidgets import QWidget
+
+from study_app.gui.pages.base import PageWidget
+from study_app.gui.pages.questionnaire import QuestionnaireWidget
+from study_app.gui.pages.text import NoticeWidget, PauseWidget, ReadingPage, TextWidget
+from study_app.gui.pointer import PointerCapture
+from study_app.gui.scene_view import TankWidget
+from study_app.gui.theme import PARTICIPANT, font, load_fonts, stylesheet
+from study_app.session.events import Continue, ForceStopped, PauseAsked
+from study_app.session.pages import (
+    EndPage,
+    Page,
+    PausePage,
+    QuestionnairePage,
+    TaskPage,
+    TextPage,
+    TroublePage,
+)
+
+if TYPE_CHECKING:
+    from study_app.protocol.words import Words
+    from study_app.session.runner import TankView
+
+HOLD_MS = 600
+LEAST_SIZE = QSize(1024, 640)
+WINDOWED_SIZE = QSize(1366, 768)
+
+
+class ParticipantWindow(QWidget):
+    """Shows pages and says what the participant does.
+
+    Parameters
+    ----------
+    words : the interface's words in the participant's language
+    clock : seconds since the session's origin, for the events' times
+    windowed : a window of at least 1024 × 640 instead of the whole screen
+    captures_pointer : hold and hide the pointer in the tank, because it is the device
+
+    ``event`` carries the session's events; ``pointer`` the hand's place [m] and ``buttons`` the buttons' bits while the
+    pointer is captured; ``painted`` (time painted, time of the sample) [ns] of every view that was drawn.
+    """
+
+    event = Signal(object)  # type: ignore[assignment]  # hides QWidget.event() from Python, not from Qt
+    pointer = Signal(float, float, float)
+    buttons = Signal(int)
+    painted = Signal(object, object)
+
+    def __init__(
+        self, words: Words, *, clock: Callable[[], float], windowed: bool = False, captures_pointer: bool = False
+    ) -> None:
+        super().__init__()
+        load_fonts()
+        self._words = words
+        self._clock = clock
+        self._windowed = windowed
+        self._captures = captures_pointer
+        self._page: Page | None = None
+        self._widget: PageWidget | TankWidget = ReadingPage(
+            ("clock", words.preparing, (), PARTICIPANT.accent), words, clock, parent=self
+        )
+        self._capture = PointerCapture(self)
+        self._capture.moved.connect(self.pointer)
+        self._capture.pressed.connect(self.buttons)
+        self._hold = QTimer(self)
+        self._hold.setSingleShot(True)
+        self._hold.setInterval(HOLD_MS)
+        self._hold.timeout.connect(self._stop_force)
+        self.setWindowTitle(words.window_title)
+        self.setObjectName("participant")
+        self.setFont(font("body"))
+        self.setStyleSheet(stylesheet(PARTICIPANT))
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setMinimumSize(LEAST_SIZE)
+
+    @property
+    def page(self) -> Page | None:
+        """The page that is shown; None before the first."""
+        return self._page
+
+    @property
+    def widget(self) -> PageWidget | TankWidget:
+        """What draws the page."""
+        return self._widget
+
+    @property
+    def tank(self) -> TankWidget | None:
+        """The tank, while it is shown."""
+        return self._widget if isinstance(self._widget, TankWidget) else None
+
+    def open_on(self, screen: QScreen | None = None) -> None:
+        """Open the window on ``screen`` (or where the system puts it), full-screen unless windowed."""
+        if screen is not None:
+            self.setScreen(screen)
+            self.move(screen.geometry().topLeft())
+        if self._windowed:
+            room = self.screen().availableSize()
+            self.resize(WINDOWED_SIZE.boundedTo(room).expandedTo(LEAST_SIZE))
+            self.show()
+        else:
+            self.showFullScreen()
+        self.activateWindow()
+        self._widget.setFocus()
+
+    def show_page(self, page: Page) -> None:
+        """Put a page in place of the present one, whole and at once."""
+        self._capture.release()
+        self._hold.stop()
+        old = self._widget
+        made = self._make(page, old)
+        made.setGeometry(self.rect())
+        if isinstance(made, TankWidget):
+            made.prepare()
+        self._page, self._widget = page, made
+        made.show()
+        made.raise_()
+        old.hide()
+        old.deleteLater()
+        if isinstance(made, TankWidget):
+            self._enter_tank(made, made.page)
+        else:
+            made.focus_first()
+
+    def show_view(self, view: TankView) -> None:
+        """Draw a view in the tank, while it is shown."""
+        if self.tank is not None:
+            self.tank.show_view(view)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802
+        """Hear Esc, and in the tank Space and Enter."""
+        if event.isAutoRepeat():
+            return
+        key = event.key()
+        if key == Qt.Key.Key_Escape:
+            self._hold.start()
+        elif key in (Qt.Key.Key_Space, Qt.Key.Key_Return, Qt.Key.Key_Enter) and self._may_leave_tank():
+            self.event.emit(Continue(self._clock()))
+        else:
+            super().keyPressEvent(event)
+
+    def keyReleaseEvent(self, event: QKeyEvent) -> None:  # noqa: N802
+        """Take a short Esc as a pause."""
+        if event.key() == Qt.Key.Key_Escape and not event.isAutoRepeat() and self._hold.isActive():
+            self._hold.stop()
+            self._pause()
+        else:
+            super().keyReleaseEvent(event)
+
+    def changeEvent(self, event: QEvent) -> None:  # noqa: N802
+        """Let the pointer go and pause when another window is activated."""
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.ActivationChange and not self.isActiveWindow():
+            self._hold.stop()
+            if self._capture.held:
+                self._capture.release()
+                self._pause()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
+        """Let the page fill the window."""
+        super().resizeEvent(event)
+        self._widget.setGeometry(self.rect())
+
+    def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802
+        """Do not let the participant close a session by accident: that is a pause."""
+        if event.spontaneous() and not isinstance(self._page, EndPage | None):
+            event.ignore()
+            self._pause()
+            return
+        self._capture.release()
+        super().closeEvent(event)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802
+        """Fill what no page covers."""
+        painter = QPainter(self)
+        painter.fillRect(self.rect(), QColor(PARTICIPANT.window))
+        painter.end()
+
+    def _make(self, page: Page, old: QWidget) -> PageWidget | TankWidget:
+        words, clock = self._words, self._clock
+        made: PageWidget
+        match page:
+            case TaskPage():
+                tank = TankWidget(page, words, self)
+                tank.painted.connect(self.painted)
+                return tank
+            case QuestionnairePage():
+                made = QuestionnaireWidget(page, words, clock, self)
+            case TextPage():
+                made = TextWidget(page, words, clock, self)
+            case PausePage():
+                made = PauseWidget(page, words, clock, under=_picture(old), parent=self)
+            case TroublePage() | EndPage():
+                made = NoticeWidget(page, words, clock, self)
+        made.event_made.connect(self.event)
+        return made
+
+    def _enter_tank(self, tank: TankWidget, page: TaskPage) -> None:
+        """Give the keyboard to the window, and the pointer to the hand if it is the device."""
+        self.activateWindow()
+        self.setFocus()
+        tank.setCursor(Qt.CursorShape.BlankCursor)
+        if self._captures:
+            self._capture.take(tank, page.workspace_m)
+
+    def _may_leave_tank(self) -> bool:
+        return self.tank is not None and self.tank.may_leave
+
+    def _pause(self) -> None:
+        if isinstance(self._page, TextPage | TaskPage | QuestionnairePage):
+            self.event.emit(PauseAsked(self._clock(), "participant"))
+
+    def _stop_force(self) -> None:
+        if self._page is not None:
+            self.event.emit(ForceStopped(self._clock(), "participant"))
+
+
+def _picture(widget: QWidget) -> QPixmap | None:
+    """Return what a page looks like, for the pause to lie on; a pause on a pause shows the first one's ground."""
+    if isinstance(widget, PauseWidget):
+        return widget.under
+    return widget.grab() if widget.width() > 0 else None

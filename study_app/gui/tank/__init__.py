@@ -1,0 +1,1 @@
+"""The tank that the participant looks into: its camera, its glass and water, and what moves in it."""

@@ -1,0 +1,101 @@
+"""How long the participant's tank takes to paint, in software, at 1920 × 1080: run me, I print a table.
+
+Whole frames are painted as after a change of page; dirty updates as between two frames of a moving ball in the ring
+whose dwell arc grows. Times are of the widget's painting including Qt's own share, without the transport to a screen.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import statistics
+import time
+
+os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+
+from PySide6.QtWidgets import QApplication
+
+from study_app.gui.scene_view import TankWidget
+from study_app.protocol.tasks import Reach
+from study_app.protocol.words import words
+from study_app.session.pages import Progress, TaskPage
+from study_app.session.runner import TankView
+from study_app.session.tasks import TaskView
+
+SIZE = (1920, 1080)
+FRAMES = 400
+LIMIT_MS = 4.0
+
+
+def page() -> TaskPage:
+    """Return a reaching task as in part 2 of the thesis' study."""
+    instruction = "Hold the ball in the lit ring until it closes"
+    task = Reach(
+        kind="reach",
+        targets_mm=((-30, 0, 0), (30, 0, 0)),
+        radius_mm=6,
+        dwell_s=0.5,
+        count=12,
+        instruction=instruction,
+    )
+    return TaskPage(
+        trial=6,
+        instruction=instruction,
+        task=task,
+        delay_s=0.0,
+        workspace_m=(0.1, 0.06, 0.06),
+        body_radius_m=0.0034,
+        progress=Progress(2, 2, "Delay setting 3", 3, 7),
+    )
+
+
+def view(frame: int) -> TankView:
+    """Return the view of a frame: the ball sways through the tank, the dwell arc grows."""
+    turn = math.tau * frame / 120
+    position = (0.03 * math.sin(turn), 0.015 * math.sin(1.3 * turn), 0.02 * math.cos(0.7 * turn))
+    task = TaskView(lit=frame // 90 % 2, reached=frame // 90, of=12, dwell=frame % 30 / 30, elapsed_s=frame / 60)
+    return TankView(position_m=position, task=task, sample_time_ns=frame * 16_666_667)
+
+
+def row(name: str, times_ms: list[float]) -> str:
+    """Return a line of the table."""
+    ordered = sorted(times_ms)
+    p95 = ordered[round(0.95 * (len(ordered) - 1))]
+    return f"{name:<28}{statistics.median(ordered):>9.2f}{p95:>9.2f}{ordered[-1]:>9.2f}"
+
+
+def main() -> None:
+    """Paint and print."""
+    app = QApplication.instance() or QApplication([])
+    tank = TankWidget(page(), words("en"))
+    tank.resize(*SIZE)
+    start = time.perf_counter()
+    tank.show()
+    tank.show_view(view(0))
+    app.processEvents()
+    tank.repaint()
+    first = 1e3 * (time.perf_counter() - start)
+    whole: list[float] = []
+    dirty: list[float] = []
+    place: list[float] = []
+    for frame in range(1, FRAMES + 1):
+        start = time.perf_counter()
+        tank.show_view(view(frame))
+        shown = time.perf_counter()
+        app.processEvents()
+        dirty.append(1e3 * (time.perf_counter() - shown))
+        place.append(1e3 * (shown - start))
+        start = time.perf_counter()
+        tank.repaint()
+        whole.append(1e3 * (time.perf_counter() - start))
+    ratio = tank.devicePixelRatioF()
+    print(f"tank at {SIZE[0]} x {SIZE[1]}, pixel ratio {ratio:g}, {app.platformName()}, {FRAMES} frames [ms]")
+    print(f"{'':<28}{'median':>9}{'p95':>9}{'most':>9}")
+    print(row("whole frame", whole))
+    print(row("dirty update", dirty))
+    print(row("placing (show_view)", place))
+    print(f"first frame with its images  {first:.0f} ms; limit for a whole frame {LIMIT_MS:g} ms")
+
+
+if __name__ == "__main__":
+    main()
