@@ -13,12 +13,10 @@ class Device(Driver, Protocol):
 
     Opened before a servo uses it and closed after the servo has stopped; in between only the servo calls ``read`` and
     ``write``. Positions and forces are in the hand frame (x right, y up, z toward the participant), SI.
+    ``workspace_m`` are the half extents of where it reaches, about the origin [m].
     """
 
-    @property
-    def workspace_m(self) -> tuple[float, float, float]:
-        """Half extents of where it reaches, about the origin [m]."""
-        ...
+    workspace_m: tuple[float, float, float]
 
     def open(self) -> None:
         """Make it ready; raise ``DeviceNotFound`` where there is none."""

@@ -114,7 +114,8 @@ def _take_order(hand: Any, now_ns: int) -> None:
     square = 0.0
     for i in range(3):
         hand.began_m[i] = hand.aim_m[i]
-        square += (hand.order.target_m[i] - hand.aim_m[i]) ** 2
+        way = hand.order.target_m[i] - hand.aim_m[i]
+        square += way * way
     if hand.order.kind == REACH and hand.order.duration_ns <= 0:
         hand.order.duration_ns = int(1e9 * (REACH_START_S + math.sqrt(square) / REACH_PACE_MPS))
 

@@ -2,7 +2,7 @@
 
 The pointer draws a simulated handle along by a spring and a damper, and the liquid's force acts on that handle: it
 falls behind the pointer by force / stiffness, and goes on after the pointer has stopped, as the liquid commands. In
-free space it follows smoothly, 24 ms behind (two low-passes of 12 ms, which make one motion of a pointer's steps).
+free space it follows smoothly, 20 ms behind (two low-passes of 10 ms, which make one motion of a pointer's steps).
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from study_app.haptics.plant import new_handle
 MASS_KG = 0.2
 STIFFNESS_NPM = 400.0  # 8 N hold the handle back by 20 mm, a fifth of the workspace
 DAMPING_NSPM = 27.0  # 1.5 times critical
-LAG_S = 0.012
+LAG_S = 0.010
 
 
 class MouseDevice(SimulatedDevice):

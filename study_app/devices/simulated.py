@@ -11,6 +11,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from study_app.devices.base import Device
 from study_app.devices.hand import HAND, HOLD, ORDER, move_hand, post
 from study_app.haptics.cfunctions import READ, READ_LOST, READ_NEW, READ_NOTHING_NEW, WRITE, c_function, record_at
 from study_app.haptics.layout import READING, records
@@ -34,7 +35,7 @@ _reading_at = record_at(READING)
 _LONGEST_STEP_S = 0.05  # a loop that stood still for longer must not spend longer still on catching up
 
 
-class SimulatedDevice:
+class SimulatedDevice(Device):
     """A handle that somebody moves; ``name``, hand and numbers come from the subclass.
 
     Parameters
@@ -56,6 +57,7 @@ class SimulatedDevice:
         self._order = records(ORDER, 1)
         self.context = int(self._memory.ctypes.data)
         self.read, self.write = _functions()
+        self.hold(0.0, 0.0, 0.0)
 
     def press(self, buttons: int) -> None:
         """Hold down exactly these buttons: button 1 is bit 0."""

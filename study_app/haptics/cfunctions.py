@@ -39,32 +39,17 @@ READ_LOST = -1
 
 
 class Driver(Protocol):
-    """What the servo needs of a device, and no more (``devices.base.Device`` is the whole)."""
+    """What the servo needs of a device, and no more (``devices.base.Device`` is the whole).
 
-    @property
-    def name(self) -> str:
-        """The word that ``open_device`` takes."""
-        ...
+    ``name`` is the word that ``open_device`` takes, ``read`` and ``write`` are C functions, ``context`` is the address
+    of the device's own memory, handed to both, and ``force_limit_n`` the greatest force it may be asked for [N].
+    """
 
-    @property
-    def read(self) -> Any:
-        """C function ``READ``."""
-        ...
-
-    @property
-    def write(self) -> Any:
-        """C function ``WRITE``."""
-        ...
-
-    @property
-    def context(self) -> int:
-        """Address of the device's own memory, handed to both."""
-        ...
-
-    @property
-    def force_limit_n(self) -> float:
-        """The greatest force it may be asked for [N]."""
-        ...
+    name: str
+    read: Any
+    write: Any
+    context: int
+    force_limit_n: float
 
 
 _alloca_once: Any = cgutils.alloca_once

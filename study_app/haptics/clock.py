@@ -27,27 +27,16 @@ _virtual_at = record_at(VIRTUAL)
 
 
 class Clock(Protocol):
-    """What the servo asks of a clock; ``runs`` tells whether time passes by itself."""
+    """What the servo asks of a clock.
 
-    @property
-    def now(self) -> Any:
-        """C function ``NOW``."""
-        ...
+    ``now`` and ``sleep`` are C functions, ``context`` is the address of the clock's own memory, handed to both, and
+    ``runs`` tells whether time passes by itself.
+    """
 
-    @property
-    def sleep(self) -> Any:
-        """C function ``SLEEP``."""
-        ...
-
-    @property
-    def context(self) -> int:
-        """Address of the clock's own memory."""
-        ...
-
-    @property
-    def runs(self) -> bool:
-        """True for a clock on which time passes by itself."""
-        ...
+    now: Any
+    sleep: Any
+    context: int
+    runs: bool
 
     def now_ns(self) -> int:
         """Return the time [ns]."""
