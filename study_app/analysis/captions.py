@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Final
 
+import pandas as pd
+
 from study_app.analysis.measures import QUARTILES
 from study_app.analysis.questions import Block
 from study_app.analysis.tables import Study
@@ -35,7 +37,7 @@ def counts(study: Study, block: Block) -> list[str]:
 
 def people_a_setting(study: Study, block: Block) -> dict[str, int]:
     """Return how many participants were presented each setting of a block."""
-    rows = study.trials[study.trials["counted"] & (study.trials["block"] == block.id)]
+    rows = _counted_trials(study, block)
     return {code: int(rows.loc[rows["code"] == code, "participant"].nunique()) for code in block.codes}
 
 
@@ -59,7 +61,8 @@ def _sentences(study: Study, block: Block) -> list[str]:
     start = f"{'Pilot. ' if study.pilot else ''}Agreement with {statements} on {settings}"
     head = f"{start} ({simulated}{counts(study, block)[0]})."
     drawn = _bars(block) if block.kind == "liquids" else _plots(block)
-    return [head, *drawn, _blinded(study), _unanswered(study, block), _left_out(study), _invalid(study, block)]
+    notes = [_achieved(study, block), _unanswered(study, block), _left_out(study), _invalid(study, block)]
+    return [head, *drawn, _blinded(study), *notes]
 
 
 def _bars(block: Block) -> list[str]:
@@ -90,6 +93,17 @@ def _blinded(study: Study) -> str:
     return "Settings are shown by code in the order of the codes, since the key is sealed; the order says nothing."
 
 
+def _achieved(study: Study, block: Block) -> str:
+    """Say how far the delays that were shown differed from those on the axis."""
+    errors = _counted_trials(study, block)["delay_error_mean_ms"].dropna()
+    if block.kind != "delays" or not block.revealed or errors.empty:
+        return ""
+    return (
+        "The axis shows the delay asked for; the delay achieved differed from it by "
+        f"{errors.mean():+.1f} ms on average (trials: {errors.min():+.1f} to {errors.max():+.1f} ms)."
+    ).replace("-", "−")
+
+
 def _unanswered(study: Study, block: Block) -> str:
     table = study.aggregate(block)
     return f"Cannot judge: {table['cannot_judge'].sum()}; not answered: {table['missing'].sum()}."
@@ -103,11 +117,15 @@ def _left_out(study: Study) -> str:
 
 
 def _invalid(study: Study, block: Block) -> str:
-    rows = study.trials[study.trials["counted"] & (study.trials["block"] == block.id)]
+    rows = _counted_trials(study, block)
     invalid = int((~rows["valid"].fillna(value=True)).sum())
     if not invalid:
         return ""
     return f"{invalid} of {len(rows)} trials exceeded the protocol's limits of timing and are included."
+
+
+def _counted_trials(study: Study, block: Block) -> pd.DataFrame:
+    return study.trials[study.trials["counted"] & (study.trials["block"] == block.id)]
 
 
 def _noun(block: Block) -> str:

@@ -101,7 +101,7 @@ def _rows(study: Study, table: pd.DataFrame) -> Iterator[dict[str, Any]]:
             setting = study.settings[plain["block"], plain["code"]]
             error = plain["delay_error_mean_ms"]
             plain |= {"condition": setting.condition, "liquid": setting.liquid, "delay_ms": setting.delay_ms}
-            plain["delay_achieved_ms"] = None if error is None else (setting.delay_ms or 0.0) + error
+            plain["delay_achieved_ms"] = None if error is None else round((setting.delay_ms or 0.0) + error, 6)
         yield plain
 
 
