@@ -82,8 +82,8 @@ def rater(draw: Draw) -> Rater:
     return Rater(
         leaning=0.4 * _normal(draw),
         noise=0.5 + 0.3 * draw(),
-        strength=max(0.5, 1 + 0.15 * _normal(draw)),
-        threshold_s=max(0.06, 0.125 + 0.02 * _normal(draw)),
+        strength=max(0.5, 1 + 0.1 * _normal(draw)),
+        threshold_s=max(0.06, 0.13 + 0.015 * _normal(draw)),
     )
 
 
@@ -116,11 +116,11 @@ def _impression(felt: Felt, person: Rater) -> _Impression:
     return _Impression(
         present=_rise(force, 0.15, 0.1),
         resisting=_rise(resistance, 25.0, 10.0),
-        thick=_rise(resistance, 85.0, 20.0),
-        carried=_rise(felt.push_share, 0.12, 0.06),
+        thick=_rise(resistance, 98.0, 14.0),
+        carried=_rise(felt.push_share, 0.08, 0.04),
         abrupt=_rise(peak, 8.0, 2.0),
         rough=_rise(felt.roughness_n, 0.15, 0.05),
-        noticed=_rise(felt.delay_s, person.threshold_s, 0.02),
+        noticed=_rise(felt.delay_s, person.threshold_s, 0.015),
         bothered=_rise(felt.delay_s, person.threshold_s + 0.03, 0.03),
         lost=_rise(felt.delay_s, person.threshold_s + 0.08, 0.04),
     )
