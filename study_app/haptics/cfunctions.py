@@ -1,8 +1,8 @@
 """The C functions the servo calls: signatures, how to compile one, and how an address becomes records.
 
-A device and a clock are each a few C functions and the address of their own memory (``context``), handed to the
-compiled loop as arguments, so that one specialisation serves all of them. Simulated ones are ``numba.cfunc`` of the
-same signatures; a driver in C passes its function pointers.
+A device and a clock are each a few C functions and the address of their own memory (``context``). The compiled loop
+gets addresses as plain numbers, so that one specialisation serves all of them. Simulated ones are ``numba.cfunc``; a
+driver in C offers its functions as anything that has an ``address``.
 
 ==========  ======================================================================================================
 ``READ``    ``int32 (intp context, int64 now_ns, intp reading)``: fill one ``layout.READING`` record; return
@@ -41,8 +41,9 @@ READ_LOST = -1
 class Driver(Protocol):
     """What the servo needs of a device, and no more (``devices.base.Device`` is the whole).
 
-    ``name`` is the word that ``open_device`` takes, ``read`` and ``write`` are C functions, ``context`` is the address
-    of the device's own memory, handed to both, and ``force_limit_n`` the greatest force it may be asked for [N].
+    ``name`` is the word that ``open_device`` takes, ``read`` and ``write`` are C functions (whatever has an
+    ``address``), ``context`` is the address of the device's own memory, handed to both, and ``force_limit_n`` the
+    greatest force it may be asked for [N].
     """
 
     name: str
@@ -53,6 +54,8 @@ class Driver(Protocol):
 
 
 _alloca_once: Any = cgutils.alloca_once
+_unpack_tuple: Any = cgutils.unpack_tuple
+_StarArgTuple: Any = types.StarArgTuple
 
 
 def c_function(signature: Any, function: Callable[..., Any]) -> Any:
@@ -63,6 +66,21 @@ def c_function(signature: Any, function: Callable[..., Any]) -> Any:
 def external(symbol: str, signature: Any) -> Any:
     """Return the system's C function ``symbol`` for compiled code to call."""
     return types.ExternalFunction(symbol, signature)
+
+
+def call_at(signature: Any) -> Any:
+    """Return a function for compiled code: (address, *arguments) -> what the C function at the address returns."""
+
+    def call(_typing_context: Any, _address: Any, *_arguments: Any) -> Any:
+        def generate(context: Any, builder: Any, _signature: Any, values: Any) -> Any:
+            returned = context.get_value_type(signature.return_type)
+            taken = [context.get_value_type(argument) for argument in signature.args]
+            function = builder.inttoptr(values[0], ir.FunctionType(returned, taken).as_pointer())
+            return builder.call(function, _unpack_tuple(builder, values[1]))
+
+        return signature.return_type(types.intp, _StarArgTuple.from_types(signature.args)), generate
+
+    return intrinsic(call)
 
 
 def record_at(dtype: np.dtype[Any]) -> Any:

@@ -10,11 +10,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from study_app.haptics.cfunctions import READ_LOST, READ_NEW, fence
+from study_app.haptics.cfunctions import NOW, READ, READ_LOST, READ_NEW, SLEEP, WRITE, call_at, fence
 from study_app.haptics.compiled import kernel
 from study_app.haptics.layout import STATUS_DEVICE_LOST, STATUS_OK
 from study_app.haptics.safety import begin_scene
 from study_app.haptics.tick import tick
+
+_read, _write, _now, _sleep = call_at(READ), call_at(WRITE), call_at(NOW), call_at(SLEEP)
 
 CONTROL = np.dtype(
     [
@@ -35,21 +37,20 @@ CONTROL = np.dtype(
 )
 
 
-# Numbers before functions: numba calls a tuple that begins with a function experimental.
 class DeviceCalls(NamedTuple):
-    """A device as the loop sees it."""
+    """A device as the loop sees it: addresses."""
 
     context: int
-    read: Any
-    write: Any
+    read: int
+    write: int
 
 
 class ClockCalls(NamedTuple):
-    """A clock as the loop sees it."""
+    """A clock as the loop sees it: addresses."""
 
     context: int
-    now: Any
-    sleep: Any
+    now: int
+    sleep: int
 
 
 class Output(NamedTuple):
@@ -80,7 +81,7 @@ def run(control: Any, slots: Any, safety: Any, reading: Any, output: Any, device
     while host.run != 0 and host.status == STATUS_OK:
         if turns >= 0 and done >= turns:
             return done
-        began_ns = clock.sleep(clock.context, host.deadline_ns)
+        began_ns = _sleep(clock.sleep, clock.context, host.deadline_ns)
         sample = ring[written[0] % ring.shape[0]]
         sample.tick = host.turns
         sample.time_ns = began_ns
@@ -94,9 +95,9 @@ def run(control: Any, slots: Any, safety: Any, reading: Any, output: Any, device
             else:
                 tick(second, safety[0], sample)
         force = sample.device_force_n
-        if device.write(device.context, force[0], force[1], force[2]) == READ_LOST:
+        if _write(device.write, device.context, force[0], force[1], force[2]) == READ_LOST:
             sample.status = STATUS_DEVICE_LOST
-        ended_ns = clock.now(clock.context)
+        ended_ns = _now(clock.now, clock.context)
         sample.busy_ns = ended_ns - began_ns
         host.status = sample.status
         fence()
@@ -104,14 +105,14 @@ def run(control: Any, slots: Any, safety: Any, reading: Any, output: Any, device
         host.turns += 1
         done += 1
         _set_deadline(host, ended_ns)
-    device.write(device.context, 0.0, 0.0, 0.0)
+    _write(device.write, device.context, 0.0, 0.0, 0.0)
     return done
 
 
 @kernel
 def _sense(sample: Any, reading: Any, device: Any) -> None:
     """Read the device into ``sample``; a lost one leaves its status, no velocity and no force."""
-    answer = device.read(device.context, sample.time_ns, np.intp(reading.ctypes.data))
+    answer = _read(device.read, device.context, sample.time_ns, np.intp(reading.ctypes.data))
     sample.fresh = 1 if answer == READ_NEW else 0
     sample.status = STATUS_DEVICE_LOST if answer == READ_LOST else STATUS_OK
     sample.buttons = reading[0].buttons
@@ -156,4 +157,4 @@ def offer_scene(control: Any, slot: int, serial: int) -> None:
 @kernel
 def let_go(device: Any) -> None:
     """Write zero force to the device."""
-    device.write(device.context, 0.0, 0.0, 0.0)
+    _write(device.write, device.context, 0.0, 0.0, 0.0)

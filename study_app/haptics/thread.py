@@ -38,16 +38,16 @@ class LoopThread:
 
     def __init__(self, driver: Driver, clock: Clock, rest: Scene, elements: int, telemetry: Telemetry) -> None:
         self.clock = clock
+        self._driver = driver  # both kept alive: the loop has nothing but addresses of theirs
         self.live = False  # begun, and not ended
         self.thread: threading.Thread | None = None
         self.priority = "none: not in a thread of its own"
         self.control = records(CONTROL, 1)
         self.control[0].period_ns = round(1e9 / rest.rate_hz)
         self._rest = rest
-        self._driver = driver
         self._safety = new_safety(driver.force_limit_n)
         self._slots = (pack(rest, capacity=elements), pack(rest, capacity=elements))
-        self._device = DeviceCalls(driver.context, driver.read, driver.write)
+        self._device = DeviceCalls(driver.context, driver.read.address, driver.write.address)
         self._arguments = (
             self.control,
             self._slots,
@@ -55,7 +55,7 @@ class LoopThread:
             records(READING, 1),
             Output(telemetry.ring, telemetry.written),
             self._device,
-            ClockCalls(clock.context, clock.now, clock.sleep),
+            ClockCalls(clock.context, clock.now.address, clock.sleep.address),
         )
 
     def compile(self) -> None:
