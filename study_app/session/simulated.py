@@ -56,19 +56,19 @@ class Senses:
 
     def felt(self) -> Felt:
         """Return the features that an opinion is made of."""
-        force_n = np.concatenate([np.zeros((1, 3)), *self.forces_n])
-        velocity_mps = np.concatenate([np.zeros((1, 3)), *self.velocities_mps]) / self.scale
-        norm_n, speed_mps = _norm(force_n), _norm(velocity_mps)
+        force_n = np.concatenate(self.forces_n or [np.zeros((0, 3))])
+        velocity_mps = np.concatenate(self.velocities_mps or [np.zeros((0, 3))]) / self.scale
+        norm_n = _norm(force_n)
         power_w = np.einsum("ij,ij->i", force_n, velocity_mps)
         effort_w = float(np.abs(power_w).sum())
         changes_n = _norm(np.diff(force_n, axis=0))
         return Felt(
-            force_mean_n=float(norm_n.mean()),
-            force_peak_n=float(norm_n.max()),
-            speed_rms_mps=float(np.sqrt((speed_mps**2).mean())),
+            force_mean_n=_mean(norm_n),
+            force_peak_n=float(norm_n.max(initial=0.0)),
+            speed_rms_mps=math.sqrt(_mean(_norm(velocity_mps) ** 2)),
             push_share=float(power_w[power_w > 0].sum()) / effort_w if effort_w > 0 else 0.0,
-            roughness_n=float(np.sqrt((changes_n**2).mean())) if len(changes_n) else 0.0,
-            delay_s=sum(self.ages_s) / len(self.ages_s) if self.ages_s else 0.0,
+            roughness_n=math.sqrt(_mean(changes_n**2)),
+            delay_s=_mean(np.asarray(self.ages_s)),
         )
 
 
@@ -149,6 +149,10 @@ def choices(answers: dict[str, int], draw: Draw, points: int) -> list[Choice]:
 
 def _between(draw: Draw, low: float, high: float) -> float:
     return low + (high - low) * draw()
+
+
+def _mean(values: Any) -> float:
+    return float(values.mean()) if len(values) else 0.0
 
 
 def _norm(vectors: Any) -> Any:

@@ -1,4 +1,4 @@
-"""How a simulated participant explores a tank: strokes, circles, zigzags and stops, in random order, one after another.
+"""How a simulated participant explores a tank: strokes, circles, zigzags and stops, round after round in random order.
 
 Only sums, products, quotients and square roots of the numbers drawn are used, so that a seed gives the same motion
 everywhere.
@@ -11,6 +11,8 @@ from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
+
+from study_app.protocol.schedule import shuffle
 
 Floats: TypeAlias = NDArray[np.float64]
 Draw: TypeAlias = Callable[[], float]
@@ -36,18 +38,12 @@ def exploration(draw: Draw, half_m: tuple[float, float, float], duration_s: floa
     position_m : (n, 3) array [m], hand frame
     """
     reach_m = 0.7 * np.asarray(half_m)
-    figures = (_strokes_across, _circles, _zigzag, _strokes_up, _strokes_in_depth)
     pieces = [np.zeros((1, 3))]
-    rows, previous = 1, -1
-    while rows < duration_s * RATE_HZ:
-        chosen = int(draw() * (len(figures) - 1))
-        previous = (previous + 1 + chosen) % len(figures)  # never the same one twice
-        for piece in figures[previous](draw, reach_m, pieces[-1][-1]):
-            pieces.append(piece)
-            rows += len(piece)
-        rest = np.tile(pieces[-1][-1], (_rows(_between(draw, *REST_S)), 1))
-        pieces.append(rest)
-        rows += len(rest)
+    coming: list[Figure] = []
+    while sum(map(len, pieces)) < duration_s * RATE_HZ:
+        coming = coming or list(shuffle(FIGURES, draw))
+        pieces += coming.pop()(draw, reach_m, pieces[-1][-1])
+        pieces.append(np.tile(pieces[-1][-1], (_rows(_between(draw, *REST_S)), 1)))
     position_m = np.concatenate(pieces)
     return np.arange(len(position_m)) / RATE_HZ, position_m
 
@@ -107,6 +103,10 @@ def _stroke(begin_m: Floats, end_m: Floats, pace_mps: float) -> Floats:
     share = np.arange(1, rows + 1) / rows
     done = share * share * share * (10.0 + share * (6.0 * share - 15.0))
     return np.asarray(begin_m + done[:, None] * way)
+
+
+Figure: TypeAlias = Callable[[Draw, Floats, Floats], list[Floats]]
+FIGURES: tuple[Figure, ...] = (_strokes_across, _circles, _zigzag, _strokes_up, _strokes_in_depth)
 
 
 def _rows(duration_s: float) -> int:

@@ -1,0 +1,179 @@
+"""Simulated participants: how they move, what they sense, and how they go through a session."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from study_app.errors import SessionError, StoreError
+from study_app.protocol.model import Reach
+from study_app.protocol.schedule import stream
+from study_app.session import rehearsal
+from study_app.session.pages import TextPage
+from study_app.session.runner import TankView
+from study_app.session.simulated import Reacher, Senses, choices, reading_s
+from study_app.session.strokes import RATE_HZ, exploration
+from study_app.session.tasks import TaskView
+from study_app.store.session import SessionStore
+from tests.session import small
+
+HALF_M = (0.05, 0.03, 0.03)
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 2**32), st.floats(1, 60))
+def test_an_exploration_stays_in_the_tank_moves_without_jumps_and_lasts(seed: int, duration_s: float) -> None:
+    t_s, position_m = exploration(stream(seed, "test").random, HALF_M, duration_s)
+    assert t_s[-1] >= duration_s - 1 / RATE_HZ
+    assert (np.abs(position_m) <= HALF_M).all()
+    assert np.linalg.norm(np.diff(position_m, axis=0), axis=1).max() * RATE_HZ < 0.6  # m/s
+
+
+def test_an_exploration_is_drawn_from_its_randomness_alone() -> None:
+    one, other, third = (exploration(stream(seed, "test").random, HALF_M, 20)[1] for seed in (1, 1, 2))
+    assert np.array_equal(one, other)
+    assert one.shape != third.shape or not np.array_equal(one, third)
+
+
+def test_an_exploration_is_varied() -> None:
+    """Within half a minute every direction is moved in, and there are stops to feel what goes on."""
+    _, position_m = exploration(stream(3, "test").random, HALF_M, 30)
+    speed = np.linalg.norm(np.diff(position_m, axis=0), axis=1)
+    assert (np.ptp(position_m, axis=0) > np.asarray(HALF_M) * 0.5).all()
+    assert 0.05 < (speed == 0).mean() < 0.6
+
+
+def test_reading_takes_longer_the_more_there_is_to_read() -> None:
+    short = TextPage("a", "break", "Title", ("one two",), "Continue")
+    long = TextPage("b", "break", "Title", ("one two", "three " * 100), "Continue")
+    assert reading_s(long) - reading_s(short) == pytest.approx(12.0)
+
+
+def test_senses_tell_drag_from_a_push_and_half_of_each() -> None:
+    def share(force_x: list[float]) -> float:
+        senses = Senses(scale=10.0)
+        force = np.zeros((len(force_x), 3))
+        force[:, 0] = force_x
+        times = np.arange(len(force_x)) / 1000
+        senses.feel(
+            np.asarray(
+                small.samples(
+                    times, np.zeros((len(force_x), 3)), device_force_n=force, velocity_mps=(1.0, 0, 0), scene=1
+                )
+            )
+        )
+        return senses.felt().push_share
+
+    assert share([-1.0, -2.0]) == 0.0
+    assert share([1.0, 2.0]) == pytest.approx(1.0)
+    assert share([1.0, -1.0]) == pytest.approx(0.5)
+
+
+def test_senses_measure_force_speed_of_the_hand_roughness_and_delay() -> None:
+    senses = Senses(scale=10.0)
+    force = [(3.0, 0.0, 4.0), (0.0, 0.0, 0.0)] * 50
+    rows = small.samples(
+        np.arange(100) / 1000, np.zeros((100, 3)), device_force_n=force, velocity_mps=(0, 2.0, 0), scene=4
+    )
+    dry = small.samples([1.0], np.zeros((1, 3)), device_force_n=(99.0, 0, 0), scene=0)
+    senses.feel(np.asarray(rows))
+    senses.feel(np.asarray(dry))
+    for age_ms in (100, 110):
+        painted_ns = 1_000_000_000
+        shown_ns = painted_ns - age_ms * 1_000_000
+        senses.see(painted_ns, TankView(np.zeros(3), TaskView(0, 0, 1, 0.0, 0.0), shown_ns))
+    felt = senses.felt()
+    assert felt.force_mean_n == pytest.approx(2.5)
+    assert felt.force_peak_n == pytest.approx(5)
+    assert felt.speed_rms_mps == pytest.approx(0.2)
+    assert felt.roughness_n == pytest.approx(5)
+    assert felt.delay_s == pytest.approx(0.105)
+
+
+def test_who_felt_nothing_has_senses_all_the_same() -> None:
+    assert Senses(scale=1.0).felt().force_peak_n == 0.0
+
+
+class StillHand:
+    """A device whose hand is where it was told to be, at once."""
+
+    moving = False
+
+    def __init__(self) -> None:
+        self.orders: list[tuple[float, float, float]] = []
+
+    def reach_to(self, x_m: float, y_m: float, z_m: float) -> None:
+        self.orders.append((x_m, y_m, z_m))
+
+
+def test_a_hand_reaches_for_what_is_seen_lit_and_no_sooner_than_a_person_could() -> None:
+    device = StillHand()
+    orders = device.orders
+    task = small.protocol().tasks["reach"]
+    assert isinstance(task, Reach)
+    hand = Reacher(task, device, stream(1, "test").random)
+
+    def see(now_s: float, lit: int | None, place: Any = (0.0, 0.0, 0.0)) -> None:
+        hand.act(now_s, TankView(np.asarray(place), TaskView(lit, 0, 2, 0.0, now_s), 0))
+
+    see(0.0, 0)
+    see(0.15, 0)
+    assert orders == []
+    see(0.4, 0)
+    assert len(orders) == 1
+    assert math.dist(orders[0], task.targets_m[0]) < task.radius_m
+    see(1.0, 0, task.targets_m[0])  # there: nothing to mend
+    see(1.5, 0, task.targets_m[0])
+    assert len(orders) == 1
+    see(2.0, 0, (0.0, 0.01, 0.0))  # seen at rest beside it
+    see(2.2, 0, (0.0, 0.01, 0.0))
+    assert len(orders) == 1
+    see(2.4, 0, (0.0, 0.01, 0.0))
+    assert len(orders) == 2
+    see(2.5, 1)
+    see(3.0, 1)
+    assert math.dist(orders[2], task.targets_m[1]) < task.radius_m
+    see(3.1, None)
+    assert len(orders) == 3
+
+
+@given(st.integers(0, 2**32), st.lists(st.integers(1, 7), min_size=1, max_size=9))
+def test_the_last_choice_for_an_item_is_its_answer_and_every_choice_is_on_the_scale(
+    seed: int, values: list[int]
+) -> None:
+    answers = {f"item_{number}": value for number, value in enumerate(values)}
+    given_ = choices(answers, stream(seed, "test").random, 7)
+    assert {choice.item: choice.value for choice in given_} == answers
+    assert all(1 <= choice.value <= 7 and choice.after_s > 0 for choice in given_)
+
+
+def test_a_device_that_is_lost_ends_the_rehearsal_with_a_word_why(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    look = rehearsal._Rehearsal._see
+
+    def pull_the_cable(self: Any, senses: Any, hand: Any) -> bool:
+        self._parts.device.unplug()
+        return look(self, senses, hand)
+
+    monkeypatch.setattr(rehearsal._Rehearsal, "_see", pull_the_cable)
+    with pytest.raises(SessionError, match="stopped answering"):
+        rehearsal.rehearse("demo", participants=1, seed=1, results=tmp_path / "demo")
+
+
+def test_a_disk_that_fails_ends_the_rehearsal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(self: SessionStore, event: str, **fields: Any) -> None:
+        if event == "choice":
+            raise StoreError("no space left")
+        kept(self, event, **fields)
+
+    kept = SessionStore.append
+    monkeypatch.setattr(SessionStore, "append", full)
+    with pytest.raises(StoreError, match="no space left"):
+        rehearsal.rehearse("demo", participants=1, seed=1, results=tmp_path / "demo")
