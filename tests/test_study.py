@@ -179,6 +179,8 @@ ODD = {
     "delay_ms = 200": "delay_ms = 137.25",
     "density_kg_m3 = 1000": "density_kg_m3 = 1013.7",
     "density_kg_m3 = 1400": "density_kg_m3 = 1450.3",
+    "length = 1700": "length = 17391",
+    "scaling = 1700": "scaling = 17392",
 }
 
 
@@ -190,7 +192,8 @@ def test_a_finished_folder_names_no_condition_liquid_parameter_or_delay(tmp_path
     odd_file.write_text(text, encoding="utf-8")
     assert {condition.delay_ms for condition in load(odd_file).conditions.values()} == {0, 137.25}
     folder = rehearse(odd_file, participants=1, seed=3, results=tmp_path / "results")
-    secrets = ("qaxilium", "vorbent", "zwiftan", "drovelm", "137.25", "0.13725", "137250000", "1013.7", "1450.3")
+    names = ("qaxilium", "vorbent", "zwiftan", "drovelm")
+    secrets = (*names, "137.25", "0.13725", "137250000", "1013.7", "1450.3", "17391", "17392")
     found = [
         (path.name, secret)
         for path in folder.rglob("*")

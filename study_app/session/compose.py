@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from study_app.protocol.schedule import PageStep
 from study_app.protocol.words import Words, words
 from study_app.session.pages import (
     EndPage,
@@ -47,12 +46,9 @@ def _text(state: SessionState, value: str | dict[str, str]) -> str:
 
 def _text_page(state: SessionState) -> TextPage:
     protocol, language = state.plan.protocol, state.plan.language
-    step = state.step
-    if not isinstance(step, PageStep):
-        raise TypeError(f"step {state.index} is no page to read")
-    text = protocol.pages[step.page_id]
+    text = protocol.pages[state.page_id]
     return TextPage(
-        id=step.page_id,
+        id=state.page_id,
         kind=text.kind,
         title=_text(state, text.title),
         paragraphs=protocol.paragraphs(text.body, language),
@@ -77,8 +73,6 @@ def _task_page(state: SessionState) -> TaskPage:
 def _questionnaire_page(state: SessionState) -> QuestionnairePage:
     protocol, language, trial = state.plan.protocol, state.plan.language, state.trial
     questionnaire = state.questionnaire
-    if questionnaire is None:
-        raise TypeError(f"block {trial.block} has no questionnaire")
     scale = protocol.scales[questionnaire.scale]
     items = [questionnaire.item(item) for item in trial.items]
     label = trial.label(protocol, language)

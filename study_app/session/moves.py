@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any, TypeAlias
 
 from study_app.errors import SessionError
-from study_app.protocol.schedule import PageStep
+from study_app.protocol.schedule import Trial
 from study_app.session import compose
 from study_app.session.commands import (
     Command,
@@ -50,16 +50,14 @@ def begin(state: SessionState, _event: Begin) -> Result:
 
 def read_on(state: SessionState, _event: Continue) -> Result:
     """Leave a page that was read."""
-    step = state.step
-    left = (Write("page_left", {"page": step.page_id}),) if isinstance(step, PageStep) else ()
-    return _enter(state, state.index + 1, left)
+    return _enter(state, state.index + 1, (Write("page_left", {"page": state.page_id}),))
 
 
 def end_task(state: SessionState, event: TaskDone) -> Result:
     """Take the liquid away, keep what was measured, and ask or go on."""
     ended = Write("trial_ended", {**_which(state), "outcome": event.outcome, **event.summary})
     done: Commands = (StopTrial(), Rest(), ended)
-    if state.questionnaire is None:
+    if not state.asks:
         return _enter(state, state.index + 1, done)
     asking = replace(state, phase=Phase.ANSWERING, answers={})
     return asking, (*done, WriteTables(), _show(asking))
@@ -170,14 +168,13 @@ def call_operator(state: SessionState, event: Broke) -> Result:
 def _enter(state: SessionState, index: int, done: Commands = ()) -> Result:
     """Go to the step at ``index``; ``done`` comes first and finishes the step before."""
     state = replace(state, index=index, attempt=1, answers={})
-    step = state.step
-    if step is None:
+    if state.step is None:
         state = replace(state, phase=Phase.COMPLETE)
         return state, (*done, Finish("completed"), _show(state))
-    if not isinstance(step, PageStep):
+    if isinstance(state.step, Trial):
         return _start_trial(state, done)
     state = replace(state, phase=Phase.READING)
-    return state, (*done, Write("page_shown", {"page": step.page_id}), WriteTables(), _show(state))
+    return state, (*done, Write("page_shown", {"page": state.page_id}), WriteTables(), _show(state))
 
 
 def _start_trial(state: SessionState, done: Commands) -> Result:
@@ -224,10 +221,7 @@ def _check_item(state: SessionState, item: str) -> None:
 
 
 def _check_value(state: SessionState, value: int | None) -> None:
-    questionnaire = state.questionnaire
-    if questionnaire is None:
-        return
-    scale = state.plan.protocol.scales[questionnaire.scale]
+    scale = state.plan.protocol.scales[state.questionnaire.scale]
     points = len(scale.labels[state.plan.language])
     if value is None and scale.cannot_judge is None:
         raise SessionError("this questionnaire has no answer off the scale: choose one of its points")
@@ -237,13 +231,10 @@ def _check_value(state: SessionState, value: int | None) -> None:
 
 def _missing(state: SessionState) -> list[int]:
     """Return the numbers of the required statements without an answer."""
-    questionnaire = state.questionnaire
     return [
         number
         for number, item in enumerate(state.trial.items, start=1)
-        if questionnaire is not None
-        and questionnaire.item(item).required
-        and not state.answers.get(item, Answer()).given
+        if state.questionnaire.item(item).required and not state.answers.get(item, Answer()).given
     ]
 
 

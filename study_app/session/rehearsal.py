@@ -99,7 +99,7 @@ def _session(study: Protocol, source: bytes, person: str, seed: int, folder: Pat
             seed=seed,
             operator="",
             language=study.study.languages[0],
-            device=device.describe() | servo.describe(),
+            device=device.describe() | _told(servo),
             screens={"participant": "simulated", "refresh_hz": 60},
             simulated=True,
             clock=clock,
@@ -108,6 +108,11 @@ def _session(study: Protocol, source: bytes, person: str, seed: int, folder: Pat
             rehearsal = _Rehearsal(study, _Parts(device, servo, store, clock), person, seed)
             rehearsal.run()
         return clock.seconds(), rehearsal.answers
+
+
+def _told(servo: Servo) -> dict[str, object]:
+    """Return what the receipt may say of the servo: the size of its wake would name a parameter of a liquid."""
+    return {name: value for name, value in servo.describe().items() if name != "elements"}
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ from enum import Enum
 
 from study_app.errors import SessionError
 from study_app.protocol.model import Protocol, Questionnaire
-from study_app.protocol.schedule import Schedule, Step, Trial
+from study_app.protocol.schedule import PageStep, Schedule, Step, Trial
 
 
 class Phase(Enum):
@@ -86,6 +86,19 @@ class SessionState:
         return steps[self.index] if 0 <= self.index < len(steps) else None
 
     @property
+    def page_id(self) -> str:
+        """The id of the page that is read.
+
+        Raises
+        ------
+        SessionError
+            None is.
+        """
+        if isinstance(step := self.step, PageStep):
+            return step.page_id
+        raise SessionError("no page is being read: wait for the next one")
+
+    @property
     def trial(self) -> Trial:
         """The trial under way.
 
@@ -99,6 +112,19 @@ class SessionState:
         raise SessionError("no trial is under way: wait for the next one")
 
     @property
-    def questionnaire(self) -> Questionnaire | None:
-        """What is answered after the trial under way."""
-        return self.plan.protocol.questionnaire_of(self.trial.block)
+    def asks(self) -> bool:
+        """Whether the trial under way has a questionnaire."""
+        return self.plan.protocol.blocks[self.trial.block].questionnaire is not None
+
+    @property
+    def questionnaire(self) -> Questionnaire:
+        """What is answered after the trial under way.
+
+        Raises
+        ------
+        SessionError
+            Nothing is.
+        """
+        if (questionnaire := self.plan.protocol.questionnaire_of(self.trial.block)) is None:
+            raise SessionError(f"block {self.trial.block!r} has no questionnaire: there is nothing to answer")
+        return questionnaire

@@ -1,0 +1,116 @@
+"""The runner on the real servo and a scripted device, on a virtual clock: what the hand feels when things happen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+from study_app.devices.scripted import ScriptedDevice
+from study_app.haptics.clock import VirtualClock
+from study_app.haptics.servo import Servo
+from study_app.session.events import Begin, Continue, EndAsked, ForceStopped, PauseAsked, ResumeAsked
+from study_app.session.pages import PausePage, TroublePage
+from study_app.session.runner import BUTTON_STOP, Ports, Runner
+from study_app.session.state import Phase
+from tests.session import small
+from tests.session.fakes import FakeJournal
+
+
+class Bench:
+    """A session of the small study at its practice, with a hand that goes to and fro through a thick liquid."""
+
+    def __init__(self, servo: Servo, device: ScriptedDevice) -> None:
+        self.servo, self.device = servo, device
+        self.journal = FakeJournal([])
+        self.pages: list[Any] = []
+        plan = small.opened().plan
+        ports = Ports(servo, self.journal, self.pages.append, self.clock)
+        self.runner = Runner(plan.protocol, plan.schedule, plan.key, ports, plan.language)
+        t_s = np.arange(0, 20, 0.005)
+        device.follow(t_s, np.column_stack((0.03 * np.sin(6 * t_s), 0 * t_s, 0 * t_s)))
+        self.runner.post(Begin(self.clock()))
+        self.runner.post(Continue(self.clock()))
+
+    def clock(self) -> float:
+        return self.servo.now_ns() / 1e9
+
+    def run(self, ticks: int) -> Any:
+        """Let ticks pass, look once, and return the force at each tick [N] (n,)."""
+        reader = self.servo.telemetry.reader()
+        self.servo.advance(ticks)
+        self.runner.poll()
+        return np.linalg.norm(reader.read().device_force_n, axis=1)
+
+
+@pytest.fixture
+def bench() -> Iterator[Bench]:
+    device = ScriptedDevice()
+    with device, Servo(device, clock=VirtualClock(), elements=100) as servo:
+        yield Bench(servo, device)
+
+
+def test_a_trial_is_felt(bench: Bench) -> None:
+    assert bench.run(800).max() > 0.5
+
+
+def test_a_force_stop_is_zero_force_with_the_next_tick_and_until_it_is_faded_in(bench: Bench) -> None:
+    bench.run(800)
+    bench.runner.post(ForceStopped(bench.clock(), "participant"))
+    assert (bench.run(500) == 0).all()
+    assert bench.pages[-1] == PausePage(force_off=True)
+    bench.runner.post(ResumeAsked(bench.clock()))
+    force_n = bench.run(900)
+    assert force_n.max() > 0.5
+    assert force_n[:50].max() < 0.15 * force_n.max()  # the start's fade takes half a second
+    assert bench.runner.state.attempt == 2
+
+
+def test_button_four_of_the_device_stops_the_force(bench: Bench) -> None:
+    bench.run(800)
+    bench.device.press(BUTTON_STOP)
+    bench.run(16)
+    assert (bench.run(100) == 0).all()
+    assert bench.journal.of("force_stopped")[0]["by"] == "device"
+
+
+def test_a_pause_and_an_end_take_the_liquid_away(bench: Bench) -> None:
+    bench.run(800)
+    bench.runner.post(PauseAsked(bench.clock(), "operator"))
+    bench.run(60)  # a change of scene fades
+    assert (bench.run(500) == 0).all()
+    bench.runner.post(ResumeAsked(bench.clock()))
+    assert bench.run(500).max() > 0.5
+    bench.runner.post(EndAsked(bench.clock(), "withdrawn", ""))
+    bench.run(60)
+    assert (bench.run(500) == 0).all()
+
+
+def test_a_pulled_cable_calls_the_operator(bench: Bench) -> None:
+    bench.run(500)
+    bench.device.unplug()
+    bench.run(100)
+    assert bench.runner.state.phase is Phase.TROUBLE
+    assert isinstance(bench.pages[-1], TroublePage)
+    assert "stopped answering" in bench.journal.of("broke")[0]["what"]
+    assert not bench.servo.force_is_on
+
+
+def test_a_task_is_followed_on_the_device_and_drawn_from_its_history(bench: Bench) -> None:
+    bench.run(400)
+    task = bench.runner.task
+    assert task is not None
+    assert task.elapsed_s == pytest.approx(0.399, abs=0.002)
+    now_ns = bench.servo.now_ns()
+    view = bench.runner.view(now_ns)
+    assert view is not None
+    assert 0 <= now_ns - view.sample_time_ns <= 1_000_000
+    bench.run(2800)
+    assert bench.runner.state.trial.number == 2
+    (row,) = bench.journal.of("trial_ended")
+    assert row["ticks"] == 3001
+    assert row["tick_rate_hz"] == pytest.approx(1000)
+    assert row["force_mean_n"] > 0.1
+    assert row["limiter_stop"] == 0
