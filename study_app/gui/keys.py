@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QEvent, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QEnterEvent, QFontMetricsF, QPainter, QPaintEvent, QPen
+from PySide6.QtGui import QColor, QEnterEvent, QFocusEvent, QFontMetricsF, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QPushButton, QSizePolicy, QWidget
 
 from study_app.gui.theme import PARTICIPANT, RADIUS_CONTROL, font
 
 RING = 4.0  # room around a button for its focus ring [logical px]
+KEYBOARD = (Qt.FocusReason.TabFocusReason, Qt.FocusReason.BacktabFocusReason, Qt.FocusReason.ShortcutFocusReason)
 
 
 def key_size(text: str, scale: float = 1.0) -> tuple[float, float]:
@@ -50,6 +51,7 @@ class GoButton(QPushButton):
         super().__init__(text, parent)
         self._key = key
         self._scale = 1.0
+        self._ringed = False
         self.setCursor(Qt.CursorShape.PointingHandCursor)
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self.setAutoDefault(False)
@@ -81,7 +83,7 @@ class GoButton(QPushButton):
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(QColor(theme.accent_hover if lit else theme.accent))
         painter.drawRoundedRect(body, radius, radius)
-        if self.hasFocus():
+        if self.hasFocus() and self._ringed:
             painter.setBrush(Qt.BrushStyle.NoBrush)
             painter.setPen(QPen(QColor(theme.text), 2))
             painter.drawRoundedRect(body.adjusted(-3, -3, 3, 3), radius + 3, radius + 3)
@@ -97,6 +99,11 @@ class GoButton(QPushButton):
             painter, left + label + 12 * scale, body.center().y(), self._key, scale, ink=ink, edge=ink, strength=0.5
         )
         painter.end()
+
+    def focusInEvent(self, event: QFocusEvent) -> None:  # noqa: N802
+        """Show the ring where the keyboard led here; a page that begins here has its key cap to say so."""
+        self._ringed = event.reason() in KEYBOARD
+        super().focusInEvent(event)
 
     def enterEvent(self, event: QEnterEvent) -> None:  # noqa: N802
         """Light up under the pointer."""

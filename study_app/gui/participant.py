@@ -106,6 +106,7 @@ class ParticipantWindow(QWidget):
             self.resize(WINDOWED_SIZE.boundedTo(room).expandedTo(LEAST_SIZE))
             self.show()
         else:
+            self.setGeometry(self.screen().geometry())
             self.showFullScreen()
         self.activateWindow()
         self._widget.setFocus()
@@ -122,12 +123,12 @@ class ParticipantWindow(QWidget):
         self._page, self._widget = page, made
         made.show()
         made.raise_()
-        old.hide()
-        old.deleteLater()
         if isinstance(made, TankWidget):
             self._enter_tank(made, made.page)
         else:
             made.focus_first()
+        old.hide()  # only now, or Qt would lead the keyboard somewhere itself
+        old.deleteLater()
 
     def show_view(self, view: TankView) -> None:
         """Draw a view in the tank, while it is shown."""

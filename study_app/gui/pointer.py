@@ -7,12 +7,13 @@ middle of the window whenever it comes near an edge; motion that was under way t
 from __future__ import annotations
 
 from PySide6.QtCore import QEvent, QObject, QPoint, Qt, Signal
-from PySide6.QtGui import QCursor, QMouseEvent, QWheelEvent
+from PySide6.QtGui import QCursor, QGuiApplication, QMouseEvent, QWheelEvent
 from PySide6.QtWidgets import QWidget
 
 SHARE_OF_SCREEN = 0.6  # of the screen's height that moves the hand through the height of the workspace
 NOTCHES = 24  # of the wheel through the depth of the workspace
 NOTCH = 120  # eighths of a degree
+WITHOUT_GRAB = ("offscreen", "minimal")  # there is no other window that could take the pointer
 BUTTONS = {Qt.MouseButton.LeftButton: 1 << 0, Qt.MouseButton.RightButton: 1 << 1}
 
 
@@ -51,7 +52,8 @@ class PointerCapture(QObject):
         widget.setCursor(Qt.CursorShape.BlankCursor)
         widget.setMouseTracking(True)
         widget.installEventFilter(self)
-        widget.grabMouse()
+        if QGuiApplication.platformName() not in WITHOUT_GRAB:
+            widget.grabMouse()
         self._last = self._middle()
         self._returning = False
         QCursor.setPos(self._last)
@@ -63,7 +65,8 @@ class PointerCapture(QObject):
             return
         widget, self._widget = self._widget, None
         widget.removeEventFilter(self)
-        widget.releaseMouse()
+        if QWidget.mouseGrabber() is widget:
+            widget.releaseMouse()
         widget.unsetCursor()
         if self._bits:
             self._bits = 0

@@ -40,7 +40,6 @@ class QuestionnaireWidget(PageWidget):
         super().__init__(words, clock, parent)
         self._page = page
         self._first = 0
-        self._asked = False
         self._submitted = False
         self._unsent: list[ItemShown] = []
         self._grid: Grid | None = None
@@ -73,7 +72,8 @@ class QuestionnaireWidget(PageWidget):
     @property
     def message(self) -> str:
         """What the foot says: which statements still need an answer, once Continue was pressed too early."""
-        return self._words.missing(self.missing) if self._asked and self.missing else ""
+        asked = [row.item.number for row in self.rows if row.missing]
+        return self._words.missing(asked) if asked else ""
 
     @property
     def heading(self) -> tuple[str, ...]:
@@ -94,7 +94,6 @@ class QuestionnaireWidget(PageWidget):
         if not waiting:
             waiting = [row for row in self.rows if row.item.required and not row.answered]
         if waiting:
-            self._asked = True
             for row in waiting:
                 row.ask(missing=True)
             self._go_to(waiting[0])

@@ -23,8 +23,9 @@ if TYPE_CHECKING:
 
 ICONS = {"consent": "pen", "instructions": "drop", "break": "clock", "debrief": "check"}
 COLUMN = 700.0  # a line that reads well [logical px at scale 1]
-LINE_PERCENT = 150
+LINE_PERCENT = 140
 SCROLLBAR = 16
+GIVING_WAY = ((1.0, True), (0.94, True), (0.89, True), (0.89, False))  # size of the text, whether with a badge
 VEIL = 0.80  # how much of the page under a pause is hidden
 
 
@@ -84,11 +85,12 @@ class Column(QWidget):
         for label, ink in ((self._title, PARTICIPANT.text), (self._body, PARTICIPANT.text2)):
             label.setStyleSheet(f"color: {ink}; background: transparent;")
 
-    def set_scale(self, scale: float) -> None:
-        """Grow with the page."""
+    def set_scale(self, scale: float, *, text: float = 1.0, badge: bool = True) -> None:
+        """Grow with the page; in a small window with smaller text, then without the badge."""
         self._badge.set_scale(scale)
-        self._title.setFont(font("display", scale=scale))
-        self._body.setFont(font("statement", scale=scale * 1.125))
+        self._badge.setVisible(badge)
+        self._title.setFont(font("display", scale=scale * text))
+        self._body.setFont(font("statement", scale=scale * text * 1.125))
         self._body.setText(paragraphs_html(self._paragraphs, 10 * scale))
         self._layout.setSpacing(round(14 * scale))
 
@@ -142,13 +144,16 @@ class ReadingPage(PageWidget):
             self._progress.setGeometry(margin, top, self.width() - 2 * margin, self._progress.height())
             top += self._progress.height()
         width = min(round(COLUMN * scale), self.width() - 2 * margin)
-        self._column.set_scale(scale)
         foot = 0
         if self.button is not None:
             self.button.set_scale(scale)
             foot = self.button.height() + round(28 * scale)
         room = self.height() - top - round(48 * scale) - foot
-        needed = self._column.needed(width)
+        for text, badge in GIVING_WAY:
+            self._column.set_scale(scale, text=text, badge=badge)
+            needed = self._column.needed(width)
+            if needed <= room:
+                break
         height = min(needed, room)
         self._column.setFixedSize(width, needed)
         y = top + round(24 * scale) + round((room - height) * 0.42)

@@ -44,7 +44,8 @@ def brightness() -> NDArray[np.float32]:
 def _starts(cells: int) -> NDArray[np.float32]:
     """Return where rays start along one axis [widths of the floor], a shift beyond either end of it."""
     beyond = math.ceil(BEND * COLUMNS) * RAYS
-    return (np.arange(-beyond, cells * RAYS + beyond, dtype=np.float32) + 0.5) / (COLUMNS * RAYS)
+    starts: NDArray[np.float32] = np.arange(-beyond, cells * RAYS + beyond, dtype=np.float32)
+    return (starts + np.float32(0.5)) / np.float32(COLUMNS * RAYS)
 
 
 def _gathered(x: NDArray[np.float32], z: NDArray[np.float32]) -> NDArray[np.float64]:

@@ -1,0 +1,111 @@
+"""Page values and a clock for tests of the participant's widgets."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from study_app.protocol.tasks import Explore, Reach
+from study_app.session.pages import ItemView, Progress, QuestionnairePage, TaskPage, TextPage
+from study_app.session.runner import TankView
+from study_app.session.tasks import TaskView
+
+LABELS = (
+    "Completely disagree",
+    "Mostly disagree",
+    "Somewhat disagree",
+    "Neutral",
+    "Somewhat agree",
+    "Mostly agree",
+    "Completely agree",
+)
+STATEMENTS = (
+    "I think this feels like interacting with a liquid.",
+    "Interacting with this application feels immersive.",
+    "The strength of the force feedback is adequate.",
+    "The simulated liquid behaves in a way I expect.",
+    "This liquid behaves like honey.",
+    "This liquid behaves like water.",
+    "This liquid behaves like slime.",
+    "This liquid behaves like oil.",
+    "This liquid behaves like tar.",
+)
+
+
+class ManualClock:
+    """Seconds that pass when told, a little with every look."""
+
+    def __init__(self) -> None:
+        self.now_s = 100.0
+
+    def __call__(self) -> float:
+        self.now_s += 0.001
+        return self.now_s
+
+
+def questionnaire(statements: tuple[str, ...] = STATEMENTS, **changed: Any) -> QuestionnairePage:
+    fields: dict[str, Any] = {
+        "trial": 2,
+        "title": "Liquid setting 1",
+        "intro": "How much do you agree with each statement about what you just felt?",
+        "items": tuple(ItemView(f"item{n}", n, text, required=True) for n, text in enumerate(statements, 1)),
+        "labels": LABELS,
+        "cannot_judge": None,
+        "progress": Progress(1, 2, "Liquid setting 1", 1, 3),
+    }
+    return QuestionnairePage(**(fields | changed))
+
+
+def reach(**changed: Any) -> Reach:
+    fields: dict[str, Any] = {
+        "kind": "reach",
+        "targets_mm": ((-30, 0, 0), (30, 0, 0)),
+        "radius_mm": 6,
+        "dwell_s": 0.5,
+        "count": 12,
+        "instruction": "Hold the ball in the lit ring until it closes",
+    }
+    return Reach(**(fields | changed))
+
+
+def explore() -> Explore:
+    return Explore(kind="explore", min_s=30, max_s=120, instruction="Move the ball through the liquid")
+
+
+def task_page(task: Explore | Reach | None = None, **changed: Any) -> TaskPage:
+    task = task or reach()
+    fields: dict[str, Any] = {
+        "trial": 3,
+        "instruction": task.instruction,
+        "task": task,
+        "delay_s": 0.137,
+        "workspace_m": (0.1, 0.06, 0.06),
+        "body_radius_m": 0.0034,
+        "progress": Progress(2, 2, "Delay setting 3", 3, 7),
+    }
+    return TaskPage(**(fields | changed))
+
+
+def view(
+    position_m: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    *,
+    lit: int | None = 1,
+    reached: int = 5,
+    dwell: float = 0.0,
+    elapsed_s: float = 12.0,
+    sample_ns: int = 7_000_000_000,
+) -> TankView:
+    task = TaskView(lit=lit, reached=reached, of=12, dwell=dwell, elapsed_s=elapsed_s)
+    return TankView(position_m=np.array(position_m), task=task, sample_time_ns=sample_ns)
+
+
+def text_page(kind: Any = "instructions", **changed: Any) -> TextPage:
+    fields: dict[str, Any] = {
+        "id": kind,
+        "kind": kind,
+        "title": "Before you begin",
+        "paragraphs": ("You will move a ball.", "Your name is not kept."),
+        "button": "Go on",
+    }
+    return TextPage(**(fields | changed))
