@@ -82,7 +82,7 @@ class TestEveryDevice:
         readings.after(1)
         device.write.ctypes(device.context, 4.0, 0.0, 0.0)
         device.close()
-        readings.after(10)
+        readings.after(300)
         assert abs(readings.position_m[0]) < 0.001
 
     def test_unplugged_it_answers_no_more_until_it_is_opened_again(self, name):

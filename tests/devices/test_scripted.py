@@ -64,10 +64,27 @@ def test_a_motion_of_one_place_is_a_place():
 def test_a_new_motion_replaces_the_one_before():
     device = steady()
     readings = Readings(device)
-    device.follow([0.0, 1.0], [[0, 0, 0], [0.05, 0, 0]])
+    device.follow([0.0, 0.02, 0.04, 0.06, 1.0], [[0, 0, 0], [0.01, 0, 0], [0.02, 0, 0], [0.03, 0, 0], [0.05, 0, 0]])
     aims(device, 100, readings)
-    device.follow([0.0, 1.0], [[0, 0, 0], [0, 0.05, 0]])
-    assert aims(device, 101, readings)[-1] == pytest.approx([0, 0.005, 0])
+    device.follow([7.0, 8.0], [[0, 0.01, 0], [0, 0.05, 0]])
+    assert aims(device, 101, readings)[-1] == pytest.approx([0, 0.014, 0])
+
+
+def test_an_order_that_is_half_written_is_left_for_later():
+    device = steady()
+    readings = Readings(device)
+    device.hold(0.01, 0, 0)
+    readings.after(1)
+    hand = device._state.hand
+    hand.serial += 1
+    hand.posted.target_m = (0.02, 0.0, 0.0)
+    readings.after(1)
+    assert device.aim_m == (0.01, 0, 0)
+    assert device.moving
+    hand.serial += 1
+    readings.after(1)
+    assert device.aim_m == (0.02, 0, 0)
+    assert not device.moving
 
 
 @pytest.mark.parametrize(

@@ -453,8 +453,10 @@ def test_the_thread_turns_while_python_computes_and_ends_when_told(probe):
 
 def test_scenes_loaded_faster_than_ticks_all_arrive_whole(probe):
     with Servo(probe) as servo:
+        reader = servo.telemetry.reader()
         serials = [servo.load(scene) for scene in (WATER, HONEY) * 10]
         wait_until(lambda: scene_of(servo.telemetry) == serials[-1])
+        assert set(serials) <= set(reader.read().scene.tolist())
 
 
 def test_a_lost_device_is_told_to_the_host(probe):

@@ -99,6 +99,7 @@ def test_beside_a_racing_writer_every_sample_read_is_whole():
     while running:
         running = writer.is_alive()
         samples = reader.read()
+        assert samples.tick.tolist() == list(range(seen + reader.dropped, seen + reader.dropped + samples.size))
         seen += samples.size
         for name in ("position_m", "device_force_n"):
             assert (samples[name] == samples.tick[:, None]).all()
