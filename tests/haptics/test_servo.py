@@ -459,6 +459,18 @@ def test_scenes_loaded_faster_than_ticks_all_arrive_whole(probe):
         assert set(serials) <= set(reader.read().scene.tolist())
 
 
+def test_a_thread_can_be_stopped_and_started_again(probe):
+    servo = Servo(probe)
+    for _ in range(2):
+        turns = int(servo.telemetry.written[0])
+        servo.start()
+        servo.load(HONEY)
+        wait_until(lambda turns=turns: servo.telemetry.written[0] > turns + 20)
+        servo.stop()
+        assert is_zero(probe.forces_n[-1])
+    assert servo.fault is None
+
+
 def test_a_lost_device_is_told_to_the_host(probe):
     probe.state.lost_at_read = 20
     with Servo(probe) as servo:
