@@ -80,7 +80,7 @@ def stop(rate_hz: float, *, speed_mps: float = SPEED_MPS, moving_s: float = 3.0,
 def zigzag(rate_hz: float, *, speed_mps: float = SPEED_MPS, leg_s: float = 0.5, legs: float = 12) -> Motion:
     """Legs alternating by 90°, 45° to either side of x (Rek 2024, Fig. 6)."""
     t_s = _times(leg_s * legs, rate_hz)
-    leg = np.minimum(np.floor(t_s / leg_s), legs - 1)
+    leg = _count(t_s, leg_s, legs)
     side = np.where(leg % 2 == 0, 1.0, -1.0)
     along = speed_mps * math.sqrt(0.5)
     across = np.where(side > 0, t_s - leg * leg_s, (leg + 1) * leg_s - t_s)
@@ -92,7 +92,7 @@ def reach(
 ) -> Motion:
     """Minimum-jerk reaches to and fro along x, with a rest at each end (Flash & Hogan 1985)."""
     t_s = _times((reach_s + dwell_s) * reaches, rate_hz)
-    count = np.minimum(np.floor(t_s / (reach_s + dwell_s)), reaches - 1)
+    count = _count(t_s, reach_s + dwell_s, reaches)
     phase = np.clip((t_s - count * (reach_s + dwell_s)) / reach_s, 0.0, 1.0)
     way = phase**3 * (10 - 15 * phase + 6 * phase**2)
     pace = 30 * phase**2 * (1 - phase) ** 2 / reach_s
@@ -113,6 +113,12 @@ NAMES = tuple(_PATHS)
 
 def _times(duration_s: float, rate_hz: float) -> Floats:
     return np.arange(round(duration_s * rate_hz) + 1) / rate_hz
+
+
+def _count(t_s: Floats, each_s: float, most: float) -> Floats:
+    """Return how many stretches of ``each_s`` are over, at most one less than there are."""
+    over: Floats = np.floor(t_s / each_s + 1e-9)
+    return np.minimum(over, most - 1)
 
 
 def _on_circle(t_s: Floats, arc_m: Floats, speed_mps: Floats, radius_m: float) -> Motion:

@@ -1,0 +1,100 @@
+"""Scenes that tests share (the thesis' liquids among them), and a hand that moves a model tick by tick."""
+
+from typing import Any
+
+import numba
+import numpy as np
+
+from study_app.haptics.layout import SAMPLE, records
+from study_app.haptics.motion import Motion
+from study_app.haptics.pack import pack
+from study_app.haptics.safety import new_safety
+from study_app.haptics.scene import Knee, Liquid, Scene, Wake
+from study_app.haptics.tick import tick
+
+COMPILED = not numba.config.DISABLE_JIT
+TICK_NS = 1_000_000
+
+# ½ ρ C_d A of the thesis' ball in 1000 kg/m³ [kg/m].
+WATER_FACTOR = 0.5 * 1000 * 0.47 * np.pi * 0.034**2
+
+
+def examples(count: int) -> int:
+    """Return how many examples to try: compiled as asked, interpreted a tenth."""
+    return count if COMPILED else max(count // 10, 5)
+
+
+def liquid(density_kg_m3: float = 1000.0, *, wake: dict[str, Any] | None = None, **fields: Any) -> Liquid:
+    """Return a liquid with drag, and with a wake if its parameters are given."""
+    effects = ("drag",) if wake is None else ("drag", "wake")
+    return Liquid(
+        **{
+            "id": "liquid",
+            "density_kg_m3": density_kg_m3,
+            "effects": effects,
+            "wake": None if wake is None else Wake(**wake),
+            **fields,
+        }
+    )
+
+
+def scene(*liquids: Liquid, **fields: Any) -> Scene:
+    """Return a scene of these liquids; by default water with drag alone."""
+    return Scene(**{"liquids": liquids or (liquid(),), **fields})
+
+
+WATER = scene(liquid(1000, id="water", wake={"length": 1700, "scaling": 1700, "exponent": 0.75}))
+HONEY = scene(liquid(1400, id="honey"))
+LIGHT_OIL = scene(liquid(4500, id="light_oil", wake={"length": 125, "scaling": 250, "exponent": 0.25}))
+THESIS = {"water": WATER, "honey": HONEY, "light_oil": LIGHT_OIL}
+UNBENT = Knee(law="none")
+
+
+def moving(velocity_mps: Any, interval_s: Any = 1e-3) -> Motion:
+    """Return the motion (n rows) with these velocities (n, 3) [m/s, scene], Δt before each row [s]."""
+    velocity_mps = np.asarray(velocity_mps, float)
+    interval_s = np.broadcast_to(interval_s, len(velocity_mps))
+    t_s = np.cumsum(interval_s)
+    return Motion(t_s, np.cumsum(velocity_mps * interval_s[:, None], axis=0), velocity_mps)
+
+
+def columns(table: Any, *names: str) -> Any:
+    """Return named columns of a table side by side, (n, k)."""
+    return np.column_stack([table[name] for name in names])
+
+
+def vectors(table: Any, kind: str) -> Any:
+    """Return one of a simulated table's vectors, (n, 3): velocity, wake, force or device."""
+    names = {
+        "velocity": ("vx_mps", "vy_mps", "vz_mps"),
+        "wake": ("wake_x_mps", "wake_y_mps", "wake_z_mps"),
+        "force": ("fx_n", "fy_n", "fz_n"),
+        "device": ("device_fx_n", "device_fy_n", "device_fz_n"),
+    }
+    return columns(table, *names[kind])
+
+
+class Hand:
+    """Moves a model as a servo would: one call, one turn of 1 ms unless said otherwise."""
+
+    def __init__(self, felt: Scene, *, faded_in: bool = True) -> None:
+        self.model = pack(felt)
+        self.safety = new_safety()
+        self.safety[0].fade = 1.0 if faded_in else 0.0
+        self.sample = records(SAMPLE, 1)
+        self.time_ns = 0
+
+    def turn(self, position_m: Any = None, *, after_ns: int = TICK_NS) -> Any:
+        """Take one turn, with a new sample at ``position_m`` (hand frame), or without one; return a copy of it."""
+        self.time_ns += after_ns
+        sample = self.sample[0]
+        sample.time_ns = self.time_ns
+        sample.fresh = int(position_m is not None)
+        if position_m is not None:
+            sample.position_m[:] = position_m
+        tick(self.model, self.safety[0], sample)
+        return self.sample.copy()[0]
+
+    def sweep(self, speed_mps: float, ticks: int, *, start_m: float = 0.0) -> list[Any]:
+        """Move along x at ``speed_mps`` of the hand from ``start_m`` on; return every sample."""
+        return [self.turn((start_m + speed_mps * 1e-3 * k, 0.0, 0.0)) for k in range(1, ticks + 1)]

@@ -1,0 +1,221 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from study_app.errors import StudyError
+from study_app.haptics.layout import (
+    LIMITER_FADE,
+    LIMITER_NON_FINITE,
+    LIMITER_NORM,
+    LIMITER_SLEW,
+    LIMITER_SLOPE,
+    LIMITER_STOP,
+    STATUS_NON_FINITE,
+)
+from study_app.haptics.motion import Motion
+from study_app.haptics.offline import simulate
+from study_app.haptics.pack import pack, pack_into
+from study_app.haptics.safety import begin_scene, new_safety, slope_limit
+from study_app.haptics.scene import Box
+from tests.haptics.scenes import (
+    HONEY,
+    LIGHT_OIL,
+    THESIS,
+    UNBENT,
+    WATER,
+    Hand,
+    examples,
+    liquid,
+    moving,
+    scene,
+    vectors,
+)
+
+TAR = scene(liquid(20_000), scale=30, knee=UNBENT)
+anything = st.floats(allow_nan=True, allow_infinity=True, width=64)
+
+
+def size(force_n):
+    """Return |force|."""
+    return float(np.linalg.norm(force_n))
+
+
+@pytest.mark.parametrize(
+    ("period_s", "delay_ticks", "expected"),
+    [
+        (1e-3, 0, 60),
+        (1e-3, 1, 60),
+        (1e-3, 2, 40),
+        (1e-3, 3, 20),
+        (1e-3, 4, 20),
+        (0.5e-3, 4, 40),
+        (0.5e-3, 1, 60),
+        (0.7e-3, 3, 20),
+        (2e-3, 1, 30),
+        (1.5e-3, 2, 20),
+        (3e-3, 1, 15),
+        (4e-3, 4, 6),
+    ],
+)
+def test_between_two_entries_of_the_slope_table_the_worse_counts(period_s, delay_ticks, expected):
+    assert slope_limit(period_s, delay_ticks) == expected
+
+
+@pytest.mark.parametrize(("period_s", "delay_ticks"), [(5e-3, 1), (1e-3, 5)])
+def test_a_loop_beyond_the_table_is_refused(period_s, delay_ticks):
+    with pytest.raises(StudyError, match="250 Hz"):
+        slope_limit(period_s, delay_ticks)
+
+
+def test_the_slope_at_the_hand_is_scale_times_that_of_the_scene():
+    model = pack(HONEY, capacity=0)
+    assert model.parameters[0].slope_limit_nspm == 6.0
+    pack_into(model, HONEY.model_copy(update={"scale": 3.0}), delay_ticks=2)
+    assert model.parameters[0].slope_limit_nspm == pytest.approx(40 / 3)
+
+
+def test_drag_is_shortened_to_the_slope_limit_along_its_direction():
+    v = np.array([0.3, -0.2, 0.1])
+    table = simulate(TAR, moving(np.tile(v, (40, 1))))
+    force, sent = vectors(table, "force")[-1], vectors(table, "device")[-1]
+    assert size(force) > 60 / 30 * size(v)
+    assert sent == pytest.approx(-60 / 30 * v, rel=1e-12)
+    assert table.limiters[-1] == LIMITER_SLOPE
+
+
+def test_a_drag_within_its_slope_is_sent_as_it_is():
+    table = simulate(WATER, moving(np.tile([0.0, 0.5, 1.0], (40, 1))))
+    assert (vectors(table, "device")[-1] == vectors(table, "force")[-1]).all()
+    assert table.limiters[-1] == 0
+
+
+def test_the_slope_is_that_of_the_relative_speed_so_a_push_is_left_alone():
+    still = moving(np.concatenate([np.tile([3.0, 0, 0], (1500, 1)), np.zeros((30, 3))]))
+    table = simulate(WATER, still)
+    assert table.fx_n[-1] > 1.0
+    assert table.device_fx_n[-1] == table.fx_n[-1]
+
+
+def test_between_two_liquids_the_slope_keeps_one_limit():
+    halves = scene(
+        liquid(20_000, id="left", region=Box(centre_m=(-1, 0, 0), size_m=(2, 9, 9))),
+        liquid(20_000, id="right", region=Box(centre_m=(1, 0, 0), size_m=(2, 9, 9))),
+        scale=30,
+        knee=UNBENT,
+    )
+    x = np.linspace(-0.02, 0.06, 80)
+    motion = Motion(np.arange(80) / 1000, np.column_stack([x, 0 * x, 0 * x]), np.tile([0.5, 0.0, 0.0], (80, 1)))
+    assert simulate(halves, motion).device_fx_n[20:] == pytest.approx(-1.0)
+
+
+def test_the_force_is_clamped_to_the_limit_along_its_direction():
+    v = np.array([4.0, 1.0, -2.0])
+    table = simulate(scene(liquid(4500), scale=1), moving(np.tile(v, (60, 1))))
+    assert vectors(table, "device")[-1] == pytest.approx(-8 * v / size(v))
+    assert table.limiters[-1] == LIMITER_NORM
+
+
+def test_a_weaker_device_clamps_earlier():
+    hand = Hand(LIGHT_OIL)
+    hand.safety[0].device_limit_n = 2.5
+    assert size(hand.sweep(0.2, 40)[-1].device_force_n) == pytest.approx(2.5)
+
+
+def test_a_limit_that_is_lowered_holds_at_once():
+    hand = Hand(HONEY)
+    assert size(hand.sweep(0.2, 300)[-1].device_force_n) > 4
+    hand.safety[0].device_limit_n = 1.0
+    assert size(hand.turn((0.0602, 0, 0)).device_force_n) == pytest.approx(1.0)
+
+
+def test_the_force_moves_by_half_a_newton_a_tick_at_most():
+    v = np.tile([2.0, 0.0, 1.0], (30, 1))
+    table = simulate(WATER, moving(np.concatenate([v, -v])))
+    sent = vectors(table, "device")
+    steps = np.linalg.norm(np.diff(sent, axis=0, prepend=np.zeros((1, 3))), axis=1)
+    assert steps.max() == pytest.approx(0.5)
+    slewed = table.limiters & LIMITER_SLEW != 0
+    assert slewed[0]
+    assert slewed[30]
+    assert (steps[~slewed] <= 0.5).all()
+    assert steps[slewed] == pytest.approx(0.5)
+
+
+def test_the_force_fades_in_over_half_a_second_at_the_start():
+    hand = Hand(HONEY, faded_in=False)
+    moved = hand.sweep(0.2, 600)
+    share = np.array([size(sample.device_force_n) / max(size(sample.force_n), 1e-9) for sample in moved])
+    assert share[200:500] == pytest.approx(np.arange(200, 500) / 500)
+    assert (share[501:] == 1).all()
+    faded = [bool(sample.limiters & LIMITER_FADE) for sample in moved]
+    assert faded == [True] * 500 + [False] * 100
+
+
+def test_a_change_of_scene_fades_in_over_50_ms_and_never_steps():
+    hand = Hand(HONEY)
+    before = hand.sweep(0.2, 300)[-1]
+    hand.model = pack(WATER)
+    begin_scene(hand.safety[0])
+    after = hand.sweep(0.2, 100, start_m=0.06)
+    sent = np.array([sample.device_force_n for sample in [before, *after]])
+    assert np.linalg.norm(np.diff(sent, axis=0), axis=1).max() <= 0.5 + 1e-12
+    assert [bool(sample.limiters & LIMITER_FADE) for sample in after] == [True] * 49 + [False] * 51
+    assert (after[-1].device_force_n == after[-1].force_n).all()
+
+
+def test_a_scene_during_the_start_fade_begins_it_again():
+    hand = Hand(HONEY, faded_in=False)
+    hand.sweep(0.2, 400)
+    begin_scene(hand.safety[0])
+    after = hand.sweep(0.2, 520, start_m=0.08)
+    assert [bool(sample.limiters & LIMITER_FADE) for sample in after[:500]] == [True] * 499 + [False]
+
+
+def test_a_force_stop_is_zero_on_the_next_tick_and_fades_back_in():
+    hand = Hand(HONEY)
+    assert size(hand.sweep(0.2, 300)[-1].device_force_n) > 4
+    hand.safety[0].stop = 1
+    stopped = hand.sweep(0.2, 20, start_m=0.06)
+    assert not any(sample.device_force_n.any() for sample in stopped)
+    assert all(sample.limiters & LIMITER_STOP for sample in stopped)
+    assert size(stopped[-1].force_n) > 4
+    hand.safety[0].stop = 0
+    back = hand.sweep(0.2, 600, start_m=0.064)
+    assert size(back[0].device_force_n) < 0.05
+    assert [bool(sample.limiters & LIMITER_FADE) for sample in back] == [True] * 499 + [False] * 101
+
+
+def test_a_force_that_is_no_number_becomes_zero_and_a_status():
+    hand = Hand(HONEY)
+    hand.sweep(0.05, 100)
+    hand.model.liquids[0].drag.factor_kg_m = np.nan
+    broken = hand.turn((0.00505, 0, 0))
+    assert broken.status == STATUS_NON_FINITE
+    assert broken.limiters & LIMITER_NON_FINITE
+    assert np.isfinite(broken.device_force_n).all()
+    assert size(broken.device_force_n) < size(hand.sample[0].device_force_n) + 0.5
+    assert not hand.turn((0.0051, 0, 0)).device_force_n.any()
+
+
+@pytest.mark.parametrize("name", THESIS)
+@settings(max_examples=examples(60), deadline=None)
+@given(data=st.data())
+def test_whatever_the_device_says_the_force_is_finite_within_its_limit_and_never_jumps(name, data):
+    hand = Hand(THESIS[name], faded_in=data.draw(st.booleans()))
+    near = st.floats(-0.06, 0.06)
+    places = st.one_of(st.none(), st.tuples(near, near, near), st.tuples(anything, anything, anything))
+    before = np.zeros(3)
+    with np.errstate(all="ignore"):
+        for place in data.draw(st.lists(places, max_size=60)):
+            after_ns = data.draw(st.sampled_from([1_000_000, 1_000_000, 0, 1, 3_000_000, 40_000_000]))
+            sent = hand.turn(place, after_ns=after_ns).device_force_n
+            assert np.isfinite(sent).all()
+            assert size(sent) <= 8 * (1 + 1e-12)
+            assert size(sent - before) <= 0.5 + 1e-9 or not sent.any()
+            before = sent.copy()
+
+
+def test_new_safety_starts_with_no_force_and_no_stop():
+    safety = new_safety(5.0)[0]
+    assert (safety.fade, safety.stop, safety.fault, safety.device_limit_n) == (0.0, 0, 0, 5.0)
