@@ -72,7 +72,7 @@ class Wake(Frozen):
     motion enters the tail.
     """
 
-    length: int = Field(ge=1, le=200_000)
+    length: int = Field(ge=1, le=100_000)
     scaling: float = Field(gt=0, le=1e9)
     exponent: float = Field(default=1.0, gt=0, le=10)
     breaking_angle_deg: float = Field(default=45.0, ge=0, le=180)
