@@ -1,5 +1,35 @@
-"""What all tests share: no screen, and caches of their own only where a test asks for them."""
+"""What all tests share: no screen, no Qt where its libraries are missing, and no warning that nobody expected."""
 
+import logging
 import os
+from collections.abc import Iterator
+
+import pytest
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+
+try:
+    import PySide6.QtWidgets  # noqa: F401
+except ImportError:
+    QT_IS_HERE = False
+else:
+    QT_IS_HERE = True
+
+
+def pytest_plugin_registered(plugin: object, manager: pytest.PytestPluginManager) -> None:
+    """Without Qt the plugin that tests it cannot start, and must not keep the other tests from running."""
+    if not QT_IS_HERE and manager.get_name(plugin) == "pytest-qt":
+        manager.unregister(plugin)
+
+
+@pytest.fixture(autouse=True)
+def no_unexpected_log(caplog: pytest.LogCaptureFixture) -> Iterator[None]:
+    """Fail on a warning in the log."""
+    yield
+    unexpected = [
+        record.getMessage()
+        for when in ("setup", "call")
+        for record in caplog.get_records(when)
+        if record.levelno >= logging.WARNING
+    ]
+    assert not unexpected, unexpected
