@@ -68,18 +68,21 @@ def check(protocol: str | None, *, schema: bool) -> None:
 def simulate(scene: str, liquid: str, path: str, out: Path, changes: tuple[str, ...]) -> None:
     """Compute the force along a motion, with the servo's own tick, without a device or a clock."""
     from study_app.haptics import motion, offline, paths
-    from study_app.haptics.scene import override
+    from study_app.haptics.scene import override_all
     from study_app.protocol.load import load_scene
 
-    chosen = load_scene(scene, liquid)
-    for change in changes:
-        name, separator, value = change.partition("=")
-        if not separator:
-            raise click.UsageError(f"--set {change}: write NAME=VALUE, such as --set density_kg_m3=1200")
-        chosen = override(chosen, name.strip(), value.strip())
+    chosen = override_all(load_scene(scene, liquid), dict(_assignment(change) for change in changes))
     moved = paths.path(path, rate_hz=chosen.rate_hz) if path in paths.NAMES else motion.read(Path(path))
-    motion.write(out, moved, offline.simulate(chosen, moved))
-    click.echo(f"{out}: {len(moved.t_s)} rows")
+    table = offline.simulate(chosen, moved)
+    motion.write(out, table)
+    click.echo(f"{out}: {len(table)} rows")
+
+
+def _assignment(change: str) -> tuple[str, str]:
+    name, separator, value = change.partition("=")
+    if not separator:
+        raise click.UsageError(f"--set {change}: write NAME=VALUE, such as --set density_kg_m3=1200")
+    return name.strip(), value.strip()
 
 
 @commands.command()
