@@ -12,9 +12,10 @@ from study_app.errors import StudyError
 from study_app.haptics.compiled import kernel
 from study_app.haptics.door import clamp, place
 from study_app.haptics.layout import ESTIMATOR_GIVEN, SAMPLE, Record, records
+from study_app.haptics.limits import slope_limit
 from study_app.haptics.motion import Motion, read
 from study_app.haptics.pack import pack
-from study_app.haptics.safety import guard, new_safety, slope_limit
+from study_app.haptics.safety import guard, new_safety
 from study_app.haptics.scene import Given, Scene
 from study_app.haptics.tick import report, respond
 

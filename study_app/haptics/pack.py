@@ -9,7 +9,7 @@ import numpy as np
 
 from study_app.errors import StudyError
 from study_app.haptics import layout
-from study_app.haptics.safety import slope_limit
+from study_app.haptics.limits import slope_limit
 from study_app.haptics.scene import MAX_LIQUIDS, Box, Cylinder, Ewma, Given, Region, Scene, Wake
 
 _EFFECTS = {"drag": layout.EFFECT_DRAG, "wake": layout.EFFECT_WAKE}

@@ -13,10 +13,11 @@ from study_app.haptics.layout import (
     LIMITER_STOP,
     STATUS_NON_FINITE,
 )
+from study_app.haptics.limits import slope_limit
 from study_app.haptics.motion import Motion
 from study_app.haptics.offline import simulate
 from study_app.haptics.pack import pack, pack_into
-from study_app.haptics.safety import begin_scene, new_safety, slope_limit
+from study_app.haptics.safety import begin_scene, new_safety
 from study_app.haptics.scene import Box
 from tests.haptics.scenes import (
     HONEY,
