@@ -62,7 +62,7 @@ def test_check_far_from_the_checkout_tells_the_study_in_words(tmp_path: Path) ->
 @pytest.mark.parametrize(
     ("words", "parts"),
     [
-        (("--participant", "P-1"), ("P-1", "letters and digits")),
+        (("--participant", "P-1"), ("P-1", "only letters A-Z", "no dash")),
         (("--participant", "P001", "--device", "falkon"), ("falkon", "mouse", "scripted")),
         (("--participant", "P001", "--language", "xx"), ("xx", "en", "nl")),
     ],
