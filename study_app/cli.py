@@ -68,7 +68,7 @@ def check(protocol: str | None, *, schema: bool) -> None:
 def simulate(scene: str, liquid: str, path: str, out: Path, changes: tuple[str, ...]) -> None:
     """Compute the force along a motion, with the servo's own tick, without a device or a clock."""
     from study_app.haptics import motion, offline, paths
-    from study_app.haptics.scene import override_all
+    from study_app.haptics.override import override_all
     from study_app.protocol.load import load_scene
 
     chosen = override_all(load_scene(scene, liquid), dict(_assignment(change) for change in changes))

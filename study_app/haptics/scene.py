@@ -1,31 +1,71 @@
 """What is presented together: a body, the liquids around it, and how its motion is measured.
 
 Frozen, validated values in SI units and the scene frame (x right, y up, z toward the participant; scene = scale · hand
-+ origin). A parameter that no model names is an error. Meaning of every number: the docstrings here; of every formula:
-``haptics.effects``.
++ origin). Liquids and their effects are in ``liquid``, setting one parameter by its name in ``override``; both are at
+hand from here, too.
 """
 
 from __future__ import annotations
 
-import difflib
-from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Literal, TypeAlias
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
-from study_app.errors import StudyError
+from study_app.haptics.liquid import (
+    MAX_LIQUIDS,
+    AddedMass,
+    Box,
+    Channel,
+    Current,
+    Cylinder,
+    Drag,
+    Effect,
+    Everywhere,
+    Frozen,
+    History,
+    Liquid,
+    LocalWake,
+    Metres,
+    Positive,
+    Region,
+    Uniform,
+    Vortex,
+    Wake,
+)
 
-Metres: TypeAlias = tuple[float, float, float]
-Positive: TypeAlias = Annotated[float, Field(gt=0)]
-Effect: TypeAlias = Literal["drag", "wake"]
+__all__ = [
+    "MAX_LIQUIDS",
+    "Accuracy",
+    "AddedMass",
+    "Body",
+    "Box",
+    "Channel",
+    "Current",
+    "Cylinder",
+    "Drag",
+    "Effect",
+    "Everywhere",
+    "Ewma",
+    "Frozen",
+    "Given",
+    "History",
+    "Knee",
+    "Liquid",
+    "LocalWake",
+    "Metres",
+    "MotionBox",
+    "Positive",
+    "Region",
+    "Scene",
+    "Uniform",
+    "Velocity",
+    "Vortex",
+    "Wake",
+]
 
-MAX_LIQUIDS = 8
-
-
-class Frozen(BaseModel):
-    """A value: never changed once made, no unknown fields, no infinities."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+HAND_SPEED_MPS = 0.3
+HAND_ACCELERATION_MPS2 = 3.0  # 0.3 m/s at 1.6 Hz
+HAND_REACH_M = 0.04
 
 
 class Body(Frozen):
@@ -34,82 +74,6 @@ class Body(Frozen):
     diameter_m: float = Field(default=0.068, ge=1e-3, le=1)
     drag_coefficient: float = Field(default=0.47, ge=0, le=10)
     density_kg_m3: float = Field(default=1000.0, gt=0, le=25_000)
-
-
-class Everywhere(Frozen):
-    """The liquid has no border."""
-
-    kind: Literal["everywhere"] = "everywhere"
-
-
-class Box(Frozen):
-    """A box of full sizes ``size_m`` along x, y, z, around ``centre_m``."""
-
-    kind: Literal["box"] = "box"
-    centre_m: Metres = (0.0, 0.0, 0.0)
-    size_m: tuple[Positive, Positive, Positive]
-
-
-class Cylinder(Frozen):
-    """An upright cylinder around ``centre_m``."""
-
-    kind: Literal["cylinder"] = "cylinder"
-    centre_m: Metres = (0.0, 0.0, 0.0)
-    radius_m: Positive
-    height_m: Positive
-
-
-Region: TypeAlias = Annotated[Everywhere | Box | Cylinder, Field(discriminator="kind")]
-
-
-class Wake(Frozen):
-    """The position tail: the liquid velocity left by the body's recent path (Rek 2024, §4.3; ``effects.wake``).
-
-    ``length`` N and ``scaling`` S count elements at 1 kHz; N ≤ S, so that the liquid never outruns the body.
-    ``decay`` λ is the factor a millisecond, ``exponent`` y shapes the response to the fill. ``breaking_angle_deg`` β is
-    the turn that starts a new segment, taken between elements ``breaking_span_m`` of path apart (0: neighbours).
-    ``resolution_m`` is the least motion between two stored elements (0: every tick). ``axes`` says whether vertical
-    motion enters the tail.
-    """
-
-    length: int = Field(ge=1, le=100_000)
-    scaling: float = Field(gt=0, le=1e9)
-    exponent: float = Field(default=1.0, gt=0, le=10)
-    breaking_angle_deg: float = Field(default=45.0, ge=0, le=180)
-    breaking_span_m: float = Field(default=0.068, ge=0)
-    decay: float = Field(default=0.999975, gt=0, le=1)
-    resolution_m: float = Field(default=0.0, ge=0)
-    axes: Literal["xz", "xyz"] = "xz"
-
-    @model_validator(mode="after")
-    def _liquid_never_outruns_the_body(self) -> Wake:
-        if self.length > self.scaling:
-            raise ValueError(
-                f"length {self.length} exceeds scaling {self.scaling:g}: the wake would outrun the body; "
-                "lower length or raise scaling"
-            )
-        return self
-
-
-class Liquid(Frozen):
-    """A region filled with a fluid, and the effects it calls for."""
-
-    id: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")
-    density_kg_m3: float = Field(gt=0, le=25_000)
-    viscosity_pa_s: float | None = Field(default=None, gt=0)
-    region: Region = Everywhere()
-    effects: tuple[Effect, ...] = ("drag",)
-    wake: Wake | None = None
-
-    @model_validator(mode="after")
-    def _effects_have_what_they_need(self) -> Liquid:
-        if len(set(self.effects)) < len(self.effects):
-            raise ValueError(f"an effect is named twice in {list(self.effects)}")
-        if "wake" in self.effects and self.wake is None:
-            raise ValueError('the effect "wake" is called for, but its table (length, scaling, ...) is missing')
-        if "wake" in self.effects and "drag" not in self.effects:
-            raise ValueError('the effect "wake" acts through "drag": name both')
-        return self
 
 
 class Ewma(Frozen):
@@ -135,11 +99,36 @@ class Knee(Frozen):
     threshold_mps: float = Field(default=5.0, gt=0)
 
 
+class Accuracy(Frozen):
+    """What ``effects = "auto"`` may leave out: up to a share of the whole force, or a force if that is greater."""
+
+    relative: float = Field(default=0.05, ge=0, le=1)
+    absolute_n: float = Field(default=0.05, ge=0)
+
+
+class MotionBox(Frozen):
+    """How the body is expected to move, in the scene: greatest speed and acceleration, and how deep its centre gets.
+
+    ``depth_m`` is the least and the greatest depth of the centre below a liquid's top face; negative is above it. What
+    is None follows from a hand that moves 40 mm to every side at up to 0.3 m/s and 3 m/s² (`Scene.motion_in`).
+    """
+
+    speed_mps: Positive | None = None
+    acceleration_mps2: Positive | None = None
+    depth_m: tuple[float, float] | None = None
+
+    @model_validator(mode="after")
+    def _least_depth_comes_first(self) -> MotionBox:
+        if self.depth_m is not None and self.depth_m[0] > self.depth_m[1]:
+            raise ValueError(f"depth_m is the least depth, then the greatest, not {list(self.depth_m)}")
+        return self
+
+
 class Scene(Frozen):
     """Everything the force model needs. Without liquids a scene is rest: zero force.
 
     ``scale`` and ``origin_m`` map the hand into the scene; ``rate_hz`` is the nominal rate of ticks; ``force_limit_n``
-    the greatest force that may be sent.
+    the greatest force that may be sent. ``accuracy`` and ``motion`` are for liquids with ``effects = "auto"``.
     """
 
     scale: float = Field(default=10.0, ge=0.01, le=100)
@@ -150,6 +139,8 @@ class Scene(Frozen):
     velocity: Velocity = Ewma()
     knee: Knee = Knee()
     force_limit_n: float = Field(default=8.0, gt=0, le=20)
+    accuracy: Accuracy = Accuracy()
+    motion: MotionBox = MotionBox()
 
     @model_validator(mode="after")
     def _liquids_are_told_apart(self) -> Scene:
@@ -158,62 +149,16 @@ class Scene(Frozen):
             raise ValueError(f"two liquids share an id in {names}")
         return self
 
-
-def override(scene: Scene, name: str, value: object) -> Scene:
-    """Return ``scene`` with the one parameter called ``name`` set to ``value``; see `override_all`."""
-    return override_all(scene, {name: value})
-
-
-def override_all(scene: Scene, values: Mapping[str, object]) -> Scene:
-    """Return ``scene`` with parameters set by name, validated once all are set.
-
-    A name is that of a field of the liquid, its wake, the body, the velocity estimator, the knee or the scene itself,
-    in this order where two share one (``density_kg_m3`` is the liquid's, ``body.density_kg_m3`` the body's). With
-    several liquids all that have the parameter get it. Text is read as the field's type; tuples are split at commas.
-
-    Raises
-    ------
-    StudyError
-        An unknown name, or a value out of range.
-    """
-    tree = scene.model_dump()
-    tables = dict(_tables(tree))
-    for name, value in values.items():
-        for table, field in _places(tables, name):
-            split = isinstance(value, str) and isinstance(table[field], tuple)
-            table[field] = tuple(value.split(",")) if split and isinstance(value, str) else value
-    try:
-        return Scene.model_validate(tree)
-    except ValidationError as error:
-        named = ", ".join(f"{name} = {value}" for name, value in values.items())
-        reasons = "; ".join(
-            f"{'.'.join(str(part) for part in problem['loc'])}: {problem['msg']}" for problem in error.errors()
+    def motion_in(self, liquid: Liquid) -> MotionBox:
+        """Return ``motion`` with what it leaves open filled in; without a top there is no depth."""
+        depth_m = self.motion.depth_m
+        if depth_m is None and not isinstance(liquid.region, Everywhere):
+            region = liquid.region
+            top_m = region.centre_m[1] + (region.size_m[1] if isinstance(region, Box) else region.height_m) / 2
+            middle_m, reach_m = top_m - self.origin_m[1], self.scale * HAND_REACH_M
+            depth_m = (middle_m - reach_m, middle_m + reach_m)
+        return MotionBox(
+            speed_mps=self.motion.speed_mps or self.scale * HAND_SPEED_MPS,
+            acceleration_mps2=self.motion.acceleration_mps2 or self.scale * HAND_ACCELERATION_MPS2,
+            depth_m=depth_m,
         )
-        raise StudyError(f"cannot set {named}: {reasons}") from error
-
-
-def _tables(tree: dict[str, Any]) -> Iterator[tuple[str, list[dict[str, Any]]]]:
-    """Yield the places a parameter may sit in, those first that a plain name means first."""
-    liquids = list(tree["liquids"])
-    yield "liquid", liquids
-    yield "wake", [liquid["wake"] for liquid in liquids if liquid["wake"] is not None]
-    yield "body", [tree["body"]]
-    yield "velocity", [tree["velocity"]]
-    yield "knee", [tree["knee"]]
-    yield "scene", [tree]
-
-
-_NOT_A_PARAMETER = {"id", "kind", "region", "wake", "body", "liquids", "velocity", "knee"}
-
-
-def _places(tables: dict[str, list[dict[str, Any]]], name: str) -> list[tuple[dict[str, Any], str]]:
-    """Return the (table, field) pairs that ``name`` means."""
-    place, _, field = name.rpartition(".")
-    for table_name, rows in tables.items():
-        found = [(row, field) for row in rows if field in row and field not in _NOT_A_PARAMETER]
-        if found and place in {"", table_name}:
-            return found
-    known = sorted({key for rows in tables.values() for row in rows for key in row} - _NOT_A_PARAMETER)
-    near = difflib.get_close_matches(field, known, n=1)
-    meant = f"did you mean {near[0]!r}? " if near else ""
-    raise StudyError(f"this scene has no parameter {name!r}: {meant}it has {', '.join(known)}")

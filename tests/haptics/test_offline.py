@@ -4,8 +4,9 @@ import pytest
 from study_app.haptics.layout import LIMITER_SLEW
 from study_app.haptics.motion import Motion, write
 from study_app.haptics.offline import COLUMNS, simulate
+from study_app.haptics.override import override_all
 from study_app.haptics.paths import circle, line, path, reach, reverse, zigzag
-from study_app.haptics.scene import Scene, override_all
+from study_app.haptics.scene import Scene
 from tests.haptics.scenes import HONEY, WATER, WATER_FACTOR, moving, scene, vectors
 
 # The settings of the thesis' figures 3 to 8.

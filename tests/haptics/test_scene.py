@@ -2,7 +2,8 @@ import pytest
 from pydantic import ValidationError
 
 from study_app.errors import StudyError
-from study_app.haptics.scene import Body, Box, Everywhere, Given, Liquid, Scene, Wake, override, override_all
+from study_app.haptics.override import override, override_all
+from study_app.haptics.scene import Body, Box, Everywhere, Given, Liquid, Scene, Wake
 from tests.haptics.scenes import HONEY, LIGHT_OIL, WATER, liquid, scene
 
 
@@ -29,7 +30,7 @@ def test_a_scene_never_changes():
         ({"effects": ("drag", "wake")}, "its table"),
         ({"effects": ("wake",), "wake": {"length": 1, "scaling": 1}}, "name both"),
         ({"effects": ("drag", "drag")}, "twice"),
-        ({"effects": ("drag", "magnet")}, "'drag' or 'wake'"),
+        ({"effects": ("drag", "magnet")}, "'drag', 'wake', 'local_wake'"),
         ({"density_kg_m3": float("nan")}, "finite"),
         ({"density_kg_m3": 0}, "greater than 0"),
         ({"viscosity": 1}, "Extra inputs are not permitted"),
@@ -122,5 +123,5 @@ def test_an_override_that_fails_says_why(name, value, message):
 
 
 def test_a_parameter_of_an_effect_left_out_is_unknown():
-    with pytest.raises(StudyError, match=r"no parameter .length.*it has alpha, density_kg_m3, diameter_m"):
+    with pytest.raises(StudyError, match=r"no parameter .length.*it has absolute_n, acceleration_mps2, alpha, "):
         override(HONEY, "length", 5)

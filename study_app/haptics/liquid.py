@@ -1,0 +1,215 @@
+"""What can be felt: regions filled with fluids, the effects they call for, and one frozen model for each effect.
+
+SI units, scene frame (x right, y up, z toward the participant). A parameter that no model names is an error. The
+equation of every effect stands in the docstring of its file in ``haptics.effects``.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, TypeAlias, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
+
+Metres: TypeAlias = tuple[float, float, float]
+Positive: TypeAlias = Annotated[float, Field(gt=0)]
+Effect: TypeAlias = Literal["drag", "wake", "local_wake", "current", "buoyancy", "surface", "added_mass", "history"]
+Effects: TypeAlias = Annotated[
+    Annotated[tuple[Effect, ...], Tag("named")] | Annotated[Literal["auto"], Tag("auto")],
+    Discriminator(lambda value: "auto" if isinstance(value, str) else "named"),
+]
+
+MAX_LIQUIDS = 8
+
+
+class Frozen(BaseModel):
+    """A value: never changed once made, no unknown fields, no infinities."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class Everywhere(Frozen):
+    """The liquid has no border."""
+
+    kind: Literal["everywhere"] = "everywhere"
+
+
+class Box(Frozen):
+    """A box of full sizes ``size_m`` along x, y, z, around ``centre_m``."""
+
+    kind: Literal["box"] = "box"
+    centre_m: Metres = (0.0, 0.0, 0.0)
+    size_m: tuple[Positive, Positive, Positive]
+
+
+class Cylinder(Frozen):
+    """An upright cylinder around ``centre_m``."""
+
+    kind: Literal["cylinder"] = "cylinder"
+    centre_m: Metres = (0.0, 0.0, 0.0)
+    radius_m: Positive
+    height_m: Positive
+
+
+Region: TypeAlias = Annotated[Everywhere | Box | Cylinder, Field(discriminator="kind")]
+
+
+class Drag(Frozen):
+    """Which drag coefficient resists (``effects.drag``): the body's own, or that of a sphere at its Reynolds number."""
+
+    law: Literal["constant", "schiller-naumann", "haider-levenspiel", "brown-lawler"] = "constant"
+
+
+class Wake(Frozen):
+    """The position tail: the liquid velocity left by the body's recent path (Rek 2024, §4.3; ``effects.wake``).
+
+    ``length`` N and ``scaling`` S count elements at 1 kHz; N ≤ S, so that the liquid never outruns the body.
+    ``decay`` λ is the factor a millisecond, ``exponent`` y shapes the response to the fill. ``breaking_angle_deg`` β is
+    the turn that starts a new segment, taken between elements ``breaking_span_m`` of path apart (0: neighbours).
+    ``resolution_m`` is the least motion between two stored elements (0: every tick). ``axes`` says whether vertical
+    motion enters the tail.
+    """
+
+    length: int = Field(ge=1, le=100_000)
+    scaling: float = Field(gt=0, le=1e9)
+    exponent: float = Field(default=1.0, gt=0, le=10)
+    breaking_angle_deg: float = Field(default=45.0, ge=0, le=180)
+    breaking_span_m: float = Field(default=0.068, ge=0)
+    decay: float = Field(default=0.999975, gt=0, le=1)
+    resolution_m: float = Field(default=0.0, ge=0)
+    axes: Literal["xz", "xyz"] = "xz"
+
+    @model_validator(mode="after")
+    def _liquid_never_outruns_the_body(self) -> Wake:
+        return _within_scaling(self)
+
+
+class LocalWake(Frozen):
+    """The position tail, tied to the places it was left at (``effects.local_wake``).
+
+    ``length``, ``scaling``, ``exponent``, ``decay`` and ``axes`` as in `Wake`. A place is felt up to about ``reach_m``
+    from it (None: one diameter of the body), ever farther and weaker as it spreads by ``spreading_m2ps``.
+    """
+
+    length: int = Field(ge=1, le=100_000)
+    scaling: float = Field(gt=0, le=1e9)
+    exponent: float = Field(default=1.0, gt=0, le=10)
+    decay: float = Field(default=0.999975, gt=0, le=1)
+    axes: Literal["xz", "xyz"] = "xz"
+    reach_m: Positive | None = None
+    spreading_m2ps: float = Field(default=1e-3, ge=0, le=10)
+
+    @model_validator(mode="after")
+    def _liquid_never_outruns_the_body(self) -> LocalWake:
+        return _within_scaling(self)
+
+
+W = TypeVar("W", Wake, LocalWake)
+
+
+def _within_scaling(wake: W) -> W:
+    if wake.length > wake.scaling:
+        raise ValueError(
+            f"length {wake.length} exceeds scaling {wake.scaling:g}: the wake would outrun the body; "
+            "lower length or raise scaling"
+        )
+    return wake
+
+
+class Uniform(Frozen):
+    """A current that is the same everywhere in the liquid."""
+
+    kind: Literal["uniform"] = "uniform"
+    velocity_mps: Metres
+
+
+class Channel(Frozen):
+    """A horizontal current between two walls ``width_m`` apart, fastest midway (``peak_mps``), at rest at the walls.
+
+    It flows toward ``heading_deg``: 0 is to the right (+x), 90 away from the participant (−z); its middle line goes
+    through ``centre_m``.
+    """
+
+    kind: Literal["channel"] = "channel"
+    centre_m: Metres = (0.0, 0.0, 0.0)
+    heading_deg: float = Field(default=0.0, ge=-360, le=360)
+    width_m: Positive
+    peak_mps: float
+
+
+class Vortex(Frozen):
+    """A current around the upright axis through ``centre_m``: ``peak_mps`` at ``core_m`` from it, counter-clockwise."""
+
+    kind: Literal["vortex"] = "vortex"
+    centre_m: Metres = (0.0, 0.0, 0.0)
+    core_m: Positive
+    peak_mps: float
+
+
+Current: TypeAlias = Annotated[Uniform | Channel | Vortex, Field(discriminator="kind")]
+
+
+class AddedMass(Frozen):
+    """The liquid that is accelerated with the body (``effects.added_mass``).
+
+    ``coefficient`` C_a is ½ for a sphere; the acceleration is smoothed over ``filter_s``, but not where velocities are
+    given.
+    """
+
+    coefficient: float = Field(default=0.5, ge=0, le=10)
+    filter_s: float = Field(default=0.025, ge=0, le=1)
+
+
+class History(Frozen):
+    """The Basset force: the boundary layer's memory of past accelerations (``effects.history``).
+
+    Accelerations younger than ``window_s`` count one by one, older ones in ten exponentials. Velocities are smoothed
+    over ``smoothing_s`` before, but not where they are given.
+    """
+
+    window_s: float = Field(default=0.05, ge=0.005, le=0.5)
+    smoothing_s: float = Field(default=0.01, ge=0, le=1)
+
+
+class Liquid(Frozen):
+    """A region filled with a fluid, and the effects it calls for; ``"auto"`` lets ``haptics.gate`` choose them.
+
+    The table of an effect that is not called for may stand; it means nothing.
+    """
+
+    id: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")
+    density_kg_m3: float = Field(gt=0, le=25_000)
+    viscosity_pa_s: float | None = Field(default=None, gt=0)
+    region: Region = Everywhere()
+    effects: Effects = ("drag",)
+    drag: Drag = Drag()
+    wake: Wake | None = None
+    local_wake: LocalWake | None = None
+    current: Current | None = None
+    added_mass: AddedMass = AddedMass()
+    history: History = History()
+
+    @model_validator(mode="after")
+    def _effects_have_what_they_need(self) -> Liquid:
+        if self.effects == "auto":
+            return self
+        effects = self.effects
+        if len(set(effects)) < len(effects):
+            raise ValueError(f"an effect is named twice in {list(effects)}")
+        for effect, table, means in (
+            ("wake", self.wake, "length, scaling, ..."),
+            ("local_wake", self.local_wake, "length, scaling, ..."),
+            ("current", self.current, 'kind = "uniform", "channel" or "vortex", ...'),
+        ):
+            if effect in effects and table is None:
+                raise ValueError(f'the effect "{effect}" is called for, but its table ({means}) is missing')
+            if effect in effects and "drag" not in effects:
+                raise ValueError(f'the effect "{effect}" acts through "drag": name both')
+        if "wake" in effects and "local_wake" in effects:
+            raise ValueError('"wake" and "local_wake" are two models of the same thing: call for one of them')
+        if "drag" in effects and self.drag.law != "constant" and self.viscosity_pa_s is None:
+            raise ValueError(f'the drag law "{self.drag.law}" needs the liquid\'s viscosity_pa_s')
+        if "history" in effects and self.viscosity_pa_s is None:
+            raise ValueError('the effect "history" needs the liquid\'s viscosity_pa_s')
+        if "surface" in effects and isinstance(self.region, Everywhere):
+            raise ValueError('the effect "surface" needs a region with a top: a box or a cylinder')
+        return self
