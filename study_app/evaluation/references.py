@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from study_app.haptics.compiled import kernel
+from study_app.haptics.compiled import workings
 from study_app.haptics.motion import Floats, Motion
 from study_app.haptics.scene import Ewma, Knee, Scene
 
@@ -76,7 +76,7 @@ def lowered(velocity_mps: Floats, knee: Knee) -> Floats:
     return velocity_mps * (wanted / speed)
 
 
-@kernel
+@workings
 def wakes(
     h_mps: Any,
     position_m: Any,
@@ -121,7 +121,7 @@ def wakes(
     return wake_mps, size_mps
 
 
-@kernel
+@workings
 def _wake(element: Any, segment: Any, count: int, scaling: float, exponent: float) -> Any:
     """Return v_wake of a list and Σ|e|/S: eq. (1), then the response to the fill."""
     tail, speeds, squares = np.zeros(3), 0.0, 0.0
@@ -143,7 +143,7 @@ def _wake(element: Any, segment: Any, count: int, scaling: float, exponent: floa
     return tail * gain, speeds / scaling
 
 
-@kernel
+@workings
 def _breaks(
     h: Any,
     element: Any,
@@ -169,6 +169,6 @@ def _breaks(
     return bool(along < (breaking_cosine - 1e-12) * _size(h) * _size(e))
 
 
-@kernel
+@workings
 def _size(vector: Any) -> float:
     return math.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)

@@ -51,10 +51,19 @@ _use_own_cache()
 
 
 def kernel(function: F) -> F:
-    """Compile ``function`` for the servo: no interpreter lock, IEEE arithmetic, division by zero gives infinity."""
-    return cast(F, numba.njit(cache=True, nogil=True, error_model="numpy")(function))
+    """Compile ``function`` for the servo: no interpreter lock, IEEE arithmetic, division by zero gives infinity.
+
+    numba's memory management is off: code that would allocate does not compile, and arrays that are handed on are not
+    counted, which took two thirds of a tick. They live as long as whoever called from Python holds them.
+    """
+    return cast(F, numba.njit(cache=True, nogil=True, error_model="numpy", _nrt=False)(function))
 
 
 def part(function: F) -> F:
     """Compile ``function`` into each kernel that calls it: for the steps of a tick, which hand on whole models."""
-    return cast(F, numba.njit(cache=True, nogil=True, error_model="numpy", forceinline=True)(function))
+    return cast(F, numba.njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)(function))
+
+
+def workings(function: F) -> F:
+    """Compile ``function`` for evaluation, not for the servo: like `kernel`, but it may make arrays."""
+    return cast(F, numba.njit(cache=True, nogil=True, error_model="numpy")(function))
