@@ -18,6 +18,9 @@ import numba
 _PACKAGE = Path(__file__).resolve().parent.parent
 _KERNEL_FOLDERS = ("haptics", "devices", "evaluation")
 
+_OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
+_NO_MEMORY: dict[str, Any] = {"_nrt": False}  # numba's own name for it; its stubs do not know it
+
 F = TypeVar("F", bound=Callable[..., Any])
 
 
@@ -56,14 +59,14 @@ def kernel(function: F) -> F:
     numba's memory management is off: code that would allocate does not compile, and arrays that are handed on are not
     counted, which took two thirds of a tick. They live as long as whoever called from Python holds them.
     """
-    return cast(F, numba.njit(cache=True, nogil=True, error_model="numpy", _nrt=False)(function))
+    return cast(F, numba.njit(**_OPTIONS, **_NO_MEMORY)(function))
 
 
 def part(function: F) -> F:
     """Compile ``function`` into each kernel that calls it: for the steps of a tick, which hand on whole models."""
-    return cast(F, numba.njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)(function))
+    return cast(F, numba.njit(**_OPTIONS, **_NO_MEMORY, forceinline=True)(function))
 
 
 def workings(function: F) -> F:
     """Compile ``function`` for evaluation, not for the servo: like `kernel`, but it may make arrays."""
-    return cast(F, numba.njit(cache=True, nogil=True, error_model="numpy")(function))
+    return cast(F, numba.njit(**_OPTIONS)(function))
