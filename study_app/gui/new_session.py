@@ -31,12 +31,13 @@ from study_app.store.description import check_study
 from study_app.store.layout import MAX_SESSION, StudyFolder, check_participant, check_unused, suggest_id
 
 MAX_SEED = 999_999
+SIMULATED_DEVICE = "scripted"
 DEVICE_WORDS = {"mouse": "Mouse (seen, not felt)", "scripted": "Scripted hand (moves by itself)"}
 
 
 @dataclass(frozen=True, slots=True)
 class NewSession:
-    """What the operator chose; ``results`` is the study's folder, ``screen`` counts from 1."""
+    """What the operator chose; ``results`` is the study's folder, ``screen`` counts from 1 (None: the last)."""
 
     source: str
     participant: str
@@ -46,13 +47,18 @@ class NewSession:
     language: str
     device: str
     windowed: bool
-    screen: int
+    screen: int | None
     results: Path
 
 
 def draw_seed() -> int:
     """Return a seed that nobody chose, short enough to be read aloud."""
     return secrets.randbelow(MAX_SEED) + 1
+
+
+def study_results(results: Path, study: str, device: str) -> Path:
+    """Return a study's folder under ``results``; what a simulated hand did is kept apart from participants' data."""
+    return results / (f"{study}-{device}" if device == SIMULATED_DEVICE else study)
 
 
 class NewSessionDialog(QDialog):
@@ -74,7 +80,10 @@ class NewSessionDialog(QDialog):
         self.setWindowTitle("New session")
         self.setModal(True)
         self.setMinimumWidth(640)
-        self.results = _path_field(results / facts.protocol.study.name)
+        self._all_results = results
+        self._suggested = str(study_results(results, facts.protocol.study.name, list_devices()[0]))
+        self.results = _field("Results folder of this study")
+        self.results.setText(self._suggested)
         self.participant = _field("Participant")
         self.session = Number(1, MAX_SESSION, 1)
         self.seed = _field("Seed")
@@ -118,6 +127,7 @@ class NewSessionDialog(QDialog):
         fields: tuple[QWidget, ...] = (self.session, self.language, self.device, self.screen_choice, self.windowed)
         for field in fields:
             field.setFont(font("body"))
+        self.device.currentIndexChanged.connect(self._suggest_folder)
         self.participant.textChanged.connect(self._check)
         self.session.valueChanged.connect(self._check)
         self.seed.textChanged.connect(self._check)
@@ -177,6 +187,13 @@ class NewSessionDialog(QDialog):
         if chosen:
             self.results.setText(chosen)
 
+    def _suggest_folder(self) -> None:
+        """Keep a simulated hand's sessions apart, unless the operator chose a folder."""
+        if self.results.text() == self._suggested:
+            study = self.facts.protocol.study.name
+            self._suggested = str(study_results(self._all_results, study, self.device.currentData()))
+            self.results.setText(self._suggested)
+
     def _check(self) -> None:
         """Say at once whether this can begin, and if not, why and what to do."""
         fault = self._fault()
@@ -224,12 +241,6 @@ def _field(name: str) -> QLineEdit:
     field = QLineEdit()
     field.setFont(font("body", tabular=True))
     field.setAccessibleName(name)
-    return field
-
-
-def _path_field(path: Path) -> QLineEdit:
-    field = _field("Results folder of this study")
-    field.setText(str(path))
     return field
 
 

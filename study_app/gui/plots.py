@@ -45,22 +45,29 @@ def pen(colour: str, width: float = STROKE, dash: tuple[float, float] | None = N
     return made
 
 
-class Plot(Themed, pg.PlotWidget):
-    """An empty plot: no menu, no buttons, no mouse, no frame; horizontal grid lines at the ticks of y."""
+class Plot(Themed, pg.GraphicsView):
+    """An empty plot: no menu, no buttons, no mouse, no frame; horizontal grid lines at the ticks of y.
+
+    Made of pyqtgraph's view box and axes alone: its plot item brings menus that outlive the window.
+    """
 
     def __init__(self) -> None:
         super().__init__(background=LIGHT.surface)
         self.setFrameShape(QFrame.Shape.NoFrame)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
-        self.setMenuEnabled(False)
-        self.hideButtons()
-        self.setMouseEnabled(x=False, y=False)
-        self.getPlotItem().setContentsMargins(0, 0, 0, 0)
-        self.getViewBox().setDefaultPadding(0)
+        self.box = pg.ViewBox(enableMenu=False, enableMouse=False, defaultPadding=0)
+        self.axes = {side: pg.AxisItem(side) for side in ("left", "bottom")}
+        whole = pg.GraphicsLayout()
+        whole.setContentsMargins(0, 0, 0, 0)
+        whole.setSpacing(0)
+        whole.addItem(self.axes["left"], 0, 0)
+        whole.addItem(self.box, 0, 1)
+        whole.addItem(self.axes["bottom"], 1, 1)
+        self.setCentralItem(whole)
         self._grid: list[Any] = []
-        for side in ("left", "bottom"):
-            axis = self.getAxis(side)
+        for axis in self.axes.values():
+            axis.linkToView(self.box)
             axis.setStyle(
                 tickLength=0,
                 tickFont=font("small", tabular=True),
@@ -70,26 +77,26 @@ class Plot(Themed, pg.PlotWidget):
             )
             axis.setPen(NOTHING)
             axis.setTickPen(NOTHING)
-        self.getAxis("left").setWidth(52)
-        self.getAxis("bottom").setHeight(28)
+        self.axes["left"].setWidth(60)
+        self.axes["bottom"].setHeight(28)
 
     def show_ticks(self, side: str, ticks: list[tuple[float, str]]) -> None:
         """Write ``ticks`` (place, text) at an axis; those of y also get a grid line."""
-        self.getAxis(side).setTicks([ticks])
+        self.axes[side].setTicks([ticks])
         if side == "left":
             for line in self._grid:
-                self.removeItem(line)
+                self.box.removeItem(line)
             self._grid = [pg.InfiniteLine(place, angle=0, pen=pen(self.theme.grid, 1)) for place, _ in ticks]
             for line in self._grid:
                 line.setZValue(-10)
-                self.addItem(line)
+                self.box.addItem(line, ignoreBounds=True)
 
     def wear(self, theme: Theme) -> None:
         """Take the colours of ``theme``."""
         super().wear(theme)
         self.setBackground(theme.surface)
-        for side in ("left", "bottom"):
-            self.getAxis(side).setTextPen(QColor(theme.text3))
+        for axis in self.axes.values():
+            axis.setTextPen(QColor(theme.text3))
         for line in self._grid:
             line.setPen(pen(theme.grid, 1))
 
@@ -112,11 +119,11 @@ class TracePlot(Plot):
         self.curves = [pg.PlotCurveItem(antialias=True) for _ in NAMES]
         self.ends = [pg.TextItem(name, anchor=(0, 0.5)) for name in NAMES]
         for item in (*self.curves, *self.ends):
-            self.addItem(item)
+            self.box.addItem(item)
         for end in self.ends:
             end.textItem.setFont(font("small", weight=600))
             end.setVisible(False)
-        self.setXRange(-1.02 * span_s, 0.08 * span_s, padding=0)
+        self.box.setXRange(-1.02 * span_s, 0.08 * span_s, padding=0)
         self.show_ticks("bottom", [(-t, "0 s" if t == 0 else f"{MINUS}{t} s") for t in range(0, int(span_s) + 1, 2)])
         self._show_reach(reach)
         self.wear(LIGHT)
@@ -125,7 +132,7 @@ class TracePlot(Plot):
         step = next(step for step in (5, 10, 20, 25, 50, 100, 200, 500, 1000) if reach / step <= 3.01 or step == 1000)
         rows = max(1, int(np.ceil(reach / step - 1e-9)))
         self._reach = rows * step
-        self.setYRange(-1.08 * self._reach, 1.08 * self._reach, padding=0)
+        self.box.setYRange(-1.08 * self._reach, 1.08 * self._reach, padding=0)
         self.show_ticks("left", [(k * step, number(k * step)) for k in range(-rows, rows + 1)])
 
     def show_traces(self, times_s: Floats, values: Floats) -> None:
@@ -163,7 +170,7 @@ class LatenessPlot(Plot):
         self.p99_name = pg.TextItem("", anchor=(0.5, 1))
         self.limit_name = pg.TextItem(f"limit {number(limit_us)}", anchor=(1, 0))
         for item in (self.bars, self.p99_line, self.limit_line, self.p99_name, self.limit_name):
-            self.addItem(item)
+            self.box.addItem(item)
         for name in (self.p99_name, self.limit_name):
             name.textItem.setFont(font("small", weight=600, tabular=True))
         self._show_decades(max(3, int(np.ceil(self._limit + 0.1))), 4)
@@ -173,8 +180,8 @@ class LatenessPlot(Plot):
         if (across, up) == self._decades:
             return
         self._decades = (across, up)
-        self.setXRange(-0.02 * across, 1.08 * across, padding=0)
-        self.setYRange(-0.3, up + 0.55, padding=0)
+        self.box.setXRange(-0.02 * across, 1.08 * across, padding=0)
+        self.box.setYRange(-0.3, up + 0.55, padding=0)
         self.show_ticks("bottom", [(k, number(10.0**k)) for k in range(across + 1)])
         self.show_ticks("left", [(k, number(10.0**k)) for k in range(up + 1)])
         self.limit_name.setPos(self._limit - 0.01 * across, up + 0.55)
@@ -192,8 +199,8 @@ class LatenessPlot(Plot):
         self.p99_line.setVisible(p99_us is not None)
         if p99_us is not None:
             at = float(np.log10(max(p99_us, 1.0)))
-            near = counts[np.abs((edges[:-1] + edges[1:]) / 2 - at) < 0.12]
-            top = min(up, float(np.log10(max(1, near.max(initial=1)))) + 0.9)
+            near = counts[np.abs((edges[:-1] + edges[1:]) / 2 - at) < 0.12 * self._decades[0]]
+            top = min(up + 0.1, float(np.log10(max(1, near.max(initial=1)))) + 0.3)
             self.p99_line.setData([at, at], [-0.3, top])
             self.p99_name.setPos(at, top)
             self.p99_name.setText(f"p99 {number(round(p99_us))}")

@@ -10,8 +10,8 @@ from PySide6.QtCore import Qt
 from study_app.gui.home.facts import study_facts
 from study_app.gui.new_session import MAX_SEED, NewSessionDialog, draw_seed
 
-# The platform without a screen cannot limit a dialog's size, and says so.
-pytestmark = pytest.mark.qt_log_ignore("propagateSizeHints")
+# The platform without a screen cannot limit or raise windows, and says so.
+pytestmark = pytest.mark.qt_log_ignore("This plugin does not support")
 
 
 @pytest.fixture
@@ -112,8 +112,19 @@ def test_begin_creates_nothing_by_itself_and_gives_what_was_chosen(dialog, resul
     chosen = dialog.chosen()
     assert (chosen.participant, chosen.session, chosen.seed, chosen.operator) == ("P009", 3, 4711, "AK")
     assert (chosen.language, chosen.device, chosen.windowed, chosen.screen) == ("nl", "scripted", True, 1)
-    assert chosen.results == results / "rek2024"
+    assert chosen.results == results / "rek2024-scripted"
     assert files(results.parent) == []
+
+
+def test_a_simulated_hand_is_kept_apart_unless_a_folder_was_chosen(dialog, tmp_path):
+    scripted, mouse = dialog.device.findData("scripted"), dialog.device.findData("mouse")
+    dialog.device.setCurrentIndex(scripted)
+    assert dialog.results.text().endswith("rek2024-scripted")
+    dialog.device.setCurrentIndex(mouse)
+    assert dialog.results.text().endswith("rek2024")
+    dialog.results.setText(str(tmp_path / "mine"))
+    dialog.device.setCurrentIndex(scripted)
+    assert dialog.results.text() == str(tmp_path / "mine")
 
 
 def test_enter_begins_only_what_can_begin(dialog, qtbot):

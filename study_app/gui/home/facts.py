@@ -128,7 +128,7 @@ def held(found: Iterable[SessionFacts], study: str) -> str:
     own = [session for session in found if session.study == study and not session.simulated and not session.pilot]
     if not own:
         return "no session yet"
-    complete = sum(session.status == "complete" for session in own)
+    complete = sum(session.status == "completed" for session in own)
     return f"{counted(len(own), 'session')}, {complete} complete"
 
 

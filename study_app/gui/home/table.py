@@ -19,7 +19,7 @@ SHOWN = 200
 COLUMNS = (("Participant", 110), ("Study", 130), ("Started", 140), ("Status", 160), ("Validity", 130), ("Answers", 80))
 
 STATUS: dict[str, tuple[Tone, str, str]] = {
-    "complete": ("ok", "check", "Complete"),
+    "completed": ("ok", "check", "Complete"),
     "unfinished": ("warn", "clock", "Interrupted"),
     "withdrawn": ("neutral", "cross", "Withdrawn"),
     "aborted": ("neutral", "cross", "Ended early"),

@@ -6,7 +6,7 @@ from datetime import datetime
 from pathlib import Path
 
 from PySide6.QtCore import QRectF, QSize, Qt, QTimer, Signal
-from PySide6.QtGui import QColor, QPainter, QPaintEvent, QResizeEvent
+from PySide6.QtGui import QCloseEvent, QColor, QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import (
     QBoxLayout,
     QFileDialog,
@@ -20,6 +20,7 @@ from PySide6.QtWidgets import (
 
 from study_app.gui.cards import Card, Chip, Icon, Logo
 from study_app.gui.controls import ActionButton
+from study_app.gui.dialogs import Notice
 from study_app.gui.home.cards import BrokenCard, CardGrid, StudyCard
 from study_app.gui.home.facts import BrokenFacts, StudyFacts, held, sessions, sources, study_facts
 from study_app.gui.home.rehearsal import RehearsalDialog
@@ -166,6 +167,7 @@ class HomeWindow(QMainWindow):
     """
 
     session_asked = Signal(object)
+    closed = Signal()
 
     def __init__(self, results: Path, *, theme: Theme = LIGHT) -> None:
         super().__init__()
@@ -174,6 +176,7 @@ class HomeWindow(QMainWindow):
         self.results = results
         self.theme = theme
         self.dialog: NewSessionDialog | RehearsalDialog | None = None
+        self.notice: Notice | None = None
         self._sources = list(sources())
         self._facts: list[StudyFacts | BrokenFacts] = []
         self.rail = Rail()
@@ -293,6 +296,18 @@ class HomeWindow(QMainWindow):
         """Make room: the rail becomes narrow, cards go below each other."""
         super().resizeEvent(event)
         self._arrange()
+
+    def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802 - Qt's name
+        """Say that the operator is done."""
+        super().closeEvent(event)
+        self.closed.emit()
+
+    def tell(self, title: str, sentence: str) -> None:
+        """Say what went wrong, with one button."""
+        notice = Notice(self, self.theme, title, sentence)
+        notice.finished.connect(notice.deleteLater)
+        self.notice = notice
+        notice.show()
 
 
 def _screens(window: QWidget) -> tuple[str, ...]:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QButtonGroup, QDialog, QHBoxLayout, QLineEdit, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QButtonGroup, QHBoxLayout, QLineEdit, QWidget
 
 from study_app.gui.cards import Card
 from study_app.gui.controls import ActionButton, Radio
+from study_app.gui.dialogs import Question
 from study_app.gui.labels import label
 from study_app.gui.operator.view import OperatorView
 from study_app.gui.theme import Theme, font
-from study_app.gui.themed import wear
 
 
 class Actions(Card):
@@ -62,6 +62,8 @@ class Actions(Card):
 
 
 def _hint(view: OperatorView) -> str:
+    if view.over and view.trouble:
+        return ""
     if view.over:
         return "The journal is closed and the tables are written."
     if view.state == "trouble":
@@ -71,39 +73,6 @@ def _hint(view: OperatorView) -> str:
     if view.state == "paused":
         return "A trial that was under way starts again."
     return "Repeating asks for a reason and keeps both recordings." if view.may_repeat else ""
-
-
-class Question(QDialog):
-    """A question with a way back; the window behind goes on living while it is open."""
-
-    def __init__(self, parent: QWidget, theme: Theme, title: str, explanation: str) -> None:
-        super().__init__(parent)
-        self.setWindowTitle(title)
-        self.setModal(True)
-        self.column = QVBoxLayout(self)
-        self.column.setContentsMargins(28, 24, 28, 24)
-        self.column.setSpacing(12)
-        self.column.addWidget(label(title, "title_dense"))
-        said = label(explanation, "body", "text2", wraps=True)
-        said.setMinimumWidth(420)
-        self.column.addWidget(said)
-        self._theme = theme
-
-    def add_buttons(self, back: str, go_on: ActionButton) -> None:
-        """Put the way back at the left and the step that goes on at the right."""
-        self.back = ActionButton("", back)
-        self.go_on = go_on
-        self.back.clicked.connect(self.reject)
-        self.go_on.clicked.connect(self.accept)
-        self.back.setAutoDefault(False)
-        self.go_on.setDefault(True)
-        row = QHBoxLayout()
-        row.addWidget(self.back)
-        row.addStretch()
-        row.addWidget(self.go_on)
-        self.column.addSpacing(8)
-        self.column.addLayout(row)
-        wear(self, self._theme)
 
 
 class RepeatQuestion(Question):

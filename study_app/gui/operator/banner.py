@@ -12,6 +12,7 @@ from study_app.gui.theme import RADIUS_CARD
 from study_app.gui.themed import Themed
 
 WHAT_TO_DO = "The force is off and every answer so far is on disk. End the session, mend the cause, then begin anew."
+AFTERWARDS = "The session is closed and the force is off. What the journal holds is safe."
 
 
 class Banner(Themed, QWidget):
@@ -20,10 +21,11 @@ class Banner(Themed, QWidget):
     def __init__(self) -> None:
         super().__init__()
         self.what = label("", "strong", "bad", wraps=True)
+        self.then = label(WHAT_TO_DO, "label", "text", wraps=True)
         words = QVBoxLayout()
         words.setSpacing(4)
         words.addWidget(self.what)
-        words.addWidget(label(WHAT_TO_DO, "label", "text", wraps=True))
+        words.addWidget(self.then)
         row = QHBoxLayout(self)
         row.setContentsMargins(20, 14, 20, 14)
         row.setSpacing(14)
@@ -31,10 +33,11 @@ class Banner(Themed, QWidget):
         row.addLayout(words, 1)
         self.hide()
 
-    def show_trouble(self, what: str) -> None:
-        """Say ``what`` happened; nothing hides the strip."""
+    def show_trouble(self, what: str, *, over: bool) -> None:
+        """Say ``what`` happened, or nothing where nothing did."""
         if what != self.what.text():
             self.what.setText(what[:1].upper() + what[1:])
+        self.then.setText(AFTERWARDS if over else WHAT_TO_DO)
         self.setVisible(bool(what))
 
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QScrollArea, QSizePolicy, QVBoxLayout, QWidget
 
@@ -33,8 +33,11 @@ class StepLine(Themed, QWidget):
         layout.addWidget(self.name, 1)
         layout.addWidget(self.note)
         self.setMinimumHeight(LEAST_ROW_HEIGHT)
-        self.setMaximumHeight(ROW_HEIGHT)
-        self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Expanding)
+        self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Preferred)
+
+    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+        """Return the room that a row likes; where there are many, each takes less."""
+        return QSize(super().sizeHint().width(), ROW_HEIGHT)
 
     def show_row(self, row: StepRow, *, first: bool, last: bool) -> None:
         """Show a step's state."""
@@ -93,6 +96,9 @@ class Rail(Card):
         self.elapsed_word = label("Elapsed", "label", "text2")
         self.elapsed = figures("", "label")
         self.bar = Bar()
+        keep = self.bar.sizePolicy()
+        keep.setRetainSizeWhenHidden(True)
+        self.bar.setSizePolicy(keep)
         self.least = figures("", "small", "text2")
         self.lines: list[StepLine] = []
         self.counts: list[tuple[QLabel, QLabel]] = []
@@ -100,6 +106,7 @@ class Rail(Card):
         self._steps_column = QVBoxLayout(self._steps)
         self._steps_column.setContentsMargins(0, 0, 8, 0)
         self._steps_column.setSpacing(0)
+        self._steps_column.addStretch(1)
         self._scroll = QScrollArea()
         self._scroll.setWidgetResizable(True)
         self._scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
@@ -168,8 +175,8 @@ class Rail(Card):
         time = view.trial_time
         self.elapsed_word.setText("Elapsed" if time else "")
         self.elapsed.setText(time.words if time else "")
+        self.bar.setVisible(time is not None and bool(time.most_s))
         if time is None or not time.most_s:
-            self.bar.show_share(0.0)
             self.least.setText("")
             return
         self.bar.show_share(time.elapsed_s / time.most_s, time.least_s / time.most_s if time.least_s else None)
@@ -180,7 +187,7 @@ class Rail(Card):
             line = StepLine()
             line.wear(self.theme)
             self.lines.append(line)
-            self._steps_column.addWidget(line)
+            self._steps_column.insertWidget(len(self.lines) - 1, line)
         for index, (line, row) in enumerate(zip(self.lines, rows, strict=True)):
             arrived = row.state == "now" != line.row.state
             line.show_row(row, first=index == 0, last=index == len(rows) - 1)

@@ -200,7 +200,7 @@ def _state(progress: SessionProgress, *, force_on: bool, trouble: str) -> State:
 def _state_word(state: State, progress: SessionProgress) -> str:
     if state == "ended":
         return {
-            "complete": "Complete",
+            "completed": "Complete",
             "withdrawn": "Withdrawn",
             "aborted": "Ended early",
             "broken": "Ended after a fault",
@@ -225,7 +225,7 @@ def _part_line(session: Session, trial: Trial | None) -> str:
 
 def _heading(session: Session, progress: SessionProgress) -> str:
     if progress.ended:
-        return {"complete": "Session complete"}.get(progress.ended, "Session ended")
+        return {"completed": "Session complete"}.get(progress.ended, "Session ended")
     if progress.step < 0:
         return "Getting ready"
     trial = progress.trial
@@ -270,7 +270,7 @@ def _trial_time(session: Session, progress: SessionProgress, now_s: float) -> Tr
 def _step_row(stage: Stage, progress: SessionProgress) -> StepRow:
     many = stage.last - stage.first + 1
     spent = sum(progress.durations_s.get(step, 0.0) for step in range(stage.first, stage.last + 1))
-    if progress.step > stage.last or progress.ended == "complete":
+    if progress.step > stage.last or progress.ended == "completed":
         return StepRow(stage.label, "done", minutes(spent))
     if stage.first <= progress.step <= stage.last:
         place = f"{progress.step - stage.first + 1} of {many}" if many > 1 else "now"

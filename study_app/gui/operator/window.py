@@ -163,7 +163,7 @@ class OperatorWindow(QMainWindow):
         for part in (self.header, self.rail, self.tiles, self.notes, self.stop, self.buttons):
             part.show_view(view)
         self.device.show_device(view.device)
-        self.banner.show_trouble("" if view.over else view.trouble)
+        self.banner.show_trouble(view.trouble, over=view.over)
         self.may_close = view.over
 
     def show_traces(self, health: ServoHealth, now_s: float) -> None:
@@ -176,25 +176,33 @@ class OperatorWindow(QMainWindow):
 
     def ask_to_repeat(self) -> None:
         """Ask for the reason of a repetition; nothing happens without one."""
-        if self._view is None or not self._view.may_repeat or self.question is not None:
+        if self._already_asked() or self._view is None or not self._view.may_repeat:
             return
         question = RepeatQuestion(self, self.theme, self._view.setting_line.split("  ·  ")[0])
-        self._open(question)
         question.accepted.connect(lambda: self.repeat_asked.emit(question.reason.text().strip()))
-        question.open()
+        self._open(question)
 
     def ask_to_end(self) -> None:
         """Ask whether and why the session is to end now."""
-        if self._view is None or self._view.over or self.question is not None:
+        if self._already_asked() or self._view is None or self._view.over:
             return
         question = EndQuestion(self, self.theme, dict(self._view.counts)["Answers on disk"])
-        self._open(question)
         question.accepted.connect(lambda: self.end_asked.emit(question.status, question.reason.text().strip()))
-        question.open()
+        self._open(question)
 
     def _open(self, question: RepeatQuestion | EndQuestion) -> None:
         self.question = question
         question.finished.connect(self._question_answered)
+        question.installEventFilter(self._escape)
+        question.show()
+
+    def _already_asked(self) -> bool:
+        """Bring a question that is still open to the front."""
+        if self.question is None:
+            return False
+        self.question.raise_()
+        self.question.activateWindow()
+        return True
 
     def _question_answered(self) -> None:
         if self.question is not None:

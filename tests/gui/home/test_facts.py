@@ -52,27 +52,27 @@ def test_a_broken_protocol_names_its_first_problem(tmp_path):
 
 
 def test_sessions_that_need_care_stand_first_then_the_newest(tmp_path):
-    start(tmp_path, "P001", "complete")
+    start(tmp_path, "P001", "completed")
     start(tmp_path, "P002")
     start(tmp_path, "P003", "withdrawn")
     found = sessions(tmp_path, {"demo": 8})
     assert [(row.participant, row.status) for row in found] == [
         ("P002", "unfinished"),
         ("P003", "withdrawn"),
-        ("P001", "complete"),
+        ("P001", "completed"),
     ]
     assert (found[0].answers, found[0].answers_of) == (0, 8)
 
 
 def test_simulated_sessions_are_not_counted_as_held(tmp_path):
-    start(tmp_path, "P001", "complete", simulated=True)
+    start(tmp_path, "P001", "completed", simulated=True)
     found = sessions(tmp_path, {})
     assert held(found, "demo") == "no session yet"
     assert found[0].simulated
 
 
 def test_held_sessions_are_counted_with_their_ends(tmp_path):
-    start(tmp_path, "P001", "complete")
+    start(tmp_path, "P001", "completed")
     start(tmp_path, "P002")
     found = sessions(tmp_path, {})
     assert held(found, "demo") == "2 sessions, 1 complete"
@@ -80,7 +80,7 @@ def test_held_sessions_are_counted_with_their_ends(tmp_path):
 
 
 def test_a_folder_that_holds_something_else_is_passed_over(tmp_path):
-    start(tmp_path, "P001", "complete")
+    start(tmp_path, "P001", "completed")
     (tmp_path / "holiday" / "data" / "sub-x" / "ses-01").mkdir(parents=True)
     (tmp_path / "holiday" / "data" / "sub-x" / "ses-01" / "journal.jsonl").write_text("[]\nno journal\n")
     assert [row.participant for row in sessions(tmp_path, {}) if row.study == "demo"] == ["P001"]

@@ -14,8 +14,8 @@ from study_app.gui.theme import DARK
 from study_app.protocol.load import load, source_bytes
 from study_app.store.session import begin
 
-# The platform without a screen cannot limit a dialog's size, and says so.
-pytestmark = pytest.mark.qt_log_ignore("propagateSizeHints")
+# The platform without a screen cannot limit or raise windows, and says so.
+pytestmark = pytest.mark.qt_log_ignore("This plugin does not support")
 
 
 @pytest.fixture
@@ -33,7 +33,7 @@ def results(tmp_path):
         screens={},
         simulated=False,
     ) as store:
-        store.finish("complete")
+        store.finish("completed")
     return folder
 
 

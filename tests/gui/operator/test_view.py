@@ -121,7 +121,7 @@ def test_the_end_is_said_with_its_status(told):
 
 def test_a_complete_session_has_every_step_done(told):
     told.welcome()
-    told.tell("session_ended", 4.0, status="complete", reason="")
+    told.tell("session_ended", 4.0, status="completed", reason="")
     assert {row.state for row in told.view().steps} == {"done"}
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from itertools import pairwise
 
+import pyqtgraph as pg
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
@@ -14,8 +15,8 @@ from study_app.gui.operator import OperatorWindow
 from study_app.gui.operator.stop import HOLD_MS, LEAST_HEIGHT, LEAST_WIDTH
 from study_app.gui.theme import DARK, LIGHT
 
-# The platform without a screen cannot limit a dialog's size, and says so.
-pytestmark = pytest.mark.qt_log_ignore("propagateSizeHints")
+# The platform without a screen cannot limit or raise windows, and says so.
+pytestmark = pytest.mark.qt_log_ignore("This plugin does not support")
 
 
 @pytest.fixture
@@ -61,7 +62,7 @@ def test_stop_force_is_large_and_never_disabled_or_moved(window, told, health):
     views = [told.view(health), told.view(health, force_on=False), told.view(health, trouble="broken")]
     told.tell("paused", by="operator")
     views.append(told.view(health))
-    told.tell("session_ended", status="complete", reason="")
+    told.tell("session_ended", status="completed", reason="")
     views.append(told.view(health))
     for view in views:
         window.show_view(view)
@@ -153,6 +154,20 @@ def test_only_one_question_at_a_time(running):
     assert running.question is first
 
 
+def test_no_question_keeps_a_hand_from_the_force_stop(running, qtbot):
+    running.ask_to_end()
+    assert running.question.windowModality() == Qt.WindowModality.NonModal
+    with qtbot.waitSignal(running.stop_asked):
+        qtbot.mousePress(running.stop.stop, Qt.MouseButton.LeftButton)
+    assert running.question is not None
+
+
+def test_escape_held_over_a_question_stops_the_force_too(running, qtbot):
+    running.ask_to_end()
+    with qtbot.waitSignal(running.stop_asked, timeout=HOLD_MS * 5):
+        QTest.keyPress(running.question, Qt.Key.Key_Escape)
+
+
 def test_enter_keeps_a_note_and_empties_the_field(running, qtbot):
     running.notes.field.setPlainText("left-handed")
     with qtbot.waitSignal(running.note_written) as written:
@@ -186,7 +201,7 @@ def test_closing_is_left_to_who_listens_until_the_session_is_over(running, told,
     with qtbot.waitSignal(running.close_asked):
         running.close()
     assert running.isVisible()
-    told.tell("session_ended", status="complete", reason="")
+    told.tell("session_ended", status="completed", reason="")
     running.show_view(told.view(health))
     assert running.buttons.close_session.isVisible()
     running.close()
@@ -212,9 +227,9 @@ def test_the_theme_changes_everything_at_once(running, qtbot):
 
 def test_plots_have_no_menu_no_button_and_no_default_colour(running):
     for plot in (running.position.plot, running.lateness.plot):
-        assert not plot.getPlotItem().menuEnabled()
-        assert plot.getPlotItem().buttonsHidden
-        assert plot.getViewBox().state["mouseEnabled"] == [False, False]
+        assert not plot.box.menuEnabled()
+        assert plot.box.state["mouseEnabled"] == [False, False]
+        assert not any(isinstance(item, pg.ButtonItem) for item in plot.scene().items())
     pens = [curve.opts["pen"] for curve in running.position.plot.curves]
     assert [pen.color().name().upper() for pen in pens] == [LIGHT.trace_x, LIGHT.trace_y, LIGHT.trace_z]
     assert [bool(pen.dashPattern()) for pen in pens] == [False, True, True]

@@ -1,0 +1,341 @@
+"""Where Qt drives a session: timers poll the runner, windows' signals become events, its news becomes views.
+
+Whatever fails in here ends in zero force: the force is stopped first, then the failure is written down and shown to the
+operator. Nothing of it reaches the participant but a calm page.
+"""
+
+from __future__ import annotations
+
+import logging
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import wraps
+from types import TracebackType
+from typing import Concatenate, ParamSpec, Protocol
+
+from PySide6.QtCore import QObject, Qt, QTimer, Signal
+
+from study_app.errors import SessionError, StudyError
+from study_app.gui.operator.health import ServoHealth
+from study_app.gui.operator.view import OperatorView, Session, operator_view
+from study_app.gui.operator.watch import WatchedJournal
+from study_app.gui.operator.window import OperatorWindow
+from study_app.gui.participant import ParticipantWindow
+from study_app.protocol.schedule import Schedule
+from study_app.session.events import (
+    Begin,
+    Broke,
+    Continue,
+    EndAsked,
+    Event,
+    ForceStopped,
+    Note,
+    PauseAsked,
+    RepeatAsked,
+    ResumeAsked,
+)
+from study_app.session.pages import Page, TaskPage
+from study_app.session.runner import Ports, Runner, ServoPort, TankView
+
+TRACE_MS = 33
+TILES_MS = 500
+log = logging.getLogger(__name__)
+P = ParamSpec("P")
+
+
+class ServoPanel(ServoPort, Protocol):
+    """What is asked of the servo here, beyond what the runner asks."""
+
+    @property
+    def force_is_on(self) -> bool: ...  # noqa: D102
+    @property
+    def overruns(self) -> int: ...  # noqa: D102
+
+
+class Hand(Protocol):
+    """A simulated hand: acts on what it sees, and tells whether it wants to go on."""
+
+    def act(self, now_s: float, view: TankView) -> bool: ...  # noqa: D102
+
+
+@dataclass(frozen=True, slots=True)
+class Parts:
+    """What a session is made of, but for its windows.
+
+    ``session`` is what the operator sees of it throughout; ``key`` is block → code → condition, never shown.
+    ``aim_m`` gives where hand or pointer mean to be [m, hand frame]; ``point_to`` and ``press`` pass the mouse on, None
+    where the device is not the mouse; ``hand_for`` makes the simulated hand for a page, None with a real hand.
+    """
+
+    session: Session
+    schedule: Schedule
+    key: Mapping[str, Mapping[str, str]] = field(repr=False)
+    language: str
+    servo: ServoPanel
+    journal: WatchedJournal
+    clock: Callable[[], float]
+    aim_m: Callable[[], tuple[float, float, float]]
+    point_to: Callable[[float, float, float], None] | None = None
+    press: Callable[[int], None] | None = None
+    hand_for: Callable[[Page], Hand | None] | None = None
+
+
+def _guarded(
+    slot: Callable[Concatenate[SessionBridge, P], None],
+) -> Callable[Concatenate[SessionBridge, P], None]:
+    """Let no exception leave a slot: an event that came too late is dropped, everything else ends in zero force."""
+
+    @wraps(slot)
+    def run(self: SessionBridge, /, *arguments: P.args, **named: P.kwargs) -> None:
+        try:
+            slot(self, *arguments, **named)
+        except SessionError as error:
+            log.info("dropped: %s", error)
+        except Exception as error:  # noqa: BLE001 - whatever it is, the hand comes first
+            self.fail(error)
+
+    return run
+
+
+class SessionBridge(QObject):
+    """Runs one session in two windows.
+
+    ``done`` comes once, when the session is over and its windows may go.
+
+    Parameters
+    ----------
+    parts
+        The session's machinery.
+    participant, operator
+        The two windows, made and not yet connected.
+    refresh_hz
+        Frames a second of the participant's screen.
+    """
+
+    done = Signal()
+
+    def __init__(
+        self, parts: Parts, participant: ParticipantWindow, operator: OperatorWindow, *, refresh_hz: float = 60.0
+    ) -> None:
+        super().__init__()
+        self.parts = parts
+        self.participant = participant
+        self.operator = operator
+        self.health = ServoHealth(parts.servo.rate_hz, refresh_hz)
+        self.trouble = ""
+        self.failure: BaseException | None = None
+        ports = Ports(parts.servo, parts.journal, self.present, parts.clock)
+        self.runner = Runner(parts.session.protocol, parts.schedule, parts.key, ports, parts.language)
+        self._reader = parts.servo.telemetry.reader()
+        self._hand: Hand | None = None
+        self._gone = False
+        self._hook_before = sys.excepthook
+        self._timers = (
+            self._timer(max(4, round(1000 / refresh_hz)), self._frame, precise=True),
+            self._timer(TRACE_MS, self._traces),
+            self._timer(TILES_MS, self._tiles),
+        )
+        self.runner.on_change(lambda _state: self._show())
+        self._connect()
+
+    def _timer(self, interval_ms: int, slot: Callable[[], None], *, precise: bool = False) -> QTimer:
+        timer = QTimer(self)
+        timer.setInterval(interval_ms)
+        if precise:
+            timer.setTimerType(Qt.TimerType.PreciseTimer)
+        timer.timeout.connect(slot)
+        return timer
+
+    def _connect(self) -> None:
+        operator, participant = self.operator, self.participant
+        operator.stop_asked.connect(self._stop_force)
+        operator.fade_in_asked.connect(self._resume)
+        operator.resume_asked.connect(self._resume)
+        operator.pause_asked.connect(self._pause)
+        operator.repeat_asked.connect(self._repeat)
+        operator.end_asked.connect(self._end)
+        operator.note_written.connect(self._note)
+        operator.mark_set.connect(self._mark)
+        operator.close_asked.connect(self._close)
+        participant.event.connect(self._event)
+        participant.painted.connect(self._painted)
+        if self.parts.point_to is not None:
+            participant.pointer.connect(self._point)
+            participant.buttons.connect(self._press)
+
+    def present(self, page: Page) -> None:
+        """Put a page before the participant; the runner's port."""
+        self.participant.show_page(page)
+        self._hand = self.parts.hand_for(page) if self.parts.hand_for is not None else None
+        if not isinstance(page, TaskPage):
+            self.health.frames_rest()
+
+    def start(self) -> None:
+        """Begin the session."""
+        sys.excepthook = self._uncaught
+        for timer in self._timers:
+            timer.start()
+        self._begin()
+
+    @_guarded
+    def _begin(self) -> None:
+        self._post(Begin(self._now()))
+        self._tiles()
+
+    def end_now(self, reason: str) -> None:
+        """End without a question: the program is being ended. Zero force, journal closed with a status."""
+        self.parts.servo.stop_force()
+        if not self.runner.finished:
+            self._end("aborted", reason)
+        self._leave()
+
+    def fail(self, error: BaseException) -> None:
+        """Zero force, then say what failed: to the journal, if it still takes it, and to the operator."""
+        self.parts.servo.stop_force()
+        first = not self.trouble
+        what = str(error) if isinstance(error, StudyError) else f"{type(error).__name__}: {error}"
+        if not first:
+            return
+        self.trouble, self.failure = what, error
+        log.error("the session broke: %s", what, exc_info=None if isinstance(error, StudyError) else error)
+        try:
+            if not self.runner.finished:
+                self.runner.post(Broke(self._now(), what))
+            self._show()
+        except Exception as second:  # noqa: BLE001 - the force is off; the first failure is the one that counts
+            log.error("and could not be written down: %s", second)  # noqa: TRY400 - one line, the first has the trace
+
+    def _uncaught(self, kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+        """Hear of exceptions that Qt met outside our slots, such as in painting."""
+        self.fail(error)
+        self._hook_before(kind, error, trace)
+
+    def _now(self) -> float:
+        return self.parts.clock()
+
+    def _post(self, event: Event) -> None:
+        self.runner.post(event)
+
+    @_guarded
+    def _frame(self) -> None:
+        """Look at the device, and draw the tank as late as the trial asks."""
+        parts = self.parts
+        self.runner.poll()
+        self.health.take(self._reader.read())
+        now_s = self._now()
+        self.health.hand(now_s, parts.aim_m())
+        view = self.runner.view(parts.servo.now_ns())
+        if view is None:
+            return
+        self.participant.show_view(view)
+        if self._hand is not None and self._hand.act(now_s, view):
+            self._post(Continue(now_s))
+
+    @_guarded
+    def _painted(self, _painted_ns: int, sample_ns: int) -> None:
+        """Keep when a frame was painted; on the servo's clock, which is not every system's monotonic one."""
+        painted_ns = self.parts.servo.now_ns()
+        self.runner.frame_shown(painted_ns, sample_ns)
+        self.health.frame(painted_ns)
+
+    @_guarded
+    def _traces(self) -> None:
+        self.operator.show_traces(self.health, self._now())
+
+    @_guarded
+    def _tiles(self) -> None:
+        self.health.overruns = self.parts.servo.overruns
+        self.operator.show_lateness(self.health)
+        self._show()
+
+    def _show(self) -> None:
+        self.operator.show_view(self.view())
+
+    def view(self) -> OperatorView:
+        """Return what the operator is to see now."""
+        parts = self.parts
+        return operator_view(
+            parts.session,
+            parts.journal.progress,
+            self.health.vitals(),
+            now_s=self._now(),
+            force_on=parts.servo.force_is_on,
+            trouble=self.trouble or parts.servo.fault or "",
+            rate_hz=parts.servo.rate_hz,
+        )
+
+    @_guarded
+    def _stop_force(self) -> None:
+        self.parts.servo.stop_force()  # before anything that could fail or wait for the disk
+        self._post(ForceStopped(self._now(), "operator"))
+
+    @_guarded
+    def _event(self, event: Event) -> None:
+        if isinstance(event, ForceStopped):
+            self.parts.servo.stop_force()
+        self._post(event)
+
+    @_guarded
+    def _resume(self) -> None:
+        self._post(ResumeAsked(self._now()))
+
+    @_guarded
+    def _pause(self) -> None:
+        self._post(PauseAsked(self._now(), "operator"))
+
+    @_guarded
+    def _repeat(self, reason: str) -> None:
+        self._post(RepeatAsked(self._now(), reason))
+
+    @_guarded
+    def _note(self, text: str) -> None:
+        self._post(Note(self._now(), "note", text))
+
+    @_guarded
+    def _mark(self) -> None:
+        self._post(Note(self._now(), "mark", ""))
+
+    @_guarded
+    def _end(self, status: str, reason: str) -> None:
+        self._post(EndAsked(self._now(), "withdrawn" if status == "withdrawn" else "aborted", reason))
+
+    @_guarded
+    def _point(self, x_m: float, y_m: float, z_m: float) -> None:
+        if self.parts.point_to is not None:
+            self.parts.point_to(x_m, y_m, z_m)
+
+    @_guarded
+    def _press(self, buttons: int) -> None:
+        if self.parts.press is not None:
+            self.parts.press(buttons)
+
+    @_guarded
+    def _close(self) -> None:
+        """Close the operator's window when all is over; else zero force and a question; asked again, end."""
+        if self.runner.finished:
+            self._leave()
+            return
+        self.parts.servo.stop_force()
+        if self.operator.question is not None:
+            self.end_now("the window was closed")
+            return
+        self.operator.ask_to_end()
+        self._post(ForceStopped(self._now(), "operator"))
+
+    def _leave(self) -> None:
+        """Let the windows go, once."""
+        if self._gone:
+            return
+        self._gone = True
+        for timer in self._timers:
+            timer.stop()
+        sys.excepthook = self._hook_before
+        self.participant.close()
+        self.operator.may_close = True
+        if self.operator.question is not None:
+            self.operator.question.reject()
+        self.operator.hide()
+        self.done.emit()
+        for part in (self.participant, self.operator, self):
+            part.deleteLater()  # here and now, in this thread: never by a garbage collection in another

@@ -1,0 +1,96 @@
+"""Whether a window can be opened here, found out before Qt is asked: it would end the program without a word.
+
+Nothing in this file imports Qt.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import importlib.util
+import os
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+
+from study_app.errors import DisplayError
+
+# What Qt's window system needs on Debian and its relatives, beyond a minimal installation.
+PACKAGES = (
+    "libegl1 libgl1 libfontconfig1 libdbus-1-3 libxkbcommon-x11-0 libxcb-cursor0 libxcb-icccm4 libxcb-image0 "
+    "libxcb-keysyms1 libxcb-randr0 libxcb-render-util0 libxcb-shape0 libxcb-xinerama0"
+)
+NEEDS_NO_DISPLAY = "liquid-study rehearse, check, export and plot need no display"
+
+
+def check_display(environment: Mapping[str, str] = os.environ, platform: str = sys.platform) -> None:
+    """Find out whether Qt could open a window.
+
+    Raises
+    ------
+    DisplayError
+        There is no display, it cannot be reached, or a system library is missing; says what to do.
+    """
+    if platform != "linux":
+        return
+    wanted = environment.get("QT_QPA_PLATFORM", "").partition(":")[0]
+    if wanted not in {"", "xcb"}:
+        return  # offscreen, wayland, vnc …: asked for by name, so Qt's own word counts
+    if wanted == "" and environment.get("WAYLAND_DISPLAY"):
+        return
+    display = environment.get("DISPLAY", "")
+    if not display:
+        raise DisplayError(
+            "no display to open a window on: DISPLAY and WAYLAND_DISPLAY are not set; start from a desktop session, "
+            f"or over SSH with ssh -X ({NEEDS_NO_DISPLAY})"
+        )
+    _load_plugin()
+    _reach(display)
+
+
+def missing_library(error: OSError | ImportError) -> DisplayError:
+    """Return what to tell of a system library that Qt could not load."""
+    library = str(error).partition(":")[0]
+    if platform_is_linux():
+        return DisplayError(
+            f"Qt cannot be loaded: {library} is missing on this system; on Debian or Ubuntu: "
+            f"sudo apt install {PACKAGES} ({NEEDS_NO_DISPLAY})"
+        )
+    return DisplayError(f"Qt cannot be loaded ({error}): install liquid-study anew with pip")
+
+
+def platform_is_linux() -> bool:
+    """Return whether system libraries are Linux packages here."""
+    return sys.platform == "linux"
+
+
+def _load_plugin() -> None:
+    """Load Qt's X11 plugin as Qt would, to hear which library is missing, if one is."""
+    package = importlib.util.find_spec("PySide6")
+    if package is None or package.origin is None:
+        raise DisplayError("PySide6 is not installed: install liquid-study anew with pip")
+    plugin = Path(package.origin).parent / "Qt" / "plugins" / "platforms" / "libqxcb.so"
+    if not plugin.exists():
+        return  # Qt from the system's own packages brings what it needs
+    try:
+        ctypes.CDLL(str(plugin))
+    except OSError as error:
+        raise missing_library(error) from error
+
+
+def _reach(display: str) -> None:
+    """Connect to the X server and leave again."""
+    try:
+        xcb = ctypes.CDLL("libxcb.so.1")
+    except OSError as error:
+        raise missing_library(error) from error
+    xcb.xcb_connect.restype = ctypes.c_void_p
+    xcb.xcb_connection_has_error.argtypes = [ctypes.c_void_p]
+    xcb.xcb_disconnect.argtypes = [ctypes.c_void_p]
+    connection = xcb.xcb_connect(display.encode(), None)
+    failed = xcb.xcb_connection_has_error(connection)
+    xcb.xcb_disconnect(connection)
+    if failed:
+        raise DisplayError(
+            f"the display {display!r} (DISPLAY) cannot be reached: is its X server running, and may you use it? "
+            f"({NEEDS_NO_DISPLAY})"
+        )

@@ -1,0 +1,121 @@
+"""The two windows of a session, made of its parts and connected by a bridge."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from study_app.devices.mouse import MouseDevice
+from study_app.devices.scripted import ScriptedDevice
+from study_app.devices.simulated import SimulatedDevice
+from study_app.gui.bridge import Parts, SessionBridge
+from study_app.gui.operator import OperatorWindow
+from study_app.gui.operator.progress import SessionProgress, stages
+from study_app.gui.operator.view import Session
+from study_app.gui.operator.watch import WatchedJournal
+from study_app.gui.participant import ParticipantWindow
+from study_app.gui.screens import choose_screens, place
+from study_app.protocol.describe import expected_duration_s
+from study_app.protocol.model import Protocol, Reach
+from study_app.protocol.schedule import Schedule, stream
+from study_app.protocol.words import words
+from study_app.session.pages import Page, TaskPage
+from study_app.session.simulated import Explorer, Reacher
+
+if TYPE_CHECKING:
+    from study_app.devices.base import Device
+    from study_app.gui.new_session import NewSession
+    from study_app.gui.theme import Theme
+    from study_app.haptics.servo import Servo
+    from study_app.store.session import SessionStore
+
+
+def open_windows(
+    chosen: NewSession,
+    protocol: Protocol,
+    schedule: Schedule,
+    store: SessionStore,
+    device: Device,
+    servo: Servo,
+    theme: Theme,
+) -> SessionBridge:
+    """Open the operator's and the participant's window; the bridge returned is to be started."""
+    clock = store.clock.seconds
+    journal = WatchedJournal(store, SessionProgress(protocol, schedule), clock)
+    by_mouse = device.name == "mouse"
+    operator = OperatorWindow(
+        protocol.study.name,
+        lateness_limit_s=protocol.limits.lateness_ms / 1000,
+        reach_m=max(device.workspace_m),
+        pointer=by_mouse,
+        theme=theme,
+    )
+    participant = ParticipantWindow(
+        words(chosen.language), clock=clock, windowed=chosen.windowed, captures_pointer=by_mouse
+    )
+    parts = Parts(
+        session=_facts(chosen, protocol, schedule, servo),
+        schedule=schedule,
+        key=store.key.codes,
+        language=chosen.language,
+        servo=servo,
+        journal=journal,
+        clock=clock,
+        aim_m=_aim(device, servo),
+        point_to=device.point_to if isinstance(device, MouseDevice) else None,
+        press=device.press if isinstance(device, MouseDevice) else None,
+        hand_for=_hands(device, chosen, clock) if isinstance(device, ScriptedDevice) else None,
+    )
+    shown_on, operated_on = choose_screens(chosen.screen)
+    bridge = SessionBridge(parts, participant, operator, refresh_hz=shown_on.refreshRate() or 60.0)
+    place(operator, operated_on, corner=shown_on is operated_on)
+    operator.show()
+    participant.open_on(shown_on)
+    return bridge
+
+
+def _facts(chosen: NewSession, protocol: Protocol, schedule: Schedule, servo: Servo) -> Session:
+    """Return what the operator's window says throughout; the force's share of its limit stays hidden."""
+    return Session(
+        protocol=protocol,
+        stages=stages(protocol, schedule),
+        who=f"Participant {chosen.participant}  ·  session {chosen.session}  ·  seed {chosen.seed}",
+        expected_s=expected_duration_s(protocol),
+        answers_of=protocol.responses_per_participant(),
+        lateness_limit_s=protocol.limits.lateness_ms / 1000,
+        device_name="Mouse" if chosen.device == "mouse" else "Scripted hand",
+        device_kind="mouse" if chosen.device == "mouse" else "simulated",
+        device_rows=(
+            ("Priority", str(servo.describe()["priority"]).partition(" (")[0]),
+            (f"Force sent, share of {protocol.device.force_limit_n:g} N limit", "hidden"),
+        ),
+    )
+
+
+def _aim(device: Device, servo: Servo) -> Callable[[], tuple[float, float, float]]:
+    """Return what tells where the hand is; of a simulated device where it means to be, for its lag shows the liquid."""
+    if isinstance(device, SimulatedDevice):
+        return lambda: device.aim_m
+
+    def position_m() -> tuple[float, float, float]:
+        x, y, z = servo.telemetry.position_at(servo.now_ns())[0]
+        return float(x), float(y), float(z)
+
+    return position_m
+
+
+def _hands(
+    device: ScriptedDevice, chosen: NewSession, clock: Callable[[], float]
+) -> Callable[[Page], Explorer | Reacher | None]:
+    """Return what makes the simulated hand for a page; on a page without a task the hand rests."""
+    draw = stream(chosen.seed, f"run/{chosen.participant}/hand").random
+
+    def hand_for(page: Page) -> Explorer | Reacher | None:
+        if not isinstance(page, TaskPage):
+            device.rest()
+            return None
+        if isinstance(page.task, Reach):
+            return Reacher(page.task, device, draw)
+        return Explorer(page.task, device, draw, clock())
+
+    return hand_for

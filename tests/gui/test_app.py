@@ -1,0 +1,228 @@
+"""The program's two ways in, with real windows, servo and store, without a screen."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import re
+import signal
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QObject, Qt, QTimer
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication
+
+from study_app import app
+from study_app.errors import DeviceNotFound, DisplayError, SessionError, StoreError
+from study_app.gui.home import HomeWindow
+from study_app.gui.opening import OpeningWindow
+from study_app.gui.operator import OperatorWindow
+from study_app.gui.participant import ParticipantWindow
+from study_app.protocol.load import source_bytes
+from study_app.session.pages import EndPage, QuestionnairePage, TextPage
+
+# The platform without a screen cannot limit or raise windows, and says so.
+pytestmark = [pytest.mark.qt_log_ignore("This plugin does not support"), pytest.mark.usefixtures("qapp")]
+
+
+@pytest.fixture
+def short_demo(tmp_path: Path) -> str:
+    """Return the demo protocol with tasks of a second."""
+    text = source_bytes("demo").decode()
+    for key, value in (("min_s", "0.3"), ("count", "1"), ("dwell_s", "0.05")):
+        text, found = re.subn(rf"^{key} = [\d.]+", f"{key} = {value}", text, flags=re.MULTILINE)
+        assert found == 1
+    path = tmp_path / "demo.toml"
+    path.write_text(text)
+    return str(path)
+
+
+@pytest.fixture
+def results(tmp_path: Path) -> Path:
+    return tmp_path / "results" / "demo"
+
+
+def window(kind):
+    """Return the window of that kind that is shown, or None."""
+    shown = [widget for widget in QApplication.topLevelWidgets() if isinstance(widget, kind) and widget.isVisible()]
+    return shown[0] if shown else None
+
+
+class Person(QObject):
+    """Does what participant and operator do, with keys and clicks: looks at the windows every 20 ms."""
+
+    def __init__(self, once=None):
+        super().__init__()
+        self.once = once
+        self.answered = None
+        self.shots = []
+        self._timer = QTimer(self)
+        self._timer.timeout.connect(self.look)
+        self._timer.start(20)
+
+    def look(self):
+        participant = window(ParticipantWindow)
+        if participant is None or participant.page is None:
+            return
+        if self.once is not None:
+            act, self.once = self.once, None
+            act(participant)
+            return
+        page = participant.page
+        if isinstance(page, TextPage):
+            QTest.keyClick(participant.widget, Qt.Key.Key_Return)
+        elif isinstance(page, QuestionnairePage) and page is not self.answered:
+            self.answered = page
+            for number in range(len(page.items)):
+                QTest.keyClick(participant.focusWidget(), Qt.Key(Qt.Key.Key_1 + number))
+            QTest.keyClick(participant.focusWidget(), Qt.Key.Key_Return)
+        elif isinstance(page, EndPage):
+            operator = window(OperatorWindow)
+            QTest.mouseClick(operator.buttons.close_session, Qt.MouseButton.LeftButton)
+
+
+def events(results: Path):
+    journal = results / "data" / "sub-P001" / "ses-01" / "journal.jsonl"
+    return [json.loads(line) for line in journal.read_text().splitlines()]
+
+
+def rows(results: Path, name: str):
+    (path,) = (results / "data" / "sub-P001" / "ses-01").glob(f"*description-{name}_data.csv")
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_a_session_runs_from_the_first_page_to_the_last_in_its_windows(short_demo, results):
+    person = Person()
+    code = app.run(
+        short_demo, participant="P001", seed=5, device="scripted", windowed=True, operator="AK", results=results
+    )
+    person.deleteLater()
+    assert code == 0
+    told = events(results)
+    assert told[-1]["event"] == "session_ended"
+    assert told[-1]["status"] == "completed"
+    answers = rows(results, "responses")
+    assert len(answers) == 8
+    assert {row["response"] for row in answers} == {"1", "2"}
+    assert {row["simulated"] for row in answers} == {"true"}
+    trials = rows(results, "trials")
+    assert [row["outcome"] for row in trials] == ["complete"] * 4
+    assert all(int(row["frames"]) > 5 for row in trials)
+    assert all(float(row["tick_rate_hz"]) > 900 for row in trials)
+    receipt = json.loads((results / "data" / "sub-P001" / "ses-01" / "receipt.json").read_text())
+    assert receipt["screens"]["participant"]["number"] == 1
+    assert receipt["operator"] == "AK"
+    assert receipt["status"] == "completed"
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_ends_with_a_status_and_its_exit_code(short_demo, results, number):
+    before = signal.getsignal(number)
+    person = Person(once=lambda _participant: os.kill(os.getpid(), number))
+    code = app.run(short_demo, participant="P001", windowed=True, results=results)
+    person.deleteLater()
+    assert code == 128 + number
+    last = events(results)[-1]
+    assert (last["event"], last["status"]) == ("session_ended", "aborted")
+    assert signal.Signals(number).name in last["reason"]
+    assert signal.getsignal(number) is before
+    assert window(OperatorWindow) is None
+
+
+def test_a_lost_device_ends_the_session_with_one_line(short_demo, results, monkeypatch):
+    machines = []
+    open_machine = app._open_machine
+    monkeypatch.setattr(app, "_open_machine", lambda *chosen: machines.append(open_machine(*chosen)) or machines[-1])
+
+    def unplug(participant):
+        QTest.keyClick(participant.widget, Qt.Key.Key_Return)
+        machines[0].device.unplug()
+        QTimer.singleShot(300, lambda: window(OperatorWindow).end_asked.emit("aborted", "cable"))
+
+    person = Person(once=unplug)
+    with pytest.raises(app.StudyError, match="stopped answering"):
+        app.run(short_demo, participant="P001", windowed=True, results=results)
+    person.deleteLater()
+    assert events(results)[-1]["status"] == "broken"
+    assert not machines[0].servo.force_is_on
+
+
+@pytest.mark.parametrize(
+    ("wrong", "refused"),
+    [
+        ({"participant": "P-001"}, StoreError),
+        ({"participant": "test"}, StoreError),
+        ({"device": "falcn"}, DeviceNotFound),
+        ({"language": "xx"}, SessionError),
+        ({"screen": 9}, DisplayError),
+    ],
+)
+def test_what_cannot_begin_leaves_nothing_behind(short_demo, results, wrong, refused):
+    with pytest.raises(refused) as error:
+        app.run(short_demo, **{"participant": "P001", "windowed": True, "results": results} | wrong)
+    assert "\n" not in str(error.value)
+    assert not results.exists()
+
+
+def test_a_results_folder_that_cannot_be_one_is_named(short_demo, tmp_path):
+    (tmp_path / "file").write_text("no folder")
+    with pytest.raises(StoreError, match="file"):
+        app.run(short_demo, participant="P001", windowed=True, results=tmp_path / "file" / "demo")
+    assert window(OperatorWindow) is None
+
+
+def test_cancelling_the_opening_creates_nothing(short_demo, results):
+    def cancel():
+        window(OpeningWindow).cancel.click()
+
+    QTimer.singleShot(0, lambda: QTimer.singleShot(0, cancel))
+    assert app.run(short_demo, participant="P001", windowed=True, results=results) == app.CANCELLED
+    assert not results.exists()
+
+
+def test_a_mistake_in_the_program_is_an_exit_code_and_a_trace(short_demo, results, monkeypatch, capsys):
+    def fails(*_chosen):
+        raise RuntimeError("not thought of")
+
+    monkeypatch.setattr(app, "_open_machine", fails)
+    assert app.run(short_demo, participant="P001", windowed=True, results=results) == app.BUG
+    assert "not thought of" in capsys.readouterr().err
+    assert not results.exists()
+
+
+def test_home_closes_with_exit_code_0(tmp_path):
+    QTimer.singleShot(0, lambda: QTimer.singleShot(0, lambda: window(HomeWindow).close()))
+    assert app.home(tmp_path / "results") == 0
+    assert not (tmp_path / "results").exists()
+
+
+def test_from_home_into_a_session_and_home_again(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    steps = []
+
+    def step():
+        home, operator = window(HomeWindow), window(OperatorWindow)
+        if not steps and home is not None:
+            steps.append("asked")
+            card = next(card for card in home.grid.cards if card.facts.source == "demo")
+            card.new.click()
+            home.dialog.windowed.setChecked(True)
+            home.dialog.begin.click()
+        elif steps == ["asked"] and operator is not None and operator.buttons.end.isEnabled():
+            steps.append("ended")
+            operator.end_asked.emit("withdrawn", "")
+            operator.close()
+        elif steps == ["asked", "ended"] and home is not None and home.sessions.lines:
+            steps.append(home.sessions.lines[0].status.word)
+            home.close()
+
+    timer = QTimer()
+    timer.timeout.connect(step)
+    timer.start(20)
+    assert app.home(tmp_path / "results") == 0
+    timer.stop()
+    assert steps == ["asked", "ended", "Withdrawn"]
+    assert events(tmp_path / "results" / "demo")[-1]["status"] == "withdrawn"
