@@ -73,6 +73,9 @@ REGION_CYLINDER = 2
 
 ESTIMATOR_EWMA = 0
 ESTIMATOR_GIVEN = 1
+ESTIMATOR_LINE = 2
+ESTIMATOR_FOAW = 3
+ESTIMATOR_RAW = 4
 
 KNEE_NONE = 0
 KNEE_SQRT = 1
@@ -89,6 +92,8 @@ PARAMETERS = np.dtype(
             "log_keep_per_s",
             np.float64,
         ),  # ln(1 - α) a second: the share of the old velocity kept after t is exp of it · t
+        ("window_samples", np.int64),  # of line and foaw: the most samples they look at
+        ("tolerance_m", np.float64),  # of foaw, in the scene
         ("knee_law", np.int64),  # KNEE_*
         ("knee_threshold_mps", np.float64),
         ("slope_limit_nspm", np.float64),  # greatest |drag| / |relative velocity| [N·s/m, scene]
@@ -134,10 +139,21 @@ STATE = np.dtype(
         ("hand_m", np.float64, (3,)),  # the last accepted position, hand frame
         ("position_m", np.float64, (3,)),  # the same in the scene
         ("previous_m", np.float64, (3,)),  # the one before
+        ("window_newest", np.int64),  # row of the newest sample in the model's window
+        ("window_held", np.int64),  # how many samples are in it
         ("estimate_mps", np.float64, (3,)),  # the estimator's own velocity, before the knee
         ("velocity_mps", np.float64, (3,)),  # after the knee
         ("wake_mps", np.float64, (3,)),  # of the last listed liquid that acts, as used by drag
         ("force_n", np.float64, (3,)),  # sum of the effects
+    ],
+    align=True,
+)
+
+WINDOW = np.dtype(
+    [
+        ("position_m", np.float64, (3,)),  # of one accepted sample
+        ("interval_s", np.float64),  # Δt from the sample before it
+        ("age_s", np.float64),  # scratch: how long ago it was, at this tick
     ],
     align=True,
 )

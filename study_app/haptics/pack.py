@@ -10,9 +10,16 @@ import numpy as np
 from study_app.errors import StudyError
 from study_app.haptics import layout
 from study_app.haptics.limits import slope_limit
-from study_app.haptics.scene import MAX_LIQUIDS, Box, Cylinder, Ewma, Given, Region, Scene, Wake
+from study_app.haptics.scene import MAX_LIQUIDS, MAX_WINDOW, Box, Cylinder, Ewma, Foaw, Given, Line, Region, Scene, Wake
 
 _EFFECTS = {"drag": layout.EFFECT_DRAG, "wake": layout.EFFECT_WAKE}
+_ESTIMATORS = {
+    "ewma": layout.ESTIMATOR_EWMA,
+    "given": layout.ESTIMATOR_GIVEN,
+    "line": layout.ESTIMATOR_LINE,
+    "foaw": layout.ESTIMATOR_FOAW,
+    "raw": layout.ESTIMATOR_RAW,
+}
 _KNEES = {"none": layout.KNEE_NONE, "sqrt": layout.KNEE_SQRT, "square": layout.KNEE_SQUARE}
 _WAKE_RATE_HZ = 1000.0
 
@@ -26,12 +33,18 @@ class Model(NamedTuple):
     liquid_states: Any  # (n,) LIQUID_STATE
     elements: Any  # (rows,) ELEMENT, of all wakes, each in its own stretch
     segments: Any  # (rows,) SEGMENT, likewise
+    window: Any  # (rows,) WINDOW, the newest samples of the estimators that look back
 
 
 def elements_needed(scene: Scene) -> int:
     """Return how many wake rows the scene owns: none where no liquid asks for a wake."""
     wakes = [liquid.wake for liquid in scene.liquids if liquid.wake is not None and "wake" in liquid.effects]
     return sum(_scaled_length(wake, scene.rate_hz) for wake in wakes)
+
+
+def window_needed(scene: Scene) -> int:
+    """Return how many samples the velocity estimator keeps: none for those that do not look back."""
+    return scene.velocity.samples if isinstance(scene.velocity, Line | Foaw) else 0
 
 
 def pack(scene: Scene, *, capacity: int | None = None, slope_limit_nspm: float | None = None) -> Model:
@@ -51,6 +64,7 @@ def pack(scene: Scene, *, capacity: int | None = None, slope_limit_nspm: float |
         liquid_states=layout.records(layout.LIQUID_STATE, liquids),
         elements=layout.records(layout.ELEMENT, rows),
         segments=layout.records(layout.SEGMENT, rows),
+        window=layout.records(layout.WINDOW, window_needed(scene) if capacity is None else MAX_WINDOW),
     )
     _fill(model, scene, slope_limit(1 / scene.rate_hz, 1) if slope_limit_nspm is None else slope_limit_nspm)
     return model
@@ -72,6 +86,11 @@ def pack_into(model: Model, scene: Scene, *, delay_ticks: int = 1) -> None:
             f"the scene needs {rows} wake elements and {len(scene.liquids)} liquids; the servo was started with room "
             f"for {len(model.elements)} and {len(model.liquids)}: start it with more elements"
         )
+    if window_needed(scene) > len(model.window):
+        raise StudyError(
+            f'velocity "{scene.velocity.kind}" looks at {window_needed(scene)} samples; the model was packed with room '
+            f"for {len(model.window)}: pack it with a capacity"
+        )
     _fill(model, scene, slope_limit(1 / scene.rate_hz, delay_ticks))
 
 
@@ -84,12 +103,13 @@ def _fill(model: Model, scene: Scene, slope_limit_nspm: float) -> None:
     parameters.origin_m[:] = scene.origin_m
     parameters.period_s = 1 / scene.rate_hz
     parameters.liquids = len(scene.liquids)
+    parameters.estimator = _ESTIMATORS[scene.velocity.kind]
+    parameters.window_samples = window_needed(scene)
     if isinstance(scene.velocity, Ewma):
-        parameters.estimator = layout.ESTIMATOR_EWMA
         keep = 1 - scene.velocity.alpha
         parameters.log_keep_per_s = _WAKE_RATE_HZ * math.log(keep) if keep > 0 else -math.inf
-    else:
-        parameters.estimator = layout.ESTIMATOR_GIVEN
+    elif isinstance(scene.velocity, Foaw):
+        parameters.tolerance_m = scene.velocity.tolerance_m * scene.scale
     parameters.knee_law = _KNEES[scene.knee.law]
     parameters.knee_threshold_mps = scene.knee.threshold_mps
     parameters.slope_limit_nspm = slope_limit_nspm / scene.scale

@@ -78,13 +78,13 @@ def stop(rate_hz: float, *, speed_mps: float = SPEED_MPS, moving_s: float = 3.0,
 
 
 def zigzag(rate_hz: float, *, speed_mps: float = SPEED_MPS, leg_s: float = 0.5, legs: float = 12) -> Motion:
-    """Legs alternating by 90°, 45° to either side of x (Rek 2024, Fig. 6)."""
+    """Toward −z in legs that alternate by 90°, 45° to either side (Rek 2024, Fig. 6)."""
     t_s = _times(leg_s * legs, rate_hz)
     leg = _count(t_s, leg_s, legs)
     side = np.where(leg % 2 == 0, 1.0, -1.0)
     along = speed_mps * math.sqrt(0.5)
     across = np.where(side > 0, t_s - leg * leg_s, (leg + 1) * leg_s - t_s)
-    return _horizontal(t_s, x=along * t_s, z=along * across, vx=np.full_like(t_s, along), vz=along * side)
+    return _horizontal(t_s, x=along * across, z=-along * t_s, vx=along * side, vz=np.full_like(t_s, -along))
 
 
 def reach(

@@ -35,6 +35,7 @@ from study_app.haptics.liquid import (
 
 __all__ = [
     "MAX_LIQUIDS",
+    "MAX_WINDOW",
     "Accuracy",
     "AddedMass",
     "Body",
@@ -44,17 +45,21 @@ __all__ = [
     "Cylinder",
     "Drag",
     "Effect",
+    "Estimator",
     "Everywhere",
     "Ewma",
+    "Foaw",
     "Frozen",
     "Given",
     "History",
     "Knee",
+    "Line",
     "Liquid",
     "LocalWake",
     "Metres",
     "MotionBox",
     "Positive",
+    "Raw",
     "Region",
     "Scene",
     "Uniform",
@@ -62,6 +67,8 @@ __all__ = [
     "Vortex",
     "Wake",
 ]
+
+MAX_WINDOW = 16
 
 HAND_SPEED_MPS = 0.3
 HAND_ACCELERATION_MPS2 = 3.0  # 0.3 m/s at 1.6 Hz
@@ -83,13 +90,39 @@ class Ewma(Frozen):
     alpha: float = Field(default=0.1, gt=0, le=1)
 
 
+class Line(Frozen):
+    """The slope of the least-squares line through the newest ``samples`` positions."""
+
+    kind: Literal["line"] = "line"
+    samples: int = Field(default=15, ge=2, le=MAX_WINDOW)
+
+
+class Foaw(Frozen):
+    """The slope of the longest line that misses no position by more than ``tolerance_m`` (``velocity``).
+
+    First-order adaptive windowing: at most ``samples`` positions, fewer where the motion bends. The tolerance is in the
+    hand frame, by default one count of the Falcon's encoders.
+    """
+
+    kind: Literal["foaw"] = "foaw"
+    samples: int = Field(default=16, ge=2, le=MAX_WINDOW)
+    tolerance_m: float = Field(default=38e-6, ge=0, le=0.01)
+
+
+class Raw(Frozen):
+    """The newest difference of positions over its time, as it is."""
+
+    kind: Literal["raw"] = "raw"
+
+
 class Given(Frozen):
     """The velocity comes with the motion: for recorded or programmed motions, never for a device."""
 
     kind: Literal["given"] = "given"
 
 
-Velocity: TypeAlias = Annotated[Ewma | Given, Field(discriminator="kind")]
+Estimator: TypeAlias = Annotated[Ewma | Line | Foaw | Raw, Field(discriminator="kind")]
+Velocity: TypeAlias = Annotated[Ewma | Line | Foaw | Raw | Given, Field(discriminator="kind")]
 
 
 class Knee(Frozen):

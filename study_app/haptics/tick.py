@@ -46,7 +46,7 @@ def respond(model: Any, interval_s: float) -> None:
     parameters, state = model.parameters[0], model.state[0]
     if state.tracking == 0:
         begin(model)
-    estimate(parameters, state, interval_s)
+    estimate(parameters, state, model.window, interval_s)
     share_out(model, interval_s)
 
     clear(state.force_n)
