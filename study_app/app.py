@@ -27,7 +27,7 @@ try:
     from study_app.gui.icons import logo
     from study_app.gui.new_session import SIMULATED_DEVICE, NewSession, draw_seed, study_results
     from study_app.gui.opening import OpeningWindow
-    from study_app.gui.screens import choose_screens, describe_screen
+    from study_app.gui.screens import choose_screens, describe_screen, place
     from study_app.gui.theme import LIGHT, Theme
 except ImportError as missing:
     raise missing_library(missing) from missing
@@ -166,6 +166,7 @@ class LiveSession(QObject):
         who = f"Participant {self.chosen.participant}  ·  session {self.chosen.session}  ·  seed {self.chosen.seed}"
         self.note = OpeningWindow(f"Preparing {Path(self.chosen.source).stem}", who, theme=self.theme)
         self.note.cancelled.connect(self._cancel)
+        place(self.note, self.note.screen(), corner=False)
         self.note.show()
         self._working = True
         threading.Thread(target=self._make_ready, name="opening", daemon=True).start()

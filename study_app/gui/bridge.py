@@ -40,6 +40,7 @@ from study_app.session.runner import Ports, Runner, ServoPort, TankView
 
 TRACE_MS = 33
 TILES_MS = 500
+END_SHOWN_MS = 5000
 log = logging.getLogger(__name__)
 P = ParamSpec("P")
 
@@ -136,7 +137,7 @@ class SessionBridge(QObject):
             self._timer(TRACE_MS, self._traces),
             self._timer(TILES_MS, self._tiles),
         )
-        self.runner.on_change(lambda _state: self._show())
+        self.runner.on_change(lambda _state: self._changed())
         self._connect()
 
     def _timer(self, interval_ms: int, slot: Callable[[], None], *, precise: bool = False) -> QTimer:
@@ -248,6 +249,12 @@ class SessionBridge(QObject):
         self.health.overruns = self.parts.servo.overruns
         self.operator.show_lateness(self.health)
         self._show()
+
+    def _changed(self) -> None:
+        """Show the news; at the end bring the operator's window back, should the participant's cover it."""
+        self._show()
+        if self.runner.finished and self.participant.isFullScreen():
+            QTimer.singleShot(END_SHOWN_MS, self.operator, self.operator.come_forward)
 
     def _show(self) -> None:
         self.operator.show_view(self.view())

@@ -60,7 +60,7 @@ class SessionLine(Themed, QWidget):
         when.show_text(started_words(facts.started, now))
         whole = f" of {facts.answers_of}" if facts.answers_of is not None else ""
         self.status = Chip(*STATUS.get(facts.status, ("neutral", "ring", facts.status.capitalize())), small=True)
-        self.validity = Chip(*VALIDITY[facts.validity], small=True)
+        self.validity = Chip(*VALIDITY[None if facts.needs_care else facts.validity], small=True)
         self.answers = figures(f"{facts.answers}{whole}", "label")
         grid = _columns(self)
         for column, cell in enumerate((who, study, when, self.status, self.validity, self.answers)):

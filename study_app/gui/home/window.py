@@ -18,7 +18,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from study_app.gui.cards import Card, Chip, Icon, Logo
+from study_app.gui.cards import SHADOW, Card, Chip, Icon, Logo
 from study_app.gui.controls import ActionButton
 from study_app.gui.dialogs import Notice
 from study_app.gui.home.cards import BrokenCard, CardGrid, StudyCard
@@ -144,16 +144,11 @@ class DeviceCard(Card):
         row.addStretch()
         row.addWidget(Chip("ok", "check", "Ready", small=True))
         self.column.addLayout(row)
-        self.column.addWidget(
-            label(
-                "Built in. The force is not felt but seen: the ball lags and coasts as the liquid commands.",
-                "label",
-                "text2",
-                wraps=True,
-            )
-        )
-        for words in screens:
-            self.column.addWidget(label(words, "label", "text2"))
+        about = "Built in. The force is not felt but seen: the ball lags and coasts as the liquid commands."
+        for words in (about, *screens):
+            line = label(words, "label", "text2", wraps=True)
+            line.setFont(font("label", weight=400, tabular=True))
+            self.column.addWidget(line)
         self.column.addStretch()
 
 
@@ -198,6 +193,7 @@ class HomeWindow(QMainWindow):
         titles.addWidget(label("Studies", "title"))
         titles.addWidget(label("Choose a protocol to start a session, or rehearse it first.", "body", "text2"))
         head = QHBoxLayout()
+        head.setContentsMargins(SHADOW, 0, SHADOW, 0)
         head.addLayout(titles)
         head.addStretch()
         head.addWidget(self.open_protocol)

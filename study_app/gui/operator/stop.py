@@ -83,7 +83,7 @@ class StopPanel(Card):
     def show_view(self, view: OperatorView) -> None:
         """Say whether the force is on."""
         if view.over:
-            self._say("minus", "text2", "Force is off, session over")
+            self._say("minus", "text2", "Force is off")
         elif view.force_on:
             self._say("check", "ok", "Force is on")
         else:

@@ -246,8 +246,10 @@ def _setting_line(session: Session, progress: SessionProgress, *, answering: boo
     block = session.protocol.blocks[trial.block]
     task = session.protocol.tasks[block.task]
     doing = "free exploration" if isinstance(task, Explore) else "reaching targets"
-    if answering:
-        doing = "answering statements"
+    if progress.paused:
+        doing = "paused"
+    elif answering:
+        doing = "answering"
     if trial.phase != "main":
         return doing.capitalize()
     return f"{trial.label(session.protocol, session.language)}  ·  {doing}"

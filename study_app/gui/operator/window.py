@@ -196,6 +196,11 @@ class OperatorWindow(QMainWindow):
         question.installEventFilter(self._escape)
         question.show()
 
+    def come_forward(self) -> None:
+        """Stand before every other window of the screen."""
+        self.raise_()
+        self.activateWindow()
+
     def _already_asked(self) -> bool:
         """Bring a question that is still open to the front."""
         if self.question is None:
