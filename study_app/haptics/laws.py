@@ -46,7 +46,7 @@ def brown_lawler(reynolds: float) -> float:
     return ratio * max(reynolds / HIGHEST_REYNOLDS, 1.0)
 
 
-LAWS: Final[dict[str, Callable[[float], float]]] = {
+LAWS: Final[dict[Law, Callable[[float], float]]] = {
     "schiller-naumann": schiller_naumann,
     "haider-levenspiel": haider_levenspiel,
     "brown-lawler": brown_lawler,
