@@ -144,7 +144,9 @@ STATE = np.dtype(
         ("estimate_mps", np.float64, (3,)),  # the estimator's own velocity, before the knee
         ("velocity_mps", np.float64, (3,)),  # after the knee
         ("wake_mps", np.float64, (3,)),  # of the last listed liquid that acts, as used by drag
+        ("drift_mps", np.float64, (3,)),  # velocity of the current at the body
         ("force_n", np.float64, (3,)),  # sum of the effects
+        ("lift_n", np.float64, (3,)),  # what of it is buoyancy and weight
     ],
     align=True,
 )
@@ -219,6 +221,22 @@ SEGMENT = np.dtype(
     align=True,
 )
 
+# The energy that hand and liquid owe each other, at the hand (haptics.energy).
+ACCOUNT = np.dtype(
+    [
+        ("balance_j", np.float64),  # E: what the hand put in and did not get back yet
+        ("impulse_ns", np.float64, (3,)),  # force sent · time since the last sample, without buoyancy and weight [N·s]
+        ("impulse_s", np.float64),  # that time
+        ("step_m", np.float64, (3,)),  # the hand's last step, in the frame of the current
+        ("interval_s", np.float64),  # how long it took
+        ("longest_m", np.float64),  # the longest step so far
+        ("strongest_n", np.float64),  # the strongest force sent so far, without buoyancy and weight
+        ("lift_n", np.float64, (3,)),  # buoyancy and weight in the force that is sent
+        ("lift_before_n", np.float64, (3,)),  # the same of the turn before
+    ],
+    align=True,
+)
+
 # Survives a change of scene; owned by whoever sends the force. The host may write stop, fault and device_limit_n.
 SAFETY = np.dtype(
     [
@@ -233,6 +251,7 @@ SAFETY = np.dtype(
         ("fade_s", np.float64),  # how long a fade from 0 to 1 takes at present
         ("device_limit_n", np.float64),  # the device's own force limit
         ("sent_n", np.float64, (3,)),  # the force of the last turn
+        ("account", ACCOUNT),  # begins anew with each scene
     ],
     align=True,
 )

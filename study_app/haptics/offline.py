@@ -74,7 +74,8 @@ def _run(model: Any, safety: Record, samples: Any, t_s: Any) -> None:
                 state.estimate_mps[axis] = sample.velocity_mps[axis]
         respond(model, interval_s)
         report(state, sample)
-        guard(model, safety, sample)
+        safety.turn_s = interval_s
+        guard(model, safety, sample, interval_s)
 
 
 def _table(t_s: Any, samples: Any) -> Table:

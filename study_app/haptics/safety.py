@@ -1,6 +1,7 @@
 """What is sent to the hand: always the last step of a turn, in the hand frame [N].
 
-Order: slope limit on drag, finite, norm, fade, slew; a force stop or a fault goes past all of them to zero.
+Order: slope limit on drag, finite, norm, fade, slew, energy, norm; a force stop or a fault goes past all of them to
+zero. ``lift_n``, what of the force is buoyancy and weight, is shortened along with it: the energy account needs it.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ import math
 from typing import Any
 
 from study_app.haptics.compiled import kernel, part
+from study_app.haptics.energy import observe, open_account, remember, settle
 from study_app.haptics.layout import (
     EFFECT_DRAG,
     LIMITER_FADE,
@@ -40,29 +42,41 @@ def new_safety(device_limit_n: float = math.inf) -> Any:
 
 @kernel
 def begin_scene(safety: Record) -> None:
-    """Let the force of another scene fade in; a start fade that is not over begins again."""
+    """Let the force of another scene fade in, its energy at 0; a start fade that is not over begins again."""
     safety.fade = 0.0
+    open_account(safety.account)
 
 
 @part
-def guard(model: Any, safety: Record, sample: Record) -> None:
-    """Turn the force of the effects into the force to be sent, ``sample.device_force_n``."""
+def guard(model: Any, safety: Record, sample: Record, interval_s: float) -> None:
+    """Turn the force of the effects into the force to be sent, ``sample.device_force_n``.
+
+    ``interval_s`` is the time since the last accepted sample, 0 where this turn brought none.
+    """
     parameters, state = model.parameters[0], model.state[0]
-    force_n = sample.device_force_n
+    account = safety.account
+    force_n, lift_n = sample.device_force_n, account.lift_n
+    observe(model, safety, interval_s)
+    copy(lift_n, account.lift_before_n)
     copy(state.force_n, force_n)
+    copy(state.lift_n, lift_n)
     _limit_slope(model, sample)
-    if not is_finite(force_n):
+    if not (is_finite(force_n) and is_finite(lift_n)):
         sample.limiters |= LIMITER_NON_FINITE
         sample.status = STATUS_NON_FINITE
         clear(force_n)
+        clear(lift_n)
     limit_n = min(parameters.force_limit_n, safety.device_limit_n)
-    _limit_norm(force_n, limit_n, sample)
-    _fade(force_n, safety, sample)
-    _limit_slew(force_n, safety, sample)
-    _limit_norm(force_n, limit_n, sample)
+    _limit_norm(force_n, lift_n, limit_n, sample)
+    _fade(force_n, lift_n, safety, sample)
+    _limit_slew(force_n, account, safety, sample)
+    settle(parameters, account, sample)
+    _limit_norm(force_n, lift_n, limit_n, sample)
     if safety.stop != 0 or safety.fault != 0:
         _let_go(force_n, safety, sample)
+        clear(lift_n)
     copy(force_n, safety.sent_n)
+    remember(account, force_n)
 
 
 @part
@@ -88,17 +102,23 @@ def _limit_slope(model: Any, sample: Record) -> None:
 
 
 @part
-def _limit_norm(force_n: Any, limit_n: float, sample: Record) -> None:
+def _limit_norm(force_n: Any, lift_n: Any, limit_n: float, sample: Record) -> None:
     """Shorten the force to the limit, keeping its direction."""
     size_n = norm(force_n)
     if size_n > limit_n:
         sample.limiters |= LIMITER_NORM
-        for axis in range(3):
-            force_n[axis] *= limit_n / size_n
+        _scale(force_n, lift_n, limit_n / size_n)
 
 
 @part
-def _fade(force_n: Any, safety: Record, sample: Record) -> None:
+def _scale(force_n: Any, lift_n: Any, factor: float) -> None:
+    for axis in range(3):
+        force_n[axis] *= factor
+        lift_n[axis] *= factor
+
+
+@part
+def _fade(force_n: Any, lift_n: Any, safety: Record, sample: Record) -> None:
     """Weaken the force while it fades in (start 500 ms, scene 50 ms) or out (no usable sample)."""
     if safety.withheld:
         sample.limiters |= safety.withheld
@@ -107,20 +127,21 @@ def _fade(force_n: Any, safety: Record, sample: Record) -> None:
         safety.fade = min(safety.fade + safety.turn_s / safety.fade_s, 1.0)
     if safety.fade < 1.0:
         sample.limiters |= LIMITER_FADE
-        for axis in range(3):
-            force_n[axis] *= safety.fade
+        _scale(force_n, lift_n, safety.fade)
     else:
         safety.fade_s = SCENE_FADE_S
 
 
 @part
-def _limit_slew(force_n: Any, safety: Record, sample: Record) -> None:
+def _limit_slew(force_n: Any, account: Record, safety: Record, sample: Record) -> None:
     """Let the force move by at most 0.5 N from the one sent before."""
     step_n = distance(force_n, safety.sent_n)
     if step_n > SLEW_N:
         sample.limiters |= LIMITER_SLEW
+        share, lift_n, before_n = SLEW_N / step_n, account.lift_n, account.lift_before_n
         for axis in range(3):
-            force_n[axis] = safety.sent_n[axis] + (force_n[axis] - safety.sent_n[axis]) * SLEW_N / step_n
+            force_n[axis] = safety.sent_n[axis] + (force_n[axis] - safety.sent_n[axis]) * share
+            lift_n[axis] = before_n[axis] + (lift_n[axis] - before_n[axis]) * share
 
 
 @part

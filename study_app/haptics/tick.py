@@ -34,7 +34,7 @@ def tick(model: Any, safety: Record, sample: Record) -> None:
     if interval_s > 0.0:
         respond(model, interval_s)
     report(model.state[0], sample)
-    guard(model, safety, sample)
+    guard(model, safety, sample, interval_s)
 
 
 @part
@@ -50,7 +50,9 @@ def respond(model: Any, interval_s: float) -> None:
     share_out(model, interval_s)
 
     clear(state.force_n)
+    clear(state.lift_n)
     clear(state.wake_mps)
+    clear(state.drift_mps)
     for i in range(parameters.liquids):
         liquid, local = model.liquids[i], model.liquid_states[i]
         if local.share > 0.0:

@@ -1,0 +1,170 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from study_app.haptics import paths
+from study_app.haptics.layout import LIMITER_ENERGY
+from study_app.haptics.motion import Motion
+from study_app.haptics.offline import simulate
+from study_app.haptics.safety import begin_scene
+from tests.haptics.scenes import COMPILED, HONEY, THESIS, WATER, Hand, examples, liquid, scene
+
+STRONG = scene(liquid(10_000), scale=30)
+SCENES = {**THESIS, "strong": STRONG}
+
+
+def account(hand):
+    """Return the energy account of a hand's servo."""
+    return hand.safety[0].account
+
+
+def test_the_account_is_the_work_of_the_force_really_sent_over_the_steps_of_the_hand():
+    hand = Hand(HONEY)
+    places = np.array([[0.03 * np.cos(9 * t), 0.0, 0.03 * np.sin(9 * t)] for t in np.arange(0, 1, 1e-3)])
+    balance_j, sent = 0.0, np.zeros(3)
+    for k, place in enumerate(places):
+        sample = hand.turn(place)
+        if k > 0:
+            balance_j = min(balance_j - sent @ (place - places[k - 1]), 0.0)
+        assert account(hand).balance_j == pytest.approx(balance_j, abs=1e-15)
+        sent = sample.device_force_n.copy()
+
+
+def test_over_a_gap_the_mean_of_the_forces_sent_meanwhile_counts():
+    hand = Hand(HONEY, faded_in=False)
+    hand.sweep(0.2, 100)
+    account(hand).balance_j = 0.0
+    forces = [hand.turn((0.02, 0.0, 0.0)).device_force_n.copy()]
+    forces += [hand.turn(None).device_force_n.copy() for _ in range(3)]
+    hand.turn((0.0195, 0.0, 0.0))
+    assert account(hand).balance_j == pytest.approx(-np.mean(forces, axis=0)[0] * -0.0005)
+    assert account(hand).balance_j < 0
+
+
+def test_what_a_wake_can_return_is_four_27ths_of_c_u_cubed_over_its_length():
+    hand = Hand(WATER)
+    hand.sweep(0.3, 1000)
+    account(hand).balance_j = 1.0
+    sample = hand.turn((0.3, 0.0, 0.0))
+    u = np.linalg.norm(sample.wake_mps)
+    reserve_j = 4 / 27 * 0.5 * 1000 * 0.47 * np.pi * 0.034**2 * u**3 * 1.7 / 10
+    assert reserve_j > 0.1
+    assert account(hand).balance_j == pytest.approx(reserve_j, rel=1e-9)
+
+
+def test_without_a_wake_nothing_is_kept_for_later():
+    hand = Hand(HONEY)
+    hand.sweep(0.3, 500)
+    assert account(hand).balance_j == 0.0
+
+
+def test_a_new_scene_owes_nothing_and_is_owed_nothing():
+    hand = Hand(WATER)
+    hand.sweep(0.3, 500)
+    assert account(hand).balance_j > 0
+    begin_scene(hand.safety[0])
+    fresh = Hand(WATER)
+    assert account(hand).tobytes() == account(fresh).tobytes()
+
+
+@pytest.mark.parametrize(("debt_j", "bearable_n"), [(50e-6, np.inf), (1e-3, 60 * 0.05)])
+def test_a_debt_is_paid_by_damping_past_the_slew_limit_within_what_the_loop_bears(debt_j, bearable_n):
+    hand = Hand(WATER)
+    felt_n = hand.sweep(0.05, 300)[-1].device_force_n[0]
+    account(hand).balance_j = -1e-3 - debt_j
+    account(hand).strongest_n, account(hand).longest_m = 8.0, 0.01
+    paid_n = hand.turn((0.01505, 0.0, 0.0)).device_force_n[0]
+    assert hand.sample[0].limiters & LIMITER_ENERGY
+    assert paid_n < felt_n - 0.5
+    paying_n = (-1e-3 - account(hand).balance_j) / 50e-6
+    assert paid_n == pytest.approx(-min(paying_n, bearable_n), rel=1e-6)
+
+
+def test_a_liquid_that_resists_enough_pays_its_debt_unchanged():
+    hand = Hand(HONEY)
+    felt = hand.sweep(0.2, 300)[-1].force_n[0]
+    account(hand).balance_j = -1e-3 + 0.0002 * felt * 0.999
+    sample = hand.turn((0.0602, 0.0, 0.0))
+    assert sample.device_force_n[0] == sample.force_n[0]
+    assert sample.limiters == 0
+    hand.turn((0.0604, 0.0, 0.0))
+    assert account(hand).balance_j > -1e-3
+
+
+def test_in_debt_nothing_pushes_the_hand_on():
+    hand = Hand(WATER)
+    hand.sweep(0.3, 600)
+    for _ in range(60):
+        hand.turn((0.18, 0.0, 0.0))
+    assert hand.sample[0].device_force_n[0] > 1.0
+    account(hand).balance_j = -1.5e-3
+    hand.turn((0.18005, 0.0, 0.0))
+    assert hand.sample[0].device_force_n[0] < 0.0
+
+
+@pytest.mark.parametrize("name", THESIS)
+@pytest.mark.parametrize("speed_mps", [0.05, 0.1, 0.2, 0.3] if COMPILED else [0.3])
+@pytest.mark.parametrize("motion", ["reach", "circle", "stop"])
+def test_it_never_acts_where_people_move_as_they_do(name, speed_mps, motion):
+    felt = THESIS[name]
+    scene_mps = felt.scale * speed_mps
+    shape = {
+        "reach": {"distance_m": 0.6, "reach_s": 1.875 * 0.6 / scene_mps},
+        "circle": {"speed_mps": scene_mps, "radius_m": 0.3},
+        "stop": {"speed_mps": scene_mps},
+    }
+    ideal = paths.path(motion, **shape[motion])
+    count_m = felt.scale * 38e-6
+    for measured in (ideal, Motion(ideal.t_s, np.round(ideal.position_m / count_m) * count_m)):
+        assert not (simulate(felt, measured).limiters & LIMITER_ENERGY).any()
+
+
+def test_no_hand_gets_more_than_one_steps_work_whatever_it_does_and_the_liquid_is_felt_again_after():
+    """A hand that always goes where it is pushed, with steps of the greatest size that the door lets through."""
+    hand = Hand(WATER)
+    hand.sweep(0.3, 600)
+    place, longest_m, strongest_n = np.array([0.18, 0.0, 0.0]), 0.0003, 0.0
+    strongest_n = account(hand).strongest_n
+    for _ in range(3000 if COMPILED else 300):
+        sent = hand.sample[0].device_force_n
+        size_n = np.linalg.norm(sent)
+        strongest_n = max(strongest_n, size_n)
+        step = 0.0099 * sent / size_n if size_n > 0 else np.zeros(3)
+        place = place + step
+        longest_m = max(longest_m, np.linalg.norm(step))
+        hand.turn(place)
+        assert account(hand).balance_j >= -1e-3 - strongest_n * longest_m
+    for _ in range(500):
+        place = place + np.array([0.0, 0.0, 0.0003])
+        hand.turn(place)
+    assert account(hand).balance_j > -1e-3
+    assert hand.sample[0].device_force_n[2] < -1.0
+
+
+@pytest.mark.parametrize("name", SCENES)
+@settings(max_examples=examples(80), deadline=None)
+@given(data=st.data())
+def test_on_any_path_the_account_stays_above_minus_1_mj_and_the_work_of_one_step(name, data):
+    hand = Hand(SCENES[name], faded_in=data.draw(st.booleans()))
+    span_m = data.draw(st.sampled_from([1e-5, 1e-4, 1e-3, 9e-3]))
+    coordinate = st.floats(-1, 1)
+    moves = st.tuples(coordinate, coordinate, coordinate, st.sampled_from(["wherever", "along", "against", "nothing"]))
+    place, strongest_n, longest_m = np.zeros(3), 0.0, 0.0
+    last = hand.turn(place).device_force_n.copy()
+    for x, y, z, kind in data.draw(st.lists(moves, min_size=1, max_size=80)):
+        after_ns = data.draw(st.sampled_from([1_000_000, 1_000_000, 300_000, 4_000_000]))
+        if kind == "nothing":
+            sample = hand.turn(None, after_ns=after_ns)
+        else:
+            step = span_m * np.array([x, y, z]) / 2
+            if kind != "wherever" and np.linalg.norm(last) > 1e-9:
+                step = (
+                    (np.linalg.norm(step) if kind == "along" else -np.linalg.norm(step)) * last / np.linalg.norm(last)
+                )
+            place = place + step
+            sample = hand.turn(place, after_ns=after_ns)
+            longest_m = max(longest_m, account(hand).longest_m)
+        last = sample.device_force_n.copy()
+        assert account(hand).balance_j >= -1e-3 - strongest_n * longest_m - 1e-12
+        strongest_n = max(strongest_n, np.linalg.norm(last))
