@@ -15,6 +15,7 @@ from study_app.gui.theme import RADIUS_CONTROL, font
 from study_app.gui.themed import Themed, dress
 
 ROW_HEIGHT = 43
+MARGIN = 12
 SHOWN = 200
 COLUMNS = (("Participant", 110), ("Study", 130), ("Started", 140), ("Status", 160), ("Validity", 130), ("Answers", 80))
 
@@ -35,7 +36,7 @@ VALIDITY: dict[str | None, tuple[Tone, str, str]] = {
 
 def _columns(widget: QWidget) -> QGridLayout:
     grid = QGridLayout(widget)
-    grid.setContentsMargins(12, 0, 12, 0)
+    grid.setContentsMargins(MARGIN, 0, MARGIN, 0)
     grid.setHorizontalSpacing(8)
     for column, (_, width) in enumerate(COLUMNS):
         grid.setColumnMinimumWidth(column, width if column in {3, 4} else width // 2)
@@ -109,6 +110,11 @@ class SessionsCard(Card):
         area.setWidgetResizable(True)
         area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         area.setWidget(inside)
+        # The heads stay above their columns when the scroll bar takes some room.
+        bar = area.verticalScrollBar()
+        bar.rangeChanged.connect(
+            lambda _least, most: grid.setContentsMargins(MARGIN, 0, MARGIN + (bar.sizeHint().width() if most else 0), 0)
+        )
         self.column.addWidget(area, 1)
         self.setMinimumHeight(200)
 

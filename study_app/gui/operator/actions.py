@@ -85,6 +85,7 @@ class RepeatQuestion(Question):
             "Repeat this trial?",
             f"{setting} starts again from its beginning. What was recorded stays, with your reason beside it.",
         )
+        self.setting = setting
         self.reason = QLineEdit()
         self.reason.setFont(font("body"))
         self.reason.setPlaceholderText("Reason, such as: phone rang")

@@ -160,6 +160,8 @@ class OperatorWindow(QMainWindow):
         if view == self._view:
             return
         self._view = view
+        if isinstance(self.question, RepeatQuestion) and not self._asks_about(view, self.question):
+            self.question.reject()  # the trial it was about is over: its answer would hit the next one
         for part in (self.header, self.rail, self.tiles, self.notes, self.stop, self.buttons):
             part.show_view(view)
         self.device.show_device(view.device)
@@ -178,7 +180,7 @@ class OperatorWindow(QMainWindow):
         """Ask for the reason of a repetition; nothing happens without one."""
         if self._already_asked() or self._view is None or not self._view.may_repeat:
             return
-        question = RepeatQuestion(self, self.theme, self._view.setting_line.split("  ·  ")[0])
+        question = RepeatQuestion(self, self.theme, _setting(self._view))
         question.accepted.connect(lambda: self.repeat_asked.emit(question.reason.text().strip()))
         self._open(question)
 
@@ -189,6 +191,10 @@ class OperatorWindow(QMainWindow):
         question = EndQuestion(self, self.theme, dict(self._view.counts)["Answers on disk"])
         question.accepted.connect(lambda: self.end_asked.emit(question.status, question.reason.text().strip()))
         self._open(question)
+
+    @staticmethod
+    def _asks_about(view: OperatorView, question: RepeatQuestion) -> bool:
+        return view.may_repeat and question.setting == _setting(view)
 
     def _open(self, question: RepeatQuestion | EndQuestion) -> None:
         self.question = question
@@ -238,6 +244,11 @@ class OperatorWindow(QMainWindow):
         else:
             event.ignore()
         self.close_asked.emit()
+
+
+def _setting(view: OperatorView) -> str:
+    """Return the neutral name of the trial under way, with its place so that it names one trial alone."""
+    return f"{view.setting_line.split('  ·  ')[0]} ({view.heading.lower()})"
 
 
 def _scrolled(layout: QLayout) -> QScrollArea:

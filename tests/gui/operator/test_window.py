@@ -129,6 +129,18 @@ def test_a_trial_is_repeated_only_with_a_reason(running, qtbot):
     assert running.question is None
 
 
+def test_a_question_about_a_trial_goes_with_the_trial(running, told, health, qtbot):
+    running.ask_to_repeat()
+    told.end(1)
+    running.show_view(told.view(health))
+    assert running.question is not None  # its statements are being answered
+    told.answer(1)
+    told.start(2)
+    with qtbot.assertNotEmitted(running.repeat_asked):
+        running.show_view(told.view(health))
+    assert running.question is None
+
+
 def test_ending_asks_first_and_says_status_and_reason(running, qtbot):
     qtbot.mouseClick(running.buttons.end, Qt.MouseButton.LeftButton)
     question = running.question
