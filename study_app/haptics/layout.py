@@ -10,6 +10,23 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from study_app.haptics.effects.records import (
+    ADDED_MASS,
+    ADDED_MASS_STATE,
+    BUOYANCY,
+    CURRENT,
+    CURRENT_STATE,
+    DRAG,
+    DRAG_STATE,
+    HISTORY,
+    HISTORY_STATE,
+    LOCAL_WAKE,
+    LOCAL_WAKE_STATE,
+    SURFACE_STATE,
+    WAKE,
+    WAKE_STATE,
+)
+
 Record: TypeAlias = Any  # one row of a recarray: fields as attributes, compiled or not
 
 # Limiters that acted in a tick, as bits of Sample.limiters.
@@ -61,11 +78,18 @@ READING = np.dtype(
 
 
 # What follows is the memory of one scene ("model", haptics.pack) and of the safety layer, in the scene frame unless
-# said otherwise. The fields of an effect sit in a record of their own, untouched where the effect is not asked for.
+# said otherwise. The fields of an effect sit in a record of their own (``effects.records``), untouched where the effect
+# is not asked for.
 
 # Effects a liquid asks for, as bits of Liquid.effects.
 EFFECT_DRAG = 1 << 0
 EFFECT_WAKE = 1 << 1
+EFFECT_LOCAL_WAKE = 1 << 2
+EFFECT_CURRENT = 1 << 3
+EFFECT_BUOYANCY = 1 << 4
+EFFECT_SURFACE = 1 << 5
+EFFECT_ADDED_MASS = 1 << 6
+EFFECT_HISTORY = 1 << 7
 
 REGION_EVERYWHERE = 0
 REGION_BOX = 1
@@ -87,6 +111,9 @@ PARAMETERS = np.dtype(
         ("origin_m", np.float64, (3,)),  # where the hand's origin is
         ("period_s", np.float64),  # nominal time between ticks
         ("liquids", np.int64),  # how many of the liquids' rows count
+        ("effects", np.int64),  # EFFECT_* bits that any of them asks for
+        ("radius_m", np.float64),  # of the body
+        ("weight_n", np.float64),  # of the body
         ("estimator", np.int64),  # ESTIMATOR_*
         (
             "log_keep_per_s",
@@ -111,24 +138,20 @@ REGION = np.dtype(
     align=True,
 )
 
-DRAG = np.dtype([("factor_kg_m", np.float64)], align=True)  # ½ ρ C_d A
-
-WAKE = np.dtype(
+LIQUID = np.dtype(
     [
-        ("row", np.int64),  # its first row in the model's elements and segments
-        ("length", np.int64),  # N, in elements at the scene's rate: the rows it owns
-        ("scaling", np.float64),  # S, likewise
-        ("exponent", np.float64),  # y
-        ("breaking_cosine", np.float64),  # cos β
-        ("breaking_span_m", np.float64),
-        ("log_decay_per_s", np.float64),  # ln λ a second
-        ("resolution_m", np.float64),
-        ("vertical", np.float64),  # 1 where vertical motion enters the tail, else 0
+        ("effects", np.int64),
+        ("region", REGION),
+        ("drag", DRAG),
+        ("wake", WAKE),
+        ("local_wake", LOCAL_WAKE),
+        ("current", CURRENT),
+        ("buoyancy", BUOYANCY),
+        ("added_mass", ADDED_MASS),
+        ("history", HISTORY),
     ],
     align=True,
 )
-
-LIQUID = np.dtype([("effects", np.int64), ("region", REGION), ("drag", DRAG), ("wake", WAKE)], align=True)
 
 STATE = np.dtype(
     [
@@ -144,7 +167,7 @@ STATE = np.dtype(
         ("estimate_mps", np.float64, (3,)),  # the estimator's own velocity, before the knee
         ("velocity_mps", np.float64, (3,)),  # after the knee
         ("wake_mps", np.float64, (3,)),  # of the last listed liquid that acts, as used by drag
-        ("drift_mps", np.float64, (3,)),  # velocity of the current at the body
+        ("drift_mps", np.float64, (3,)),  # velocity of the current at the body, of the same liquid
         ("force_n", np.float64, (3,)),  # sum of the effects
         ("lift_n", np.float64, (3,)),  # what of it is buoyancy and weight
     ],
@@ -160,63 +183,22 @@ WINDOW = np.dtype(
     align=True,
 )
 
-DRAG_STATE = np.dtype(
-    [
-        ("relative_mps", np.float64, (3,)),  # w: the body's velocity relative to the liquid at its place
-        ("force_n", np.float64, (3,)),
-    ],
-    align=True,
-)
-
-WAKE_STATE = np.dtype(
-    [
-        ("stored", np.int64),  # elements stored since it was empty: the number of the next one
-        ("held", np.int64),  # how many of them are still in the list
-        ("first_segment", np.int64),  # number of the oldest segment
-        ("last_segment", np.int64),  # number of the newest, to which elements are added
-        ("reference", np.int64),  # number of the element the next one is compared with
-        ("scanned", np.int64),  # number of the first element not yet considered as reference
-        ("evicted", np.int64),  # moving elements that fell off since the last renewal
-        ("arc_m", np.float64),  # a: path travelled in this liquid
-        ("stored_at_m", np.float64, (3,)),  # where the body was when an element was last stored
-        ("scale", np.float64),  # speeds and sums are stored divided by this common decay
-        ("interior_mps", np.float64, (3,)),  # Σ direction · sum over segments between oldest and newest
-        ("interior_carry_mps", np.float64, (3,)),  # its rounding error
-        ("speed_mps", np.float64),  # Σ|e|
-        ("speed_carry_mps", np.float64),
-        ("square_m2ps2", np.float64),  # Σ|e|²
-        ("square_carry_m2ps2", np.float64),
-    ],
-    align=True,
-)
-
 LIQUID_STATE = np.dtype(
     [
-        ("inside", np.int64),  # 1 while the body is within the region (with hysteresis)
-        ("share", np.float64),  # φ: 0 outside, 1 inside
-        ("flow_mps", np.float64, (3,)),  # velocity of the liquid at the body
+        ("inside", np.int64),  # 1 while the body is within the borders (with hysteresis)
+        ("border", np.float64),  # 0 outside, 1 inside, faded between
+        ("share", np.float64),  # φ of the volume: border, times what of the body is under the surface
+        ("frontal", np.float64),  # φ of the frontal area, likewise; of the motion w
+        ("motion_mps", np.float64, (3,)),  # v - v_current
+        ("wake_mps", np.float64, (3,)),  # v_wake; zero where no wake is asked for
+        ("relative_mps", np.float64, (3,)),  # w = v - v_current - v_wake
         ("drag", DRAG_STATE),
         ("wake", WAKE_STATE),
-    ],
-    align=True,
-)
-
-ELEMENT = np.dtype(
-    [
-        ("velocity_mps", np.float64, (3,)),  # e, divided by the wake's scale
-        ("speed_mps", np.float64),  # |e|, likewise
-        ("arc_m", np.float64),  # a when it was stored
-        ("moving", np.int64),  # 0 for a zero element
-    ],
-    align=True,
-)
-
-SEGMENT = np.dtype(
-    [
-        ("direction", np.float64, (3,)),  # unit vector of its newest element
-        ("speed_mps", np.float64),  # Σ|e| of its elements, divided by the wake's scale
-        ("speed_carry_mps", np.float64),  # the rounding error of that sum
-        ("count", np.int64),  # its elements still in the list
+        ("local_wake", LOCAL_WAKE_STATE),
+        ("current", CURRENT_STATE),
+        ("surface", SURFACE_STATE),
+        ("added_mass", ADDED_MASS_STATE),
+        ("history", HISTORY_STATE),
     ],
     align=True,
 )

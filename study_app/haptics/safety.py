@@ -93,7 +93,7 @@ def _limit_slope(model: Any, sample: Record) -> None:
         local = model.liquid_states[i]
         if model.liquids[i].effects & EFFECT_DRAG and local.share > 0.0:
             drag_n = norm(local.drag.force_n)
-            most_n = parameters.slope_limit_nspm * norm(local.drag.relative_mps) * local.share / shares
+            most_n = parameters.slope_limit_nspm * norm(local.relative_mps) * local.share / shares
             if drag_n > most_n:
                 sample.limiters |= LIMITER_SLOPE
                 excess = 1.0 - most_n / drag_n

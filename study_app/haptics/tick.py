@@ -10,13 +10,30 @@ from typing import Any
 
 from study_app.haptics.compiled import kernel, part
 from study_app.haptics.door import admit, watch
+from study_app.haptics.effects.added_mass import push_aside
+from study_app.haptics.effects.buoyancy import carry
+from study_app.haptics.effects.current import stream
 from study_app.haptics.effects.drag import resist
+from study_app.haptics.effects.history import remember
+from study_app.haptics.effects.local_wake import forget_places, leave_behind, linger
 from study_app.haptics.effects.segments import empty
+from study_app.haptics.effects.surface import expose
 from study_app.haptics.effects.wake import flow, follow
-from study_app.haptics.layout import EFFECT_DRAG, EFFECT_WAKE, STATUS_OK, Record
+from study_app.haptics.layout import (
+    EFFECT_ADDED_MASS,
+    EFFECT_BUOYANCY,
+    EFFECT_CURRENT,
+    EFFECT_DRAG,
+    EFFECT_HISTORY,
+    EFFECT_LOCAL_WAKE,
+    EFFECT_SURFACE,
+    EFFECT_WAKE,
+    STATUS_OK,
+    Record,
+)
 from study_app.haptics.region import share_out
 from study_app.haptics.safety import guard
-from study_app.haptics.vector import clear, copy
+from study_app.haptics.vector import clear, copy, subtract
 from study_app.haptics.velocity import estimate, forget
 
 
@@ -54,16 +71,55 @@ def respond(model: Any, interval_s: float) -> None:
     clear(state.wake_mps)
     clear(state.drift_mps)
     for i in range(parameters.liquids):
-        liquid, local = model.liquids[i], model.liquid_states[i]
-        if local.share > 0.0:
-            clear(local.flow_mps)
-            if liquid.effects & EFFECT_WAKE:
-                flow(liquid, local, model.segments)
-            copy(local.flow_mps, state.wake_mps)
-            if liquid.effects & EFFECT_DRAG:
-                resist(liquid, local, state)
-        if liquid.effects & EFFECT_WAKE:
-            follow(liquid, local, state, model.elements, model.segments, interval_s)
+        if model.liquid_states[i].share > 0.0:
+            act(model, i, interval_s)
+        else:
+            leave(model, i)
+    if parameters.effects & EFFECT_BUOYANCY:
+        carry(model)
+
+
+@part
+def act(model: Any, i: int, interval_s: float) -> None:
+    """Let one liquid, in which the body is, act on it by the effects it asks for: in this order, no others."""
+    liquid, local, state = model.liquids[i], model.liquid_states[i], model.state[0]
+    copy(state.velocity_mps, local.motion_mps)
+    clear(local.wake_mps)
+    if liquid.effects & EFFECT_CURRENT:
+        stream(liquid, local, state)
+        copy(local.current.velocity_mps, state.drift_mps)
+    if liquid.effects & EFFECT_WAKE:
+        flow(liquid, local, model.segments)
+    if liquid.effects & EFFECT_LOCAL_WAKE:
+        linger(liquid, local, state, model.cells)
+    subtract(local.motion_mps, local.wake_mps, local.relative_mps)
+    copy(local.wake_mps, state.wake_mps)
+    if liquid.effects & EFFECT_SURFACE:
+        expose(local)
+    if liquid.effects & EFFECT_DRAG:
+        resist(liquid, local, state)
+    if liquid.effects & EFFECT_ADDED_MASS:
+        push_aside(liquid, local, state, interval_s)
+    if liquid.effects & EFFECT_HISTORY:
+        remember(liquid, local, state, model.intervals, model.exponentials, interval_s)
+    if liquid.effects & EFFECT_WAKE:
+        follow(liquid, local, state, model.elements, model.segments, interval_s)
+    if liquid.effects & EFFECT_LOCAL_WAKE:
+        leave_behind(liquid, local, state, model.cells, interval_s)
+
+
+@part
+def leave(model: Any, i: int) -> None:
+    """Let one liquid forget the body: it is out of it, or was lost."""
+    liquid, local = model.liquids[i], model.liquid_states[i]
+    if liquid.effects & EFFECT_WAKE:
+        empty(liquid.wake, local.wake, model.segments)
+    if liquid.effects & EFFECT_LOCAL_WAKE:
+        forget_places(local.local_wake)
+    if liquid.effects & EFFECT_ADDED_MASS:
+        local.added_mass.primed = 0
+    if liquid.effects & EFFECT_HISTORY:
+        local.history.primed = 0
 
 
 @kernel
@@ -71,8 +127,7 @@ def begin(model: Any) -> None:
     """Forget the motion so far: all that is known of the body is where it is."""
     forget(model.parameters[0], model.state[0])
     for i in range(model.parameters[0].liquids):
-        if model.liquids[i].effects & EFFECT_WAKE:
-            empty(model.liquids[i].wake, model.liquid_states[i].wake, model.segments)
+        leave(model, i)
     model.state[0].tracking = 1
 
 

@@ -25,6 +25,14 @@ def copy(source: Any, to: Any) -> None:
 
 
 @part
+def subtract(a: Any, b: Any, to: Any) -> None:
+    """Set ``to`` to a − b."""
+    to[0] = a[0] - b[0]
+    to[1] = a[1] - b[1]
+    to[2] = a[2] - b[2]
+
+
+@part
 def norm(vector: Any) -> float:
     """Return its length."""
     return math.sqrt(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2])

@@ -2,21 +2,40 @@
 
 from __future__ import annotations
 
+from study_app.haptics import laws
 from study_app.haptics.compiled import part
+from study_app.haptics.effects.records import LAW_BROWN_LAWLER, LAW_CONSTANT, LAW_HAIDER_LEVENSPIEL
 from study_app.haptics.layout import Record
 from study_app.haptics.vector import norm
+
+_schiller_naumann = part(laws.schiller_naumann)
+_haider_levenspiel = part(laws.haider_levenspiel)
+_brown_lawler = part(laws.brown_lawler)
 
 
 @part
 def resist(liquid: Record, local: Record, state: Record) -> None:
-    """Add F = −½ ρ C_d A |w| w φ to the force, with w = v − v_flow (Rek 2024, §4.1).
+    """Add F = −½ ρ C_d A |w| w φ to the force, (3,) [N], with w = v − v_wake − v_current (Rek 2024, §4.1).
 
-    A is the frontal area of the ball, φ the share of the liquid, v_flow the liquid's velocity at the body.
+    A is the frontal area of the ball, φ the share of it in the liquid. C_d is the body's own, or that of a sphere at
+    Re = ρ|w|D/µ (``laws``): there as a multiple of Stokes' −3πµD w, finite at rest, where C_d is not.
     """
-    w = local.drag.relative_mps
-    for axis in range(3):
-        w[axis] = state.velocity_mps[axis] - local.flow_mps[axis]
+    w = local.relative_mps
     speed_mps = norm(w)
+    if liquid.drag.law == LAW_CONSTANT:
+        resistance_nspm = liquid.drag.factor_kg_m * speed_mps
+    else:
+        resistance_nspm = liquid.drag.stokes_nspm * _over_stokes(liquid.drag.law, liquid.drag.reynolds_spm * speed_mps)
     for axis in range(3):
-        local.drag.force_n[axis] = -liquid.drag.factor_kg_m * speed_mps * w[axis] * local.share
+        local.drag.force_n[axis] = -resistance_nspm * w[axis] * local.frontal
         state.force_n[axis] += local.drag.force_n[axis]
+
+
+@part
+def _over_stokes(law: int, reynolds: float) -> float:
+    """Return the drag as a multiple of Stokes'."""
+    if law == LAW_BROWN_LAWLER:
+        return _brown_lawler(reynolds)
+    if law == LAW_HAIDER_LEVENSPIEL:
+        return _haider_levenspiel(reynolds)
+    return _schiller_naumann(reynolds)

@@ -17,7 +17,7 @@ import math
 from typing import Any
 
 from study_app.haptics.compiled import part
-from study_app.haptics.effects.segments import empty, renew, store, tail
+from study_app.haptics.effects.segments import renew, store, tail
 from study_app.haptics.layout import Record
 from study_app.haptics.vector import clear, copy, distance, norm
 
@@ -29,46 +29,46 @@ NOTHING_MPS = 1e-30
 
 @part
 def flow(liquid: Record, local: Record, segments: Any) -> None:
-    """Set the liquid's velocity at the body, ``local.flow_mps``, from the wake so far.
-
-    The response acts on the fill x = |v_tail|/m̄ with m̄ = Σ|e|²/Σ|e|: straight motion fills the wake as x^y. For y < 1
-    a smooth floor x_0 keeps x^(y-1) finite where opposed segments cancel.
-    """
-    out = local.flow_mps
-    tail(liquid.wake, local.wake, segments, out)
+    """Set the liquid's velocity at the body, ``local.wake_mps`` (3,) [m/s], from the wake so far."""
+    wake, out = local.wake, local.wake_mps
+    tail(liquid.wake, wake, segments, out)
     size_mps = norm(out)
     if size_mps < NOTHING_MPS:
         clear(out)
         return
-    wake, y = local.wake, liquid.wake.exponent
     mean_mps = wake.scale * (wake.square_m2ps2 + wake.square_carry_m2ps2) / (wake.speed_mps + wake.speed_carry_mps)
-    fill = size_mps / mean_mps
-    if y > 1.0:
-        gain = fill ** (y - 1.0)
-    elif y < 1.0:
-        gain = (fill * fill + RESPONSE_FLOOR * RESPONSE_FLOOR) ** (0.5 * (y - 1.0))
-    else:
-        gain = 1.0
+    gain = response(size_mps / mean_mps, liquid.wake.exponent)
     for axis in range(3):
         out[axis] *= gain
+
+
+@part
+def response(fill: float, exponent: float) -> float:
+    """Return what |v_tail| is multiplied by where it is the share ``fill`` of the elements' mean speed.
+
+    The response acts on the fill x = |v_tail|/m̄ with m̄ = Σ|e|²/Σ|e|: straight motion fills the wake as x^y. For y < 1
+    a smooth floor x_0 keeps x^(y-1) finite where opposed segments cancel.
+    """
+    if exponent > 1.0:
+        return float(fill ** (exponent - 1.0))
+    if exponent < 1.0:
+        return float((fill * fill + RESPONSE_FLOOR * RESPONSE_FLOOR) ** (0.5 * (exponent - 1.0)))
+    return 1.0
 
 
 @part
 def follow(liquid: Record, local: Record, state: Record, elements: Any, segments: Any, interval_s: float) -> None:
     """Let the wake take in this tick, after the force: decay, arc, and an element where the rules ask for one.
 
-    A body slower than 1 mm/s stores a zero element, which belongs to no segment and still takes one of the N places; a
-    moving one stores its velocity once it is ``resolution`` away from where it last stored. Out of the liquid the wake
-    is forgotten.
+    What enters is the motion through the current: a body that drifts with a river leaves no wake. Slower than 1 mm/s it
+    stores a zero element, which belongs to no segment and still takes one of the N places; a moving one stores its
+    velocity once it is ``resolution`` away from where it last stored.
     """
-    wake, tracks = liquid.wake, local.wake
-    if local.share == 0.0:
-        empty(wake, tracks, segments)
-        return
+    wake, tracks, h = liquid.wake, local.wake, local.motion_mps
     tracks.scale *= math.exp(wake.log_decay_per_s * interval_s)
     if tracks.scale < SMALLEST_SCALE or tracks.evicted >= wake.length:
         renew(wake, tracks, elements, segments)
-    hx, hy, hz = state.velocity_mps[0], wake.vertical * state.velocity_mps[1], state.velocity_mps[2]
+    hx, hy, hz = h[0], wake.vertical * h[1], h[2]
     speed_mps = math.sqrt(hx * hx + hy * hy + hz * hz)
     tracks.arc_m += speed_mps * interval_s
     if speed_mps < REST_MPS:
