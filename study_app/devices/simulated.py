@@ -15,7 +15,7 @@ from study_app.devices.base import Device
 from study_app.devices.hand import HAND, HOLD, ORDER, move_hand, post
 from study_app.haptics.cfunctions import READ, READ_LOST, READ_NEW, READ_NOTHING_NEW, WRITE, c_function, record_at
 from study_app.haptics.layout import READING, records
-from study_app.haptics.plant import HANDLE, measure, move
+from study_app.haptics.plant import HANDLE, let_go, measure, move, push
 
 SIMULATED = np.dtype(
     [
@@ -93,7 +93,7 @@ class SimulatedDevice(Device):
 
     def close(self) -> None:
         """Take the force off the handle."""
-        self._state.handle.force_n = 0.0
+        let_go(self._state.handle)
 
     def describe(self) -> dict[str, Any]:
         """Return name and numbers for the receipt."""
@@ -159,7 +159,5 @@ def _read(context: int, now_ns: int, reading: int) -> int:
 
 def _write(context: int, fx: float, fy: float, fz: float) -> int:
     device = _simulated_at(context)
-    device.handle.force_n[0] = fx
-    device.handle.force_n[1] = fy
-    device.handle.force_n[2] = fz
+    push(device.handle, fx, fy, fz)
     return READ_LOST if device.unplugged != 0 else 0

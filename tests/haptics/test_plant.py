@@ -11,7 +11,9 @@ from hypothesis import strategies as st
 if numba.config.DISABLE_JIT:
     pytest.skip("too many sub-steps for plain Python", allow_module_level=True)
 
-from study_app.haptics.plant import SUB_STEP_S, measure, move, new_handle
+from study_app.errors import StudyError
+from study_app.haptics.pace import new_pace, next_turn
+from study_app.haptics.plant import MOST_DELAY, SUB_STEP_S, let_go, measure, move, new_handle, push
 
 STILL = np.zeros(3)
 
@@ -180,3 +182,85 @@ def test_no_time_changes_nothing(seconds):
     handle.velocity_mps[0] = 1.0
     move(handle, along_x(1.0), along_x(1.0), seconds)
     assert (handle.position_m[0], handle.velocity_mps[0]) == (0.0, 1.0)
+
+
+@pytest.mark.parametrize("delay", range(MOST_DELAY + 1))
+def test_a_force_acts_as_many_writes_late_as_the_device_is_delayed(delay):
+    handle = new_handle(mass_kg=0.2, delay=delay)
+    acting = []
+    for k in range(1, 12):
+        push(handle, k, -k, 2 * k)
+        acting.append(handle.force_n.tolist())
+    assert acting == [[max(k - delay, 0) * sign for sign in (1, -1, 2)] for k in range(1, 12)]
+
+
+@pytest.mark.parametrize("delay", [-1, MOST_DELAY + 1])
+def test_a_delay_beyond_its_memory_is_refused(delay):
+    with pytest.raises(StudyError, match="0 to 4 ticks"):
+        new_handle(mass_kg=0.2, delay=delay)
+
+
+def test_motors_saturate_each_on_its_own_and_give_whole_steps():
+    handle = new_handle(mass_kg=0.2, motor_limit_n=8.0, motor_step_n=0.25)
+    push(handle, 9.0, -100.0, 0.37)
+    assert handle.force_n.tolist() == [8.0, -8.0, 0.25]
+    push(handle, 0.38, -0.38, 0.124)
+    assert handle.force_n.tolist() == [0.5, -0.5, 0.0]
+
+
+def test_letting_go_of_the_force_forgets_what_is_on_its_way():
+    handle = new_handle(mass_kg=0.2, delay=3)
+    for _ in range(4):
+        push(handle, 1.0, 1.0, 1.0)
+    let_go(handle)
+    assert not handle.force_n.any()
+    push(handle, 0.0, 0.0, 0.0)
+    assert not handle.force_n.any()
+
+
+def test_the_mass_of_the_hand_moves_along_until_it_lets_go():
+    handle = new_handle(mass_kg=0.2, hand_kg=0.3)
+    handle.force_n[0] = 1.0
+    move(handle, STILL, STILL, 0.1)
+    assert handle.velocity_mps[0] == pytest.approx(0.2)
+    handle.held = 0
+    move(handle, STILL, STILL, 0.1)
+    assert handle.velocity_mps[0] == pytest.approx(0.7)
+
+
+def test_a_handle_let_go_knows_no_hand():
+    handle = new_handle(mass_kg=0.2, stiffness_npm=500, damping_nspm=30)
+    handle.held = 0
+    move(handle, STILL, along_x(0.03), 0.1)
+    assert not handle.position_m.any()
+
+
+def test_a_regular_pace_is_regular():
+    pace = new_pace(1e-3)
+    assert [next_turn(pace) for _ in range(5)] == [1e-3] * 5
+
+
+def test_a_turn_is_late_but_its_deadlines_stay():
+    pace = new_pace(2e-3, jitter_s=0.5e-3)
+    late_s = np.cumsum([next_turn(pace) for _ in range(5000)]) - 2e-3 * np.arange(1, 5001)
+    assert late_s.min() >= -1e-12
+    assert late_s.max() <= 0.5e-3
+    assert late_s.mean() == pytest.approx(0.25e-3, rel=0.05)
+    assert late_s.std() == pytest.approx(0.5e-3 / math.sqrt(12), rel=0.05)
+
+
+def test_a_share_of_the_turns_does_not_come():
+    pace = new_pace(1e-3, missed=0.2)
+    turns = np.array([next_turn(pace) for _ in range(5000)]) / 1e-3
+    assert turns == pytest.approx(np.rint(turns))
+    assert turns.mean() == pytest.approx(1 / 0.8, rel=0.03)
+    assert turns.max() > 2
+
+
+def test_another_seed_is_another_pace_and_the_same_seed_the_same():
+    def row(seed):
+        pace = new_pace(1e-3, jitter_s=0.5e-3, seed=seed)
+        return [next_turn(pace) for _ in range(10)]
+
+    assert row(1) == row(1)
+    assert row(1) != row(2)
