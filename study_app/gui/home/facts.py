@@ -63,7 +63,7 @@ class SessionFacts:
 def sources() -> tuple[str, ...]:
     """Return the names of the protocols at hand: those beside us, then those that ship with the program."""
     own = {path.stem for path in Path("protocols").glob("*.toml")}
-    return tuple(sorted({*own, *shipped()}, key=lambda name: (name == "demo", name)))
+    return tuple(sorted({*own, *shipped()}, key=lambda name: (name != "rek2024", name == "demo", name)))
 
 
 def study_facts(source: str) -> StudyFacts | BrokenFacts:
