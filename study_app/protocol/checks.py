@@ -13,12 +13,12 @@ from pydantic import BaseModel, ConfigDict
 
 from study_app.haptics.scene import MAX_LIQUIDS
 from study_app.protocol.document import Path, names
-from study_app.protocol.model import Block, Condition, DeviceNeeds, Named, Reach
+from study_app.protocol.model import Block, Condition, DeviceNeeds, Named, PageText, Reach
 from study_app.protocol.problems import Fault
 from study_app.protocol.references import items, languages, references, repeats, sequence
 from study_app.protocol.tasks import Task
 
-_TABLES = ("conditions", "tasks", "blocks")
+_TABLES = ("conditions", "tasks", "pages", "blocks")
 
 
 class Draft(BaseModel):
@@ -29,6 +29,7 @@ class Draft(BaseModel):
     device: DeviceNeeds | None = None
     conditions: dict[str, Condition] = {}
     tasks: dict[str, Task] = {}
+    pages: dict[str, PageText] = {}
     blocks: Named[Block] = {}
     sequence: tuple[str, ...] = ()
     whole: bool = True
@@ -61,7 +62,7 @@ def check(document: Mapping[str, Any], broken: Iterable[Path]) -> Iterator[Fault
     for of_names in (references, sequence, repeats, items, languages):
         yield from of_names(document)
     parts = draft(document, broken)
-    for of_tables in (targets, crowded, practice, codes, counted_parts):
+    for of_tables in (targets, crowded, practice, codes, breaks, counted_parts):
         yield from of_tables(parts)
 
 
@@ -114,6 +115,15 @@ def codes(parts: Draft) -> Iterator[Fault]:
         if block.code_prefix is not None and owners.setdefault(block.code_prefix, name) != name:
             message = f'block "{owners[block.code_prefix]}" has the prefix "{block.code_prefix}" too'
             yield Fault(("blocks", name, "code_prefix"), message, "choose another letter")
+
+
+def breaks(parts: Draft) -> Iterator[Fault]:
+    """Check that a break is a page of that kind."""
+    for name, block in parts.blocks.items():
+        page = parts.pages.get(block.break_page or "")
+        if page is not None and page.kind != "break":
+            message = f'page "{block.break_page}" is of kind "{page.kind}"'
+            yield Fault(("blocks", name, "break_page"), message, 'a break needs a page with kind = "break"')
 
 
 def counted_parts(parts: Draft) -> Iterator[Fault]:

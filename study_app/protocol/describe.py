@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from study_app.protocol.model import Block, Explore, Protocol, Questionnaire
 from study_app.protocol.schedule import block_codes
+from study_app.protocol.squares import row_count
 from study_app.protocol.tasks import Task
 
 READING_WORDS_PER_S = 3.0
@@ -35,7 +36,9 @@ def expected_duration_s(protocol: Protocol) -> float:
     """Return how long a session will take [s], between the shortest and the longest it can be."""
     language = protocol.study.languages[0]
     return sum(
-        _reading_s(protocol, step, language) if step in protocol.pages else _block_s(protocol, protocol.blocks[step])
+        _reading_s(protocol, step, language)
+        if step in protocol.pages
+        else _block_s(protocol, protocol.blocks[step], language)
         for step in protocol.sequence
     )
 
@@ -45,10 +48,11 @@ def _reading_s(protocol: Protocol, page_id: str, language: str) -> float:
     return PAGE_S + len(body.split()) / READING_WORDS_PER_S
 
 
-def _block_s(protocol: Protocol, block: Block) -> float:
+def _block_s(protocol: Protocol, block: Block, language: str) -> float:
     questionnaire = protocol.questionnaire_of(block.id)
     answering = 0.0 if questionnaire is None else PAGE_S + ANSWER_S * len(questionnaire.items)
-    return _trials(block) * (_task_s(protocol.tasks[block.task]) + answering)
+    resting = 0.0 if block.break_page is None else block.breaks * _reading_s(protocol, block.break_page, language)
+    return block.trials * (_task_s(protocol.tasks[block.task]) + answering) + resting
 
 
 def _task_s(task: Task) -> float:
@@ -57,10 +61,6 @@ def _task_s(task: Task) -> float:
     if task.count is not None:
         return min(task.timeout_s, task.count * (task.dwell_s + MOVE_S))
     return task.duration_s or 0.0
-
-
-def _trials(block: Block) -> int:
-    return len(block.conditions) * block.repetitions
 
 
 def _counted(count: int, noun: str) -> str:
@@ -103,7 +103,7 @@ def _session(protocol: Protocol, language: str) -> list[tuple[str, str, str]]:
         else:
             block = protocol.blocks[step]
             title = protocol.text(block.title, language)
-            rows.append((f"{number:>2}", f"{block.phase} trials", f"{title}: {_counted(_trials(block), 'trial')}"))
+            rows.append((f"{number:>2}", f"{block.phase} trials", f"{title}: {_counted(block.trials, 'trial')}"))
     return rows
 
 
@@ -112,7 +112,8 @@ def _block(protocol: Protocol, block: Block, language: str) -> Iterable[str]:
     questionnaire = protocol.questionnaire_of(block.id)
     rows = [
         ("Trials", _presentation(block)),
-        ("Shown as", f"{protocol.text(block.setting_label, language)}{' 1, 2, …' if _trials(block) > 1 else ''}"),
+        *_beside_the_trials(protocol, block, language),
+        ("Shown as", f"{protocol.text(block.setting_label, language)}{' 1, 2, …' if block.trials > 1 else ''}"),
         ("Recorded as", ", ".join(block_codes(block))),
         ("Conditions", ", ".join(block.conditions)),
         ("Task", _task(protocol.tasks[block.task])),
@@ -122,14 +123,42 @@ def _block(protocol: Protocol, block: Block, language: str) -> Iterable[str]:
 
 
 def _presentation(block: Block) -> str:
-    words = _counted(_trials(block), "trial")
+    words = _counted(block.trials, "trial")
     if block.repetitions > 1:
         words += f", every condition {block.repetitions} times"
-    if len(block.conditions) == 1:
-        return words
-    if block.order == "shuffled":
-        return f"{words}, another order for each participant"
-    return f"{words}, in the order written: who reads the protocol can tell the codes"
+    return words if len(block.conditions) == 1 else f"{words}, {_order(block)}"
+
+
+def _order(block: Block) -> str:
+    match block.order:
+        case "fixed":
+            return "in the order written: who reads the protocol can tell the codes"
+        case "shuffled":
+            return "another order for each participant"
+        case "constrained":
+            return f"another order for each participant, {_constraint(block)}"
+        case "williams" | "latin" as square:
+            rows = row_count(square, len(block.conditions))
+            name = "a Williams design" if square == "williams" else "a Latin square"
+            return f"in {name} of {rows} rows"
+
+
+def _constraint(block: Block) -> str:
+    kept = []
+    if block.max_repeats is not None:
+        kept.append(f"at most {block.max_repeats} of a kind in a row")
+    if block.min_distance is not None:
+        kept.append(f"at least {block.min_distance} trials from one to the next of its kind")
+    return " and ".join(kept)
+
+
+def _beside_the_trials(protocol: Protocol, block: Block, language: str) -> Iterator[tuple[str, str]]:
+    """Yield how rows are dealt, and when there are breaks."""
+    if block.order in ("williams", "latin") and len(block.conditions) > 1:
+        yield "Rows", "dealt by the number in the participant's id: P007 is number 7, whatever the seed"
+    if block.break_page is not None:
+        title = protocol.text(protocol.pages[block.break_page].title, language)
+        yield "Breaks", f"{block.breaks}, after every {_counted(block.break_every or 0, 'trial')}: {title}"
 
 
 def _task(task: Task) -> str:

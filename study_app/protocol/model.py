@@ -1,7 +1,7 @@
 """A study as a frozen, validated value; field names are the keys of the TOML file.
 
-Each class is one table of the file (questionnaires and tasks have modules of their own). What a single table can decide
-by itself is checked by its class; what needs two tables is in ``references`` and ``checks``.
+Each class is one table of the file (blocks, tasks and questionnaires have modules of their own). What a single table
+can decide by itself is checked by its class; what needs two tables is in ``references`` and ``checks``.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from pydantic import BaseModel, BeforeValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from study_app.haptics.scene import Body, Ewma, Knee, Liquid, Scene
+from study_app.protocol.blocks import Block
 from study_app.protocol.questionnaires import Item, Questionnaire, Scale
 from study_app.protocol.table import Table
 from study_app.protocol.tasks import Explore, Reach, Task
@@ -115,49 +116,6 @@ class PageText(Table):
     title: Localised = Field(description="Heading of the page.")
     body: Localised = Field(description="The text; a blank line begins a paragraph.")
     button: Localised | None = Field(default=None, description="Words on the button; left out: Continue.")
-
-
-class Block(Table):
-    """Trials that share a task and a questionnaire.
-
-    A condition of a main block is shown under a code, L1 … Ln with ``code_prefix`` L; which condition a code stands for
-    is drawn by ``schedule.draw_key``. Practice and baseline are announced for what they are, and have one condition.
-    """
-
-    id: Id = Field(description="The name of the block's table.")
-    phase: Literal["main", "practice", "baseline"] = Field(default="main", description="Only main trials are analysed.")
-    part: int | None = Field(default=None, ge=1, le=20, description="Part of the study that the block belongs to.")
-    title: Localised = Field(description="Name of the block.")
-    setting_label: Localised = Field(description="Neutral name of its trials; a number follows: Liquid setting 1.")
-    code_prefix: str | None = Field(default=None, pattern=r"^[A-Z]$", description="Letter of the block's codes.")
-    conditions: tuple[Id, ...] = Field(min_length=1, description="What is presented.")
-    order: Literal["fixed", "shuffled"] = Field(default="fixed", description="As written, or anew per participant.")
-    repetitions: int = Field(default=1, ge=1, le=100, description="How often each condition comes.")
-    task: Id = Field(description="What the participant does.")
-    questionnaire: Id | None = Field(default=None, description="What is answered after each trial; left out: nothing.")
-
-    @model_validator(mode="after")
-    def _codes_where_blinded(self) -> Self:
-        if self.phase == "main":
-            if self.code_prefix is None:
-                raise PydanticCustomError(
-                    "codes", "a main block needs a code_prefix, a capital letter", {"place": "code_prefix"}
-                )
-            if self.part is None:
-                raise PydanticCustomError("part", "a main block needs a part: 1, 2, …", {"place": "part"})
-        elif self.code_prefix is not None:
-            raise PydanticCustomError(
-                "codes",
-                "a {phase} block is not blinded and has no code_prefix",
-                {"phase": self.phase, "place": "code_prefix"},
-            )
-        elif len(self.conditions) > 1:
-            raise PydanticCustomError(
-                "codes",
-                "a {phase} block has one condition, this one {count}: use one block for each",
-                {"phase": self.phase, "count": len(self.conditions), "place": "conditions"},
-            )
-        return self
 
 
 class Limits(Table):

@@ -19,6 +19,7 @@ REFERENCES = {
     "blocks.*.conditions.*": "conditions",
     "blocks.*.task": "tasks",
     "blocks.*.questionnaire": "questionnaires",
+    "blocks.*.break_page": "pages",
 }
 
 TEXTS = (
@@ -56,7 +57,7 @@ def references(document: Document) -> Iterator[Fault]:
 
 
 def sequence(document: Document) -> Iterator[Fault]:
-    """Check that the sequence names pages and blocks, each block once, and leaves none out."""
+    """Check that the sequence names pages and blocks, each block once, and leaves none out but pages of breaks."""
     pages, blocks = names(document, "pages"), names(document, "blocks")
     for name in pages:
         if name in blocks:
@@ -70,9 +71,10 @@ def sequence(document: Document) -> Iterator[Fault]:
         if name in blocks and name in seen:
             yield Fault(path, f'block "{name}" comes twice', "give the block repetitions")
         seen.add(str(name))
+    breaks = [page for _, page in entries(document, "blocks.*.break_page")]
     for section, tables in (("pages", pages), ("blocks", blocks)):
         for name in tables:
-            if name not in seen:
+            if name not in seen and not (section == "pages" and name in breaks):
                 yield Fault((section, name), "comes nowhere in sequence", "add it there, or take it out")
 
 

@@ -1,44 +1,44 @@
 """What comes when: protocol, participant and seed give the session's steps, the same on every machine.
 
-Every choice comes from a named stream, a ``random.Random`` seeded by SHA-256 of (seed, name), of which only
-``.random()`` is used (the one method Python promises never to change) under our own Fisher–Yates. One name, one
-purpose: a draw more in one stream moves no other.
-
 Orders are orders of codes; what a code stands for is drawn once per study by :func:`draw_key` and sealed. So a schedule
-gives nothing away.
+gives nothing away, and a receipt, which holds no conditions, is enough to make it again (see ``orders``).
+
+==============  ========================================================================================================
+order           the codes of a block
+==============  ========================================================================================================
+fixed           as written, again in each repetition
+shuffled        in a random order, another in each repetition; from stream "order/PARTICIPANT/BLOCK/REPETITION"
+constrained     all trials in one random order within max_repeats and min_distance (see ``constrained``); from stream
+                "order/PARTICIPANT/BLOCK"
+williams latin  a row of a square, dealt by the number in the participant's id, whatever the seed (see ``squares``)
+==============  ========================================================================================================
 """
 
 from __future__ import annotations
 
-import hashlib
-import random
-from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Literal, TypeAlias, TypeVar
+from typing import TypeAlias
 
-from study_app.protocol.model import Block, Protocol
+from study_app.protocol.blocks import Phase
+from study_app.protocol.constrained import Constraint, arrange
+from study_app.protocol.model import Protocol
+from study_app.protocol.orders import BlockOrder, Orders, block_codes, orders_of
+from study_app.protocol.squares import row, row_count, row_of
+from study_app.protocol.streams import Draw, shuffle, stream
 
-T = TypeVar("T")
+__all__ = [
+    "PageStep",
+    "Schedule",
+    "Trial",
+    "block_codes",
+    "build_schedule",
+    "codes_of",
+    "draw_key",
+    "shuffle",
+    "stream",
+]
 
 Key: TypeAlias = dict[str, dict[str, str]]
-
-
-def stream(seed: int, name: str) -> random.Random:
-    """Return the random stream of that name under that seed; use only its ``.random()``."""
-    digest = hashlib.sha256(f"{seed}\n{name}".encode()).digest()
-    return random.Random(int.from_bytes(digest, "big"))  # noqa: S311 - reproducible, not secret
-
-
-def shuffle(items: Iterable[T], draw: Callable[[], float]) -> tuple[T, ...]:
-    """Return ``items`` in random order (Fisher–Yates, Durstenfeld's form), with len(items) − 1 calls of ``draw``.
-
-    ``draw`` gives uniform numbers in [0, 1), as ``stream(…).random`` does.
-    """
-    order = list(items)
-    for last in range(len(order) - 1, 0, -1):
-        chosen = int(draw() * (last + 1))
-        order[last], order[chosen] = order[chosen], order[last]
-    return tuple(order)
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +58,7 @@ class Trial:
 
     number: int
     block: str
-    phase: Literal["main", "practice", "baseline"]
+    phase: Phase
     part: int | None
     index: int
     of: int
@@ -88,31 +88,41 @@ class Schedule:
         return tuple(step for step in self.steps if isinstance(step, Trial))
 
 
-def block_codes(block: Block) -> tuple[str, ...]:
-    """Return the codes of a block's conditions: L1, L2, … in a main block, the phase's name elsewhere."""
-    if block.code_prefix is None:
-        return (block.phase,)
-    return tuple(f"{block.code_prefix}{number}" for number in range(1, len(block.conditions) + 1))
-
-
-def build_schedule(protocol: Protocol, participant: str, seed: int) -> Schedule:
+def build_schedule(protocol: Protocol | Orders, participant: str, seed: int) -> Schedule:
     """Return the session of ``participant``: a pure function of its arguments."""
+    orders = orders_of(protocol) if isinstance(protocol, Protocol) else protocol
     steps: list[Step] = []
-    number = 0
-    for step in protocol.sequence:
-        if step in protocol.pages:
+    number = 1
+    for step in orders.steps:
+        if isinstance(step, str):
             steps.append(PageStep(step))
             continue
-        trials = _trials(protocol, protocol.blocks[step], participant, seed, first=number + 1)
-        number += len(trials)
-        steps.extend(trials)
+        for trial in _trials(orders.study, step, participant, seed, number):
+            steps.append(trial)
+            if step.break_page is not None and step.break_after(trial.index):
+                steps.append(PageStep(step.break_page))
+        number += step.trials
     return Schedule(participant, seed, tuple(steps))
 
 
-def _trials(protocol: Protocol, block: Block, participant: str, seed: int, first: int) -> list[Trial]:
-    codes = [
-        code for repetition in range(1, block.repetitions + 1) for code in _order(block, participant, seed, repetition)
-    ]
+def codes_of(study: str, block: BlockOrder, participant: str, seed: int) -> tuple[str, ...]:
+    """Return the codes of a block's trials, in the order in which ``participant`` meets them."""
+    codes, times = block.codes, block.repetitions
+    match block.order:
+        case "fixed":
+            return codes * times
+        case "shuffled":
+            streams = [stream(seed, f"order/{participant}/{block.id}/{number}") for number in range(1, times + 1)]
+            return tuple(code for drawn in streams for code in shuffle(codes, drawn.random))
+        case "constrained":
+            constraint = Constraint(block.max_repeats, block.min_distance)
+            return arrange(codes, times, constraint, stream(seed, f"order/{participant}/{block.id}").random)
+        case "williams" | "latin" as square:
+            taken = row_of(study, block.id, row_count(square, len(codes)), participant)
+            return tuple(codes[number] for number in row(square, len(codes), taken, times))
+
+
+def _trials(study: str, block: BlockOrder, participant: str, seed: int, first: int) -> list[Trial]:
     return [
         Trial(
             number=first + index - 1,
@@ -120,32 +130,21 @@ def _trials(protocol: Protocol, block: Block, participant: str, seed: int, first
             phase=block.phase,
             part=block.part,
             index=index,
-            of=len(codes),
+            of=block.trials,
             code=code,
-            items=_items(protocol, block, participant, seed, index),
+            items=_items(block, participant, seed, index),
         )
-        for index, code in enumerate(codes, start=1)
+        for index, code in enumerate(codes_of(study, block, participant, seed), start=1)
     ]
 
 
-def _order(block: Block, participant: str, seed: int, repetition: int) -> tuple[str, ...]:
-    codes = block_codes(block)
-    if block.order == "fixed":
-        return codes
-    return shuffle(codes, stream(seed, f"order/{participant}/{block.id}/{repetition}").random)
+def _items(block: BlockOrder, participant: str, seed: int, index: int) -> tuple[str, ...]:
+    if block.item_order == "fixed":
+        return block.items
+    return shuffle(block.items, stream(seed, f"items/{participant}/{block.id}/{index}").random)
 
 
-def _items(protocol: Protocol, block: Block, participant: str, seed: int, index: int) -> tuple[str, ...]:
-    questionnaire = protocol.questionnaire_of(block.id)
-    if questionnaire is None:
-        return ()
-    items = tuple(item.id for item in questionnaire.items)
-    if questionnaire.item_order == "fixed":
-        return items
-    return shuffle(items, stream(seed, f"items/{participant}/{block.id}/{index}").random)
-
-
-def draw_key(protocol: Protocol, draw: Callable[[], float]) -> Key:
+def draw_key(protocol: Protocol, draw: Draw) -> Key:
     """Return block → code → condition, drawn with ``draw`` (uniform numbers in [0, 1)).
 
     A block in fixed order keeps its order, as the protocol asks, so its codes name its conditions in the order written:

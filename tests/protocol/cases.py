@@ -118,6 +118,25 @@ task = "reach"
 questionnaire = "short"
 """
 
+ORDER = 'order = "shuffled"\nrepetitions = 2'
+
+EVERY_ORDER = (
+    SOUND.replace(ORDER, 'order = "constrained"\nmax_repeats = 1\nmin_distance = 2\nrepetitions = 3\nBREAKS')
+    .replace("BREAKS", 'break_every = 2\nbreak_page = "rest"')
+    .replace(
+        "[blocks.warm_up]",
+        """\
+[pages.rest]
+kind = "break"
+title = { en = "Rest", nl = "Rust" }
+body = { en = "Let go.", nl = "Laat los." }
+
+[blocks.warm_up]""",
+    )
+    .replace('scale = "agreement"', 'scale = "agreement"\nitem_order = "shuffled"')
+    .replace('order = "shuffled"\ntask = "reach"', 'order = "williams"\ntask = "reach"')
+)
+"""The sound protocol with constraints, breaks, dealt rows and items in random order."""
 
 MORE_ITEMS = """\
 [questionnaires.more]
@@ -222,7 +241,7 @@ CASES = (
     case("density", "density_kg_m3 = 1400", "density_kg_m3 = -1",
          ("density_kg_m3 = -1", "liquids.thick.density_kg_m3", "is -1, must be more than 0")),
     case("word not permitted", 'order = "shuffled"\nrepetitions', 'order = "shufled"\nrepetitions',
-         ("shufled", "blocks.feel.order", '"shufled" is not "fixed" or "shuffled" (did you mean "shuffled"?)')),
+         ("shufled", "blocks.feel.order", '"williams" or "latin" (did you mean "shuffled"?)')),
     case("unknown kind of task", 'kind = "explore"', 'kind = "wander"',
          ('kind = "wander"', "tasks.explore.kind", '"wander" is not one of "explore", "reach"')),
     case("task without kind", 'kind = "explore"\n', "", ("[tasks.explore]", "tasks.explore.kind", "is missing")),
@@ -274,6 +293,32 @@ CASES = (
          ('code_prefix = "P"', "blocks.warm_up.code_prefix", "a practice block is not blinded")),
     case("practice in two conditions", 'conditions = ["apart"]', 'conditions = ["apart", "both"]',
          ('"apart", "both"', "blocks.warm_up.conditions", "has one condition, this one 2")),
+    # orders and breaks
+    case("constraint nowhere", ORDER, 'order = "constrained"\nrepetitions = 2',
+         ('order = "constrained"', "blocks.feel.order", '"constrained" needs max_repeats, min_distance or both')),
+    case("nothing to constrain", ORDER, 'order = "constrained"\nmax_repeats = 1',
+         ("[blocks.feel]", "blocks.feel.repetitions", 'is 1: every condition comes once and none can come again')),
+    case("constraint of no order", ORDER, 'order = "constrained"\nmin_distance = 3\nrepetitions = 2',
+         ("min_distance = 3", "blocks.feel.min_distance", "is 3, but with 2 conditions only 1 to 2 is possible")),
+    case("constraint of one condition",
+         'conditions = ["apart"]', 'conditions = ["apart"]\norder = "constrained"\nmax_repeats = 2\nrepetitions = 5',
+         ("max_repeats = 2", "blocks.warm_up.max_repeats",
+          "is 2, but with one condition 5 times only 5 or more is possible")),
+    case("no such distance", ORDER, 'order = "constrained"\nmin_distance = 0\nrepetitions = 2',
+         ("min_distance = 0", "blocks.feel.min_distance", "is 0, must be at least 1")),
+    case("constraint of another order", ORDER, ORDER + "\nmax_repeats = 2",
+         ("max_repeats = 2", "blocks.feel.max_repeats", 'belongs to order = "constrained", this is "shuffled"')),
+    case("breaks without page", ORDER, ORDER + "\nbreak_every = 2",
+         ("[blocks.feel]", "blocks.feel.break_page", "is missing: break_every and break_page need each other")),
+    case("page without breaks", ORDER, ORDER + '\nbreak_page = "hello"',
+         ("[blocks.feel]", "blocks.feel.break_every", "is missing: break_every and break_page need each other")),
+    case("no break would come", ORDER, ORDER + '\nbreak_every = 4\nbreak_page = "hello"',
+         ("break_every = 4", "blocks.feel.break_every", "is 4, and the block has 4 trials: no break would come")),
+    case("unknown page of breaks", ORDER, ORDER + '\nbreak_every = 2\nbreak_page = "hallo"',
+         ("break_page", "blocks.feel.break_page", 'there is no page "hallo" (did you mean "hello"?)')),
+    case("break on another kind of page", ORDER, ORDER + '\nbreak_every = 2\nbreak_page = "hello"',
+         ("break_page", "blocks.feel.break_page",
+          'page "hello" is of kind "consent" (a break needs a page with kind = "break")')),
     # names
     case("unknown liquid", 'liquid = "thick"', 'liquid = "thik"',
          ("thik", "conditions.is_thick.liquid", 'no liquid "thik" (did you mean "thick"?)')),

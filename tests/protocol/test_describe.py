@@ -4,7 +4,7 @@ import pytest
 
 from study_app.protocol.describe import describe, expected_duration_s
 from study_app.protocol.load import load, parse
-from tests.protocol.cases import SOUND
+from tests.protocol.cases import ORDER, SOUND
 
 REK = load("rek2024")
 
@@ -54,6 +54,14 @@ def test_no_line_ends_in_blanks():
     assert all(line == line.rstrip() for line in describe(REK).splitlines())
 
 
+REST = """
+[pages.rest]
+kind = "break"
+title = { en = "Rest", nl = "Rust" }
+body = { en = "Let go.", nl = "Laat los." }
+"""
+
+
 def edited(*edits: tuple[str, str]):
     text = SOUND
     for old, new in edits:
@@ -84,6 +92,37 @@ def test_what_only_some_protocols_have():
     assert "(may be left out)" in told
     assert "both       thin + other  seen 120 ms late" in told
     assert told.count("in no condition") == 1
+
+
+@pytest.mark.parametrize(
+    ("new", "words"),
+    [
+        (
+            'order = "constrained"\nmax_repeats = 2\nmin_distance = 2\nrepetitions = 3',
+            "6 trials, every condition 3 times, another order for each participant, at most 2 of a kind in a row and "
+            "at least 2 trials from one to the next of its kind",
+        ),
+        ('order = "williams"', "2 trials, in a Williams design of 2 rows"),
+        ('order = "latin"', "2 trials, in a Latin square of 2 rows"),
+        (
+            'order = "latin"',
+            "Rows         dealt by the number in the participant's id: P007 is number 7, whatever the seed",
+        ),
+        (f'{ORDER}\nbreak_every = 1\nbreak_page = "rest"', "Breaks       3, after every 1 trial: Rest"),
+        (f'{ORDER}\nbreak_every = 2\nbreak_page = "rest"', "Breaks       1, after every 2 trials: Rest"),
+    ],
+)
+def test_orders_and_breaks_are_told(new: str, words: str):
+    edits = [(ORDER, new)]
+    if "rest" in new:
+        edits.append(("[blocks.warm_up]", REST + "[blocks.warm_up]"))
+    assert words in describe(edited(*edits))
+
+
+def test_breaks_take_their_time():
+    rest = ("[blocks.warm_up]", REST + "[blocks.warm_up]")
+    with_breaks = edited((ORDER, f'{ORDER}\nbreak_every = 1\nbreak_page = "rest"'), rest)
+    assert expected_duration_s(with_breaks) - expected_duration_s(edited()) == pytest.approx(3 * (5 + 2 / 3))
 
 
 def test_the_expected_duration_counts_every_trial():

@@ -7,10 +7,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from study_app.errors import Problem, ProtocolError
+from study_app.protocol import constrained
 from study_app.protocol.describe import describe
 from study_app.protocol.load import load, load_scene, parse, protocol_hash, shipped, source_bytes
 from study_app.protocol.schedule import build_schedule
-from tests.protocol.cases import BROKEN, CASES, SOUND, Case
+from tests.protocol.cases import BROKEN, CASES, EVERY_ORDER, ORDER, SOUND, Case
 
 
 def problems_of(text: str | bytes):
@@ -36,6 +37,20 @@ def test_every_problem_is_named_with_its_line(case: Case):
     for problem, expected in zip(found, case.expected, strict=True):
         assert expected.words in str(problem)
         assert problem.line == (None if expected.at is None else line_of(expected.at, text))
+
+
+def test_an_impossible_constraint_is_refused_without_looking_for_an_order(monkeypatch: pytest.MonkeyPatch):
+    """The largest block there can be is refused after no step of a search at all: what is possible is known."""
+
+    def search(*_: object) -> None:
+        raise AssertionError("it looked for an order")
+
+    monkeypatch.setattr(constrained, "propose", search)
+    monkeypatch.setattr(constrained, "arrange", search)
+    impossible = SOUND.replace(ORDER, 'order = "constrained"\nmin_distance = 1000\nrepetitions = 100')
+    (problem,) = problems_of(impossible)
+    assert (problem.place, problem.line) == ("blocks.feel.min_distance", line_of("min_distance", impossible))
+    assert problem.message == "is 1000, but with 2 conditions only 1 to 2 is possible"
 
 
 @pytest.mark.parametrize(("name", "text", "line", "words"), BROKEN, ids=[broken[0] for broken in BROKEN])
@@ -71,7 +86,7 @@ def test_a_name_is_looked_up_in_the_working_folder_first(tmp_path: Path, monkeyp
     ("name", "words"),
     [
         ("rek2042", 'did you mean "rek2024"?'),
-        ("elsewhere", "known: demo, rek2024"),
+        ("elsewhere", "known: demo, "),
         ("folder/rek2024.toml", "no such file"),
         ("rek2024.toml", "no such file"),
         (".", "is a folder"),
@@ -140,7 +155,7 @@ def test_an_unknown_liquid_is_named_with_the_nearest():
     assert 'did you mean "honey"?' in str(caught.value)
 
 
-LINES = SOUND.splitlines()
+LINES = EVERY_ORDER.splitlines()
 VALUES = ["3", "-1.5", "true", '""', '"thin"', "[]", "[1, [2]]", "{}", "{ en = 1 }", '["thin"]', "1979-05-27", "inf"]
 
 

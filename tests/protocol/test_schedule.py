@@ -1,12 +1,17 @@
 from __future__ import annotations
 
+import hashlib
 from collections import Counter
+from itertools import pairwise
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from study_app.protocol.constrained import Constraint
 from study_app.protocol.load import load, parse
+from study_app.protocol.model import Protocol
+from study_app.protocol.orders import orders_of
 from study_app.protocol.schedule import (
     PageStep,
     Schedule,
@@ -17,7 +22,7 @@ from study_app.protocol.schedule import (
     shuffle,
     stream,
 )
-from tests.protocol.cases import SOUND
+from tests.protocol.cases import ORDER, SOUND
 
 REK = load("rek2024")
 SMALL = parse(SOUND.encode(), "small.toml")
@@ -42,6 +47,30 @@ def test_the_order_is_the_same_on_every_machine(participant: str, seed: int, liq
     schedule = build_schedule(REK, participant, seed)
     assert codes(schedule, "liquids") == liquids.split()
     assert codes(schedule, "delays") == delays.split()
+
+
+@pytest.mark.parametrize(
+    ("protocol", "digest"),
+    [
+        (REK, "08b72e46b51b155f8cb86e772c184005ad2a337472d24aa2b19ddee27eb8a3e5"),
+        (load("demo"), "8d431528c58487158a5636ff2869637763a4e9b7920ef8303a105ecee7aeae4e"),
+        (
+            parse(
+                SOUND.replace('scale = "agreement"', 'scale = "agreement"\nitem_order = "shuffled"').encode(), "small"
+            ),
+            "1642d21b6cad98edcbdc8c14b36100cd67d3ba12f82c525c7f3d7740ce9e51f1",
+        ),
+    ],
+    ids=["rek2024", "demo", "small"],
+)
+def test_whole_schedules_stay_what_they_were(protocol: Protocol, digest: str):
+    """Sessions under way and receipts on disk rely on it: a change here needs another name of stream or order."""
+    steps = [
+        repr(build_schedule(protocol, f"P{number:03d}", seed).steps)
+        for number in range(1, 51)
+        for seed in (0, 1, 20240601, 2**64)
+    ]
+    assert hashlib.sha256("\n".join(steps).encode()).hexdigest() == digest
 
 
 def test_the_key_of_a_rehearsal_is_the_same_on_every_machine():
@@ -206,3 +235,98 @@ def test_trials_are_values():
     trial = build_schedule(REK, "P001", 1).trials[0]
     assert isinstance(trial, Trial)
     assert trial in {trial}
+
+
+def of_six(order: str, more: str = "") -> Protocol:
+    """The small protocol with six conditions, their blocks' order, and what else the block says."""
+    names = [f"c{number}" for number in range(6)]
+    tables = "".join(f'[conditions.{name}]\nliquid = "thin"\ndelay_ms = {ms}\n' for ms, name in enumerate(names))
+    listed = ", ".join(f'"{name}"' for name in names)
+    text = SOUND.replace('["is_thin", "is_thick"]', f"[{listed}]").replace(
+        "[tasks.explore]", f"{tables}[tasks.explore]"
+    )
+    return parse(text.replace(ORDER, f'order = "{order}"\n{more}').encode(), "six.toml")
+
+
+@pytest.mark.parametrize("order", ["williams", "latin"])
+@given(seed=seeds)
+def test_rows_do_not_depend_on_the_seed(order: str, seed: int):
+    protocol = of_six(order)
+    assert codes(build_schedule(protocol, "P007", seed), "feel") == codes(build_schedule(protocol, "P007", 1), "feel")
+
+
+def test_six_participants_meet_each_code_in_each_place_and_after_each_other():
+    protocol = of_six("williams")
+    shown = [codes(build_schedule(protocol, f"P{number:03d}", number), "feel") for number in range(7, 13)]
+    assert all(len(set(place)) == 6 for place in zip(*shown, strict=True))
+    assert len({pair for order in shown for pair in pairwise(order)}) == 6 * 5
+
+
+def test_dealt_orders_are_the_same_on_every_machine():
+    shown = [codes(build_schedule(of_six("williams"), f"P00{number}", 1), "feel") for number in (1, 2)]
+    assert [" ".join(order) for order in shown] == ["L4 L5 L3 L6 L2 L1", "L6 L1 L5 L2 L4 L3"]
+    assert " ".join(codes(build_schedule(of_six("latin"), "P001", 1), "feel")) == "L4 L5 L6 L1 L2 L3"
+
+
+@given(seeds, participants)
+def test_constrained_orders_keep_their_constraint_over_all_repetitions(seed: int, participant: str):
+    protocol = of_six("constrained", "repetitions = 3\nmin_distance = 4")
+    order = codes(build_schedule(protocol, participant, seed), "feel")
+    assert Counter(order) == dict.fromkeys(("L1", "L2", "L3", "L4", "L5", "L6"), 3)
+    assert Constraint(min_distance=4).holds(order)
+
+
+def test_constrained_orders_differ_between_participants_and_seeds():
+    protocol = of_six("constrained", "repetitions = 3\nmin_distance = 4")
+    orders = {tuple(codes(build_schedule(protocol, f"P{n}", seed), "feel")) for n in range(10) for seed in range(10)}
+    assert len(orders) == 100
+
+
+BREAKS = """
+[pages.pause]
+kind = "break"
+title = { en = "Rest", nl = "Rust" }
+body = { en = "Let go.", nl = "Laat los." }
+
+[blocks.warm_up]
+"""
+
+
+def with_breaks(every: int) -> Protocol:
+    text = SOUND.replace(ORDER, f'{ORDER}\nbreak_every = {every}\nbreak_page = "pause"')
+    return parse(text.replace("[blocks.warm_up]\n", BREAKS).encode(), "small.toml")
+
+
+@pytest.mark.parametrize(
+    ("every", "expected"),
+    [
+        (1, "1 pause 2 pause 3 pause 4"),
+        (2, "1 2 pause 3 4"),
+        (3, "1 2 3 pause 4"),
+    ],
+)
+def test_breaks_come_between_trials_and_not_after_the_last(every: int, expected: str):
+    protocol = with_breaks(every)
+    steps = build_schedule(protocol, "P001", 1).steps
+    in_block = [
+        step.page_id if isinstance(step, PageStep) else str(step.index)
+        for step in steps
+        if step == PageStep("pause") or (isinstance(step, Trial) and step.block == "feel")
+    ]
+    assert in_block == expected.split()
+    assert in_block.count("pause") == protocol.blocks["feel"].breaks
+    assert build_schedule(protocol, "P001", 1).trials == build_schedule(SMALL, "P001", 1).trials
+
+
+def test_a_page_of_breaks_can_stand_in_the_sequence_too():
+    text = SOUND.replace(ORDER, f'{ORDER}\nbreak_every = 2\nbreak_page = "pause"').replace(
+        '"feel", ', '"feel", "pause", '
+    )
+    protocol = parse(text.replace("[blocks.warm_up]\n", BREAKS).encode(), "small.toml")
+    assert build_schedule(protocol, "P001", 1).steps.count(PageStep("pause")) == 2
+
+
+@given(seeds, participants)
+def test_a_schedule_needs_no_more_than_its_orders(seed: int, participant: str):
+    for protocol in (REK, SMALL):
+        assert build_schedule(orders_of(protocol), participant, seed) == build_schedule(protocol, participant, seed)
