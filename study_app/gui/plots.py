@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
-from PySide6.QtCore import QPointF, Qt
+from PySide6.QtCore import QPointF, QSize, Qt
 from PySide6.QtGui import QColor, QPen
 from PySide6.QtWidgets import QFrame
 
@@ -79,6 +79,10 @@ class Plot(Themed, pg.GraphicsView):
             axis.setTickPen(NOTHING)
         self.axes["left"].setWidth(60)
         self.axes["bottom"].setHeight(28)
+
+    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+        """Return a small size: a plot takes what is left, and never makes a window scroll."""
+        return QSize(320, 150)
 
     def show_ticks(self, side: str, ticks: list[tuple[float, str]]) -> None:
         """Write ``ticks`` (place, text) at an axis; those of y also get a grid line."""

@@ -6,7 +6,7 @@ from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
-from study_app.gui.cards import Icon
+from study_app.gui.cards import SHADOW, Icon
 from study_app.gui.labels import label
 from study_app.gui.theme import RADIUS_CARD
 from study_app.gui.themed import Themed
@@ -46,4 +46,5 @@ class Banner(Themed, QWidget):
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(QColor(self.theme.bad_bg))
-        painter.drawRoundedRect(QRectF(self.rect()), RADIUS_CARD, RADIUS_CARD)
+        strip = QRectF(self.rect()).adjusted(SHADOW, 0, -SHADOW, 0)
+        painter.drawRoundedRect(strip, RADIUS_CARD, RADIUS_CARD)

@@ -95,7 +95,9 @@ class OperatorView:
 
     @property
     def share(self) -> float:
-        """Share of the expected time that has passed, 0 to 1."""
+        """Share of the expected time that has passed, 0 to 1; a complete session is whole however long it took."""
+        if self.over and self.state_word == "Complete":
+            return 1.0
         return min(1.0, self.elapsed_s / self.expected_s) if self.expected_s > 0 else 0.0
 
 

@@ -123,6 +123,7 @@ def test_a_complete_session_has_every_step_done(told):
     told.welcome()
     told.tell("session_ended", 4.0, status="completed", reason="")
     assert {row.state for row in told.view().steps} == {"done"}
+    assert told.view().share == 1.0
 
 
 def test_counts_are_of_what_is_on_disk(told):

@@ -224,6 +224,8 @@ def test_trouble_stands_above_everything_and_leaves_the_end(running, told, healt
     running.show_view(told.view(health, trouble="the device 'mouse' stopped answering"))
     assert running.banner.isVisible()
     assert "stopped answering" in running.banner.what.text()
+    QApplication.processEvents()
+    assert running._middle_area.verticalScrollBar().maximum() == 0
     assert running.buttons.end.isEnabled()
 
 
