@@ -6,10 +6,12 @@ buoyancy and weight, which only lend energy, and Δp the step of the hand in the
 
 The account E begins at 0 with a scene and holds at most what the liquid can return::
 
-    E ← min(E - f·Δp, reserve),    reserve = (4/27) c |v_wake|³ N T / scale
+    E ← min(E - f·Δp, reserve),    reserve = (4/27) c |v_wake|³ N T / scale + m |v - v_current|² / (2 scale)
 
-(a wake of speed u gives a body of speed v the power c (u - v)² v, at most that at v = u/3, and it lasts for N ticks of
-T). A filter that lags, a loop that is late, a force held for too long all show as E < 0. From -1 mJ on the debt D =
+A wake of speed u gives a body of speed v the power c (u - v)² v, at most that at v = u/3, and it lasts for N ticks of
+T. m is the added mass and, with a history, its inertia in a sway of 1 Hz, 3πR² √(2µρ/ω) (Landau & Lifshitz, §24).
+
+A filter that lags, a loop that is late, a force held for too long all show as E < 0. From -1 mJ on the debt D =
 -1 mJ - E is paid back: what pushes along the last step is taken from the force, and damping is added until the next
 step, if it is like the last, pays D, but no stronger than the loop bears. And the whole force is kept within
 
@@ -21,14 +23,25 @@ so that E ≥ -1 mJ - F R on any path of the hand: even the worst next step leav
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from study_app.haptics.compiled import kernel, part
-from study_app.haptics.layout import EFFECT_WAKE, LIMITER_ENERGY, Record
+from study_app.haptics.effects.drag import resistance
+from study_app.haptics.effects.records import LAW_CONSTANT
+from study_app.haptics.layout import (
+    EFFECT_ADDED_MASS,
+    EFFECT_HISTORY,
+    EFFECT_LOCAL_WAKE,
+    EFFECT_WAKE,
+    LIMITER_ENERGY,
+    Record,
+)
 from study_app.haptics.vector import clear, distance, norm
 
 ALLOWANCE_J = 1e-3
 FORGIVEN_W = 1e-3
+HISTORY_PERIOD_S = 1.0
 
 
 @kernel
@@ -75,14 +88,32 @@ def observe(model: Any, safety: Record, interval_s: float) -> None:
 def reserve(model: Any) -> float:
     """Return the most that the liquids can still give back [J at the hand]."""
     parameters = model.parameters[0]
-    wake_mps = norm(model.state[0].wake_mps)
     most_j = 0.0
     for i in range(parameters.liquids):
         liquid, local = model.liquids[i], model.liquid_states[i]
-        if liquid.effects & EFFECT_WAKE and local.share > 0.0:
-            power_w = 4.0 / 27.0 * liquid.drag.factor_kg_m * wake_mps * wake_mps * wake_mps
-            most_j += power_w * liquid.wake.length * parameters.period_s / parameters.scale
-    return most_j
+        if local.share > 0.0:
+            speed_mps = norm(local.motion_mps)
+            if liquid.effects & EFFECT_WAKE:
+                most_j += _wake_power(liquid, local) * liquid.wake.length * parameters.period_s
+            if liquid.effects & EFFECT_LOCAL_WAKE:
+                most_j += _wake_power(liquid, local) * liquid.local_wake.length * parameters.period_s
+            if liquid.effects & EFFECT_ADDED_MASS:
+                most_j += 0.5 * liquid.added_mass.mass_kg * local.share * speed_mps * speed_mps
+            if liquid.effects & EFFECT_HISTORY:
+                inertia_kg = 0.5 * liquid.history.factor_kg_rs * local.share * math.sqrt(HISTORY_PERIOD_S)
+                most_j += 0.5 * inertia_kg * speed_mps * speed_mps
+    return float(most_j / parameters.scale)
+
+
+@part
+def _wake_power(liquid: Record, local: Record) -> float:
+    """Return the greatest power [W, scene] that the wake gives to a body: max over v of R(u - v) (u - v) v.
+
+    For a constant coefficient that is (4/27) c u³; R of the other laws grows less, so R(u) u²/4 bounds it.
+    """
+    wake_mps = norm(local.wake_mps)
+    share = 4.0 / 27.0 if liquid.drag.law == LAW_CONSTANT else 0.25
+    return float(share * resistance(liquid.drag, wake_mps) * wake_mps * wake_mps)
 
 
 @part

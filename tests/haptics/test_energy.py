@@ -3,14 +3,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from study_app.haptics import paths
+from study_app.haptics import laws, paths
 from study_app.haptics.layout import LIMITER_ENERGY
 from study_app.haptics.motion import Motion
 from study_app.haptics.offline import simulate
 from study_app.haptics.safety import begin_scene
+from study_app.haptics.scene import Body
 from tests.haptics.scenes import COMPILED, HONEY, THESIS, WATER, Hand, examples, liquid, scene
 
 STRONG = scene(liquid(10_000), scale=30)
+RHO_V = 1400 * 4 / 3 * np.pi * 0.034**3
+STOKES_LAYER_KG = 3 * np.pi * 0.034**2 * np.sqrt(2 * 10.0 * 1400 / (2 * np.pi))
 SCENES = {**THESIS, "strong": STRONG}
 
 
@@ -51,6 +54,51 @@ def test_what_a_wake_can_return_is_four_27ths_of_c_u_cubed_over_its_length():
     reserve_j = 4 / 27 * 0.5 * 1000 * 0.47 * np.pi * 0.034**2 * u**3 * 1.7 / 10
     assert reserve_j > 0.1
     assert account(hand).balance_j == pytest.approx(reserve_j, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("effects", "inertia_kg"),
+    [
+        (("added_mass",), 0.5 * RHO_V),
+        (("history",), STOKES_LAYER_KG),
+        (("added_mass", "history"), 0.5 * RHO_V + STOKES_LAYER_KG),
+    ],
+)
+def test_what_moving_liquid_can_return_is_its_kinetic_energy(effects, inertia_kg):
+    hand = Hand(scene(liquid(1400, viscosity_pa_s=10.0, effects=("drag", *effects)), scale=3))
+    hand.sweep(0.3, 300)
+    account(hand).balance_j = 10.0
+    v = hand.turn((0.09, 0.0, 0.0)).velocity_mps[0]
+    assert account(hand).balance_j == pytest.approx(0.5 * inertia_kg * v**2 / 3, rel=1e-9)
+
+
+def test_a_wake_of_a_viscous_liquid_returns_a_quarter_of_its_resistance():
+    viscous = liquid(1400, viscosity_pa_s=10.0, wake={"length": 500, "scaling": 600}, drag={"law": "brown-lawler"})
+    hand = Hand(scene(viscous, scale=3))
+    hand.sweep(0.1, 300)
+    account(hand).balance_j = 10.0
+    u = np.linalg.norm(hand.turn((0.03, 0.0, 0.0)).wake_mps)
+    resistance_nspm = 3 * np.pi * 10 * 0.068 * laws.brown_lawler(1400 * u * 0.068 / 10)
+    assert account(hand).balance_j == pytest.approx(0.25 * resistance_nspm * u**2 * 0.5 / 3, rel=1e-9)
+
+
+def test_buoyancy_only_lends():
+    ball = Body(density_kg_m3=300.0)
+    hand = Hand(scene(liquid(1000, effects=("buoyancy",)), body=ball))
+    for k in range(1, 500):
+        sample = hand.turn((0.0, 1e-4 * k, 0.0))
+    assert sample.device_force_n[1] > 1.0
+    assert account(hand).balance_j == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_hand_that_drifts_with_a_current_does_no_work():
+    river = liquid(1000, effects=("drag", "current"), current={"kind": "uniform", "velocity_mps": (1.0, 0.0, 0.0)})
+    hand = Hand(scene(river, scale=10))
+    held = [hand.turn((0.0, 0.0, 0.0)) for _ in range(100)]
+    assert held[-1].device_force_n[0] > 0.5
+    hand.sweep(0.1, 300)
+    assert not any(hand.turn((0.03 + 2e-5 * k, 0.0, 0.0)).limiters & LIMITER_ENERGY for k in range(500))
+    assert account(hand).balance_j <= 0.0
 
 
 def test_without_a_wake_nothing_is_kept_for_later():

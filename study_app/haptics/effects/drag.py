@@ -21,14 +21,18 @@ def resist(liquid: Record, local: Record, state: Record) -> None:
     Re = ρ|w|D/µ (``laws``): there as a multiple of Stokes' −3πµD w, finite at rest, where C_d is not.
     """
     w = local.relative_mps
-    speed_mps = norm(w)
-    if liquid.drag.law == LAW_CONSTANT:
-        resistance_nspm = liquid.drag.factor_kg_m * speed_mps
-    else:
-        resistance_nspm = liquid.drag.stokes_nspm * _over_stokes(liquid.drag.law, liquid.drag.reynolds_spm * speed_mps)
+    resistance_nspm = resistance(liquid.drag, norm(w))
     for axis in range(3):
         local.drag.force_n[axis] = -resistance_nspm * w[axis] * local.frontal
         state.force_n[axis] += local.drag.force_n[axis]
+
+
+@part
+def resistance(drag: Record, speed_mps: float) -> float:
+    """Return |F|/|w| [N·s/m] of the whole ball at a relative speed."""
+    if drag.law == LAW_CONSTANT:
+        return float(drag.factor_kg_m * speed_mps)
+    return float(drag.stokes_nspm * _over_stokes(drag.law, drag.reynolds_spm * speed_mps))
 
 
 @part
