@@ -20,62 +20,56 @@ REFERENCE: Law = "haider-levenspiel"
 def bounds(scene: Scene, liquid: Liquid) -> Mapping[Effect, float]:
     """Return the bound [N] of every effect that the liquid has parameters for.
 
-    With V and R of the ball, u and s of the current (its greatest speed and shear), in a liquid without a wake:
+    With V and R of the ball, v and a the greatest speed and acceleration:
 
-    - ``drag``: F(v_max), by the reference law where the liquid has a viscosity;
-    - ``current``, ``wake``, ``local_wake``: F(v_max + u) − F(v_max), u the most the liquid can move; the laws are
-      convex, so this is more than what a following liquid takes away;
+    - ``drag``: F(v), by the reference law where the liquid has a viscosity;
+    - ``wake``, ``local_wake``: F(v + u) − F(v), u the most that the liquid can follow; the laws are convex, so this is
+      more than what a following liquid takes away;
+    - ``current``: the same with its greatest speed u, and what added mass and history make of its shear s: to the ball
+      that moves through it the liquid changes its velocity by up to u, at up to s v;
     - ``buoyancy``: g |ρ V_sub − ρ_body V|, at the worse end of the depth range;
-    - ``added_mass``: C_a ρ V a with a = a_max + s v_max;
-    - ``history``: 12 R² √(2π ρ µ a w), the Basset integral for a body that was carried along at −w and then turned to
-      w at a, w = v_max (+ u where u is not the same everywhere): no motion in the box makes it greater;
+    - ``added_mass``: C_a ρ V (a + s v);
+    - ``history``: H(a, v) + H(s v, u) with H(a, v) = 12 R² √(2π ρ µ a v), the Basset integral for a body that was
+      carried along at −v and then turned to v at a: no motion in the box makes it greater;
     - ``surface``: all of the others where the centre can cross the surface, for without it the ball is in or out.
     """
     motion = scene.motion_in(liquid)
     depth_m = motion.depth_m or (math.inf, math.inf)
+    speed_mps = lowered_mps(motion.speed_mps or 0.0, scene.knee)
+    acceleration_mps2 = motion.acceleration_mps2 or 0.0
     radius_m = scene.body.diameter_m / 2
-    touches = 1.0 if depth_m[1] > -radius_m else 0.0
-    speed_mps, acceleration_mps2 = _relative(scene, liquid)
-    own_mps = lowered_mps(motion.speed_mps or 0.0, scene.knee)
     volume_m3 = 4 / 3 * math.pi * radius_m**3
     lift_n = liquid.density_kg_m3 * volume_m3 * GRAVITY_MPS2
     weight_n = scene.body.density_kg_m3 * volume_m3 * GRAVITY_MPS2
+    mass_kg = liquid.added_mass.coefficient * liquid.density_kg_m3 * volume_m3
+    per_root = 12 * radius_m**2 * math.sqrt(2 * math.pi * liquid.density_kg_m3 * (liquid.viscosity_pa_s or 0.0))
 
     def more_by(flow_mps: float) -> float:
-        more_n = resistance_n(scene, liquid, own_mps + flow_mps) - resistance_n(scene, liquid, own_mps)
-        return touches * more_n
+        return resistance_n(scene, liquid, speed_mps + flow_mps) - resistance_n(scene, liquid, speed_mps)
 
-    found: dict[Effect, float] = {"drag": touches * resistance_n(scene, liquid, own_mps)}
+    found: dict[Effect, float] = {"drag": resistance_n(scene, liquid, speed_mps)}
     if liquid.wake is not None:
-        found["wake"] = more_by(own_mps * fullest(liquid.wake))
+        found["wake"] = more_by(speed_mps * fullest(liquid.wake))
     if liquid.local_wake is not None:
-        found["local_wake"] = more_by(own_mps * fullest(liquid.local_wake))
+        found["local_wake"] = more_by(speed_mps * fullest(liquid.local_wake))
+    found["added_mass"] = mass_kg * acceleration_mps2
+    found["history"] = per_root * math.sqrt(acceleration_mps2 * speed_mps)
     if liquid.current is not None:
-        found["current"] = more_by(fastest_mps(liquid.current))
+        flow_mps, change_mps2 = fastest_mps(liquid.current), shear_per_s(liquid.current) * speed_mps
+        sheared_n = {"added_mass": mass_kg * change_mps2, "history": per_root * math.sqrt(change_mps2 * flow_mps)}
+        found["current"] = more_by(flow_mps) + sum(sheared_n.values())
+        found["added_mass"] += sheared_n["added_mass"]
+        found["history"] += sheared_n["history"]
+    if liquid.viscosity_pa_s is None:
+        del found["history"]
+    if depth_m[1] <= -radius_m:
+        found = dict.fromkeys(found, 0.0)
     found["buoyancy"] = max(abs(lift_n * submerged(depth, radius_m) - weight_n) for depth in depth_m)
-    mass_kg = liquid.added_mass.coefficient * liquid.density_kg_m3 * volume_m3
-    found["added_mass"] = touches * mass_kg * acceleration_mps2
-    if liquid.viscosity_pa_s is not None:
-        product = liquid.density_kg_m3 * liquid.viscosity_pa_s * acceleration_mps2 * speed_mps
-        found["history"] = touches * 12 * radius_m**2 * math.sqrt(2 * math.pi * product)
     if motion.depth_m is not None:
         frontal, volume = _in_doubt(motion.depth_m, radius_m)
-        drag_n = found["drag"] + found.get("current", 0.0)
-        found["surface"] = frontal * drag_n + volume * (found["added_mass"] + found.get("history", 0.0) + lift_n)
+        carried_n = found["added_mass"] + found.get("history", 0.0) + lift_n
+        found["surface"] = frontal * (found["drag"] + found.get("current", 0.0)) + volume * carried_n
     return found
-
-
-def _relative(scene: Scene, liquid: Liquid) -> tuple[float, float]:
-    """Return the greatest speed [m/s] and acceleration [m/s²] that the liquid sees the body turn by."""
-    motion, current = scene.motion_in(liquid), liquid.current
-    speed_mps = lowered_mps(motion.speed_mps or 0.0, scene.knee)
-    shear_per_s = 0.0
-    if isinstance(current, Channel):
-        shear_per_s = 4 * abs(current.peak_mps) / current.width_m
-    elif isinstance(current, Vortex):
-        shear_per_s = 2 * abs(current.peak_mps) / current.core_m
-    carried_mps = 0.0 if current is None or shear_per_s == 0.0 else fastest_mps(current)
-    return speed_mps + carried_mps, (motion.acceleration_mps2 or 0.0) + shear_per_s * speed_mps
 
 
 def _in_doubt(depth_m: tuple[float, float], radius_m: float) -> tuple[float, float]:
@@ -116,6 +110,13 @@ def fastest_mps(current: Current) -> float:
     if isinstance(current, Channel | Vortex):
         return abs(current.peak_mps)
     raise TypeError(f"no bound is known for a current of kind {current!r}")
+
+
+def shear_per_s(current: Current) -> float:
+    """Return how much a current changes over a way, at most [m/s per m]."""
+    if isinstance(current, Channel):
+        return 4 * abs(current.peak_mps) / current.width_m
+    return 2 * abs(current.peak_mps) / current.core_m if isinstance(current, Vortex) else 0.0
 
 
 def lowered_mps(speed_mps: float, knee: Knee) -> float:

@@ -177,7 +177,7 @@ def _table(verdicts: tuple[Verdict, ...], cost_ns: Mapping[tuple[str, Effect], f
         row = [verdict.effect, _newtons(verdict.bound_n), f"{verdict.share:.1%}"]
         if cost_ns is not None:
             cost = cost_ns.get((verdict.liquid, verdict.effect))
-            row.append("–" if cost is None else f"{cost:.0f}")
+            row.append("–" if cost is None else f"{max(cost, 0.0):.0f}")
         rows.append([*row, "in" if verdict.included else "out", verdict.why])
     widths = [max(len(cell) for cell in column) for column in zip(*rows, strict=True)]
     numbers = range(1, len(widths) - 2)
