@@ -7,7 +7,7 @@ from typing import Any
 
 from study_app.haptics.compiled import part
 from study_app.haptics.layout import LIMITER_GLITCH, LIMITER_STALE, STATUS_OK, STATUS_STALE_FAULT, Record
-from study_app.haptics.vector import copy, distance
+from study_app.haptics.vector import copy, square_distance
 
 SHORTEST_S = 0.2e-3
 LONGEST_S = 20e-3
@@ -75,7 +75,8 @@ def _plausible(parameters: Record, state: Record, sample: Record, interval_s: fl
     x_m, y_m, z_m = _in_scene(parameters, sample.position_m)
     if not (math.isfinite(x_m) and math.isfinite(y_m) and math.isfinite(z_m)):
         return False
-    return state.tracking == 0 or distance(sample.position_m, state.hand_m) <= FASTEST_HAND_MPS * interval_s
+    farthest_m = FASTEST_HAND_MPS * interval_s
+    return state.tracking == 0 or square_distance(sample.position_m, state.hand_m) <= farthest_m * farthest_m
 
 
 @part

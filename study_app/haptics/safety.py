@@ -24,7 +24,7 @@ from study_app.haptics.layout import (
     Record,
     records,
 )
-from study_app.haptics.vector import clear, copy, distance, is_finite, norm
+from study_app.haptics.vector import clear, copy, distance, is_finite, norm, square, square_distance
 
 START_FADE_S = 0.5
 SCENE_FADE_S = 0.05
@@ -92,11 +92,10 @@ def _limit_slope(model: Any, sample: Record) -> None:
     for i in range(parameters.liquids):
         local = model.liquid_states[i]
         if model.liquids[i].effects & EFFECT_DRAG and local.share > 0.0:
-            drag_n = norm(local.drag.force_n)
-            most_n = parameters.slope_limit_nspm * norm(local.relative_mps) * local.share / shares
-            if drag_n > most_n:
+            most_nspm = parameters.slope_limit_nspm * local.share / shares
+            if square(local.drag.force_n) > most_nspm * most_nspm * square(local.relative_mps):
                 sample.limiters |= LIMITER_SLOPE
-                excess = 1.0 - most_n / drag_n
+                excess = 1.0 - most_nspm * norm(local.relative_mps) / norm(local.drag.force_n)
                 for axis in range(3):
                     sample.device_force_n[axis] -= excess * local.drag.force_n[axis]
 
@@ -104,10 +103,9 @@ def _limit_slope(model: Any, sample: Record) -> None:
 @part
 def _limit_norm(force_n: Any, lift_n: Any, limit_n: float, sample: Record) -> None:
     """Shorten the force to the limit, keeping its direction."""
-    size_n = norm(force_n)
-    if size_n > limit_n:
+    if square(force_n) > limit_n * limit_n:
         sample.limiters |= LIMITER_NORM
-        _scale(force_n, lift_n, limit_n / size_n)
+        _scale(force_n, lift_n, limit_n / norm(force_n))
 
 
 @part
@@ -135,10 +133,10 @@ def _fade(force_n: Any, lift_n: Any, safety: Record, sample: Record) -> None:
 @part
 def _limit_slew(force_n: Any, account: Record, safety: Record, sample: Record) -> None:
     """Let the force move by at most 0.5 N from the one sent before."""
-    step_n = distance(force_n, safety.sent_n)
-    if step_n > SLEW_N:
+    if square_distance(force_n, safety.sent_n) > SLEW_N * SLEW_N:
         sample.limiters |= LIMITER_SLEW
-        share, lift_n, before_n = SLEW_N / step_n, account.lift_n, account.lift_before_n
+        share = SLEW_N / distance(force_n, safety.sent_n)
+        lift_n, before_n = account.lift_n, account.lift_before_n
         for axis in range(3):
             force_n[axis] = safety.sent_n[axis] + (force_n[axis] - safety.sent_n[axis]) * share
             lift_n[axis] = before_n[axis] + (lift_n[axis] - before_n[axis]) * share

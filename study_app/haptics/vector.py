@@ -39,10 +39,23 @@ def norm(vector: Any) -> float:
 
 
 @part
+def square(vector: Any) -> float:
+    """Return its length squared: enough to compare lengths, and no root."""
+    return float(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2])
+
+
+@part
 def distance(a: Any, b: Any) -> float:
     """Return the length of a − b."""
     x, y, z = a[0] - b[0], a[1] - b[1], a[2] - b[2]
     return math.sqrt(x * x + y * y + z * z)
+
+
+@part
+def square_distance(a: Any, b: Any) -> float:
+    """Return the length of a − b, squared."""
+    x, y, z = a[0] - b[0], a[1] - b[1], a[2] - b[2]
+    return float(x * x + y * y + z * z)
 
 
 @part

@@ -16,7 +16,7 @@ from study_app.haptics.layout import (
     KNEE_SQUARE,
     Record,
 )
-from study_app.haptics.vector import clear, copy, norm
+from study_app.haptics.vector import clear, copy, norm, square
 
 TIE = 1e-9
 
@@ -51,9 +51,9 @@ def _ewma(parameters: Record, state: Record, interval_s: float) -> None:
 
     α(Δt) = 1 − (1 − α)^(Δt/1 ms) makes it the same filter at any rate.
     """
-    weight = -math.expm1(parameters.log_keep_per_s * interval_s)
+    weight, per_s = -math.expm1(parameters.log_keep_per_s * interval_s), 1.0 / interval_s
     for axis in range(3):
-        difference_mps = (state.position_m[axis] - state.previous_m[axis]) / interval_s
+        difference_mps = (state.position_m[axis] - state.previous_m[axis]) * per_s
         state.estimate_mps[axis] += weight * (difference_mps - state.estimate_mps[axis])
 
 
@@ -157,10 +157,10 @@ def _knee(parameters: Record, state: Record) -> None:
     ``sqrt`` has unit slope at the threshold: s' = s0 + √(1 + 2(s − s0)) − 1 with s, s0 in m/s. ``square`` is the
     literal "squaring the part above" of Rek 2024, which raises any excess over 1 m/s.
     """
-    speed_mps = norm(state.estimate_mps)
-    excess_mps = speed_mps - parameters.knee_threshold_mps
     share = 1.0
-    if excess_mps > 0.0:
+    if square(state.estimate_mps) > parameters.knee_threshold_mps * parameters.knee_threshold_mps:
+        speed_mps = norm(state.estimate_mps)
+        excess_mps = speed_mps - parameters.knee_threshold_mps
         if parameters.knee_law == KNEE_SQRT:
             share = (parameters.knee_threshold_mps + math.sqrt(1.0 + 2.0 * excess_mps) - 1.0) / speed_mps
         elif parameters.knee_law == KNEE_SQUARE:
