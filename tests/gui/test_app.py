@@ -24,7 +24,7 @@ from study_app.protocol.load import source_bytes
 from study_app.session.pages import EndPage, QuestionnairePage, TextPage
 
 # The platform without a screen cannot limit or raise windows, and says so.
-pytestmark = [pytest.mark.qt_log_ignore("This plugin does not support"), pytest.mark.usefixtures("qapp")]
+pytestmark = pytest.mark.usefixtures("qapp")
 
 
 @pytest.fixture

@@ -26,7 +26,6 @@ from study_app.session.events import Continue, ForceStopped, Submitted
 from study_app.session.pages import EndPage, PausePage, TaskPage, TextPage, TroublePage
 
 # The platform without a screen cannot limit or raise windows, and says so.
-pytestmark = pytest.mark.qt_log_ignore("This plugin does not support")
 
 
 class World:

@@ -11,7 +11,6 @@ from study_app.gui.home.facts import study_facts
 from study_app.gui.new_session import MAX_SEED, NewSessionDialog, draw_seed
 
 # The platform without a screen cannot limit or raise windows, and says so.
-pytestmark = pytest.mark.qt_log_ignore("This plugin does not support")
 
 
 @pytest.fixture

@@ -15,7 +15,6 @@ from study_app.protocol.load import load, source_bytes
 from study_app.store.session import begin
 
 # The platform without a screen cannot limit or raise windows, and says so.
-pytestmark = pytest.mark.qt_log_ignore("This plugin does not support")
 
 
 @pytest.fixture

@@ -16,7 +16,6 @@ from study_app.gui.operator.stop import HOLD_MS, LEAST_HEIGHT, LEAST_WIDTH
 from study_app.gui.theme import DARK, LIGHT
 
 # The platform without a screen cannot limit or raise windows, and says so.
-pytestmark = pytest.mark.qt_log_ignore("This plugin does not support")
 
 
 @pytest.fixture

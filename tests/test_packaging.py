@@ -1,0 +1,64 @@
+"""What is shipped: the wheel works far from the checkout, the README's commands are the ones the check runs."""
+
+import os
+import subprocess
+import sys
+from importlib.metadata import requires
+from pathlib import Path
+
+import pytest
+from packaging.requirements import Requirement
+from packaging.specifiers import SpecifierSet
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the package as its wheel holds it."""
+    folder = tmp_path_factory.mktemp("wheel")
+    pip = [sys.executable, "-m", "pip", "--quiet", "--disable-pip-version-check"]
+    build = [*pip, "wheel", str(ROOT), "--no-deps", "--no-build-isolation", "--wheel-dir", str(folder)]
+    subprocess.run(build, check=True)
+    (wheel,) = folder.glob("*.whl")
+    subprocess.run([*pip, "install", "--no-deps", "--target", str(folder / "site"), str(wheel)], check=True)
+    return folder / "site"
+
+
+def test_the_wheel_contains_the_protocols_and_the_typeface(installed: Path) -> None:
+    package = installed / "study_app"
+    shipped = {path.name for path in (package / "protocols").glob("*.toml")}
+    assert shipped == {path.name for path in (ROOT / "protocols").glob("*.toml")}
+    assert list((package / "gui" / "assets" / "fonts").glob("Inter-*"))
+    assert (package / "py.typed").is_file()
+
+
+def test_check_works_far_from_the_checkout(installed: Path, tmp_path: Path) -> None:
+    environment = os.environ | {"PYTHONPATH": str(installed), "PYTHONSAFEPATH": "1"}
+    program = "import study_app, sys; print(study_app.__file__); from study_app.cli import main; main()"
+    words = [sys.executable, "-c", program, "check", "rek2024"]
+    finished = subprocess.run(words, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+    assert finished.returncode == 0, finished.stderr
+    assert Path(finished.stdout.splitlines()[0]).is_relative_to(installed)
+    assert "62 per participant" in finished.stdout
+
+
+def test_the_check_installs_and_tests_as_the_readme_says() -> None:
+    readme, check = (ROOT / "README.md").read_text("utf-8"), (ROOT / ".ci" / "run").read_text("utf-8")
+    (line,) = [line for line in readme.splitlines() if line.endswith("-m pytest")]
+    for command in line.split(" && "):
+        assert command.replace("pip install", "pip install --quiet") in check or command in check
+
+
+def test_qt_stays_where_repainting_does_not_leak() -> None:
+    (qt,) = [Requirement(entry) for entry in requires("liquid-study") or [] if entry.lower().startswith("pyside6")]
+    assert qt.specifier == SpecifierSet(">=6.8.3,<6.10")
+
+
+def test_every_picture_of_the_readme_is_there() -> None:
+    readme = (ROOT / "README.md").read_text("utf-8")
+    pictures = [part.split(")")[0] for part in readme.split("](")[1:] if part.startswith(".readme/")]
+    assert pictures
+    for picture in pictures:
+        assert (ROOT / picture).is_file(), picture
+    assert {path.name for path in (ROOT / ".readme").iterdir()} == {Path(picture).name for picture in pictures}
