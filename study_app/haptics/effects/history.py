@@ -51,11 +51,11 @@ def remember(
     _append(history, tracks, local.relative_mps, intervals, interval_s)
     clear(tracks.force_n)
     oldest_s = _integrate(history, tracks, intervals)
-    _hand_on(history, tracks, intervals, exponentials, oldest_s)
     for i in range(EXPONENTIALS):
         exponential = exponentials[history.tail_row + i]
         for axis in range(3):
-            tracks.force_n[axis] += exponential.sum[axis]
+            tracks.force_n[axis] += exponential.memory[axis]
+    _hand_on(history, tracks, intervals, exponentials, oldest_s)
     for axis in range(3):
         tracks.force_n[axis] *= -history.factor_kg_rs * local.share
         state.force_n[axis] += tracks.force_n[axis]
@@ -69,7 +69,7 @@ def _begin(history: Record, tracks: Record, w: Any, exponentials: Any) -> None:
     tracks.held = 0
     copy(w, tracks.smoothed_mps)
     for i in range(EXPONENTIALS):
-        clear(exponentials[history.tail_row + i].sum)
+        clear(exponentials[history.tail_row + i].memory)
 
 
 @part
@@ -79,8 +79,8 @@ def _fade(history: Record, exponentials: Any, interval_s: float) -> None:
         exponential = exponentials[history.tail_row + i]
         keep = math.exp(-0.5 * interval_s / (TIMES[i] * history.window_s))
         for axis in range(3):
-            kept = keep * exponential.sum[axis]
-            exponential.sum[axis] = kept if abs(kept) > NOTHING else 0.0
+            kept = keep * exponential.memory[axis]
+            exponential.memory[axis] = kept if abs(kept) > NOTHING else 0.0
 
 
 @part
@@ -125,7 +125,7 @@ def _hand_on(history: Record, tracks: Record, intervals: Any, exponentials: Any,
             weight = 2.0 * WEIGHTS[i] * math.sqrt(math.e * time_s) * share
             exponential = exponentials[history.tail_row + i]
             for axis in range(3):
-                exponential.sum[axis] += weight * interval.acceleration_mps2[axis]
+                exponential.memory[axis] += weight * interval.acceleration_mps2[axis]
         oldest_s = ended_s
         tracks.first = _wrapped(tracks.first + 1, history.rows)
         tracks.held -= 1

@@ -210,4 +210,4 @@ INTERVAL = np.dtype(
     align=True,
 )
 
-EXPONENTIAL = np.dtype([("sum", np.float64, (3,))], align=True)  # of the kernel's tail, times dw/dt [m/s / √s]
+EXPONENTIAL = np.dtype([("memory", np.float64, (3,))], align=True)  # of the kernel's tail, times dw/dt [m/s / √s]
