@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 
+from study_app.haptics.gate import resolve
+from study_app.protocol import feeling
 from study_app.protocol.model import Block, Explore, Protocol, Questionnaire
 from study_app.protocol.schedule import block_codes
 from study_app.protocol.squares import row_count
@@ -25,9 +27,11 @@ def describe(protocol: Protocol) -> str:
         _titled("Session", _session(protocol, language)),
         *(_block(protocol, block, language) for block in protocol.blocks_in_order),
         _titled("Liquids", _liquids(protocol)),
+        ("Effects in each liquid", *(f"  {line}".rstrip() for line in feeling.effects(protocol))),
         _titled("Conditions", _conditions(protocol)),
         *(_statements(protocol, name, language) for name in protocol.questionnaires),
         _titled("A trial is valid up to", _limits(protocol)),
+        *_warned(protocol),
     )
     return "\n\n".join("\n".join(section) for section in sections)
 
@@ -81,6 +85,7 @@ def _titled(title: str, rows: Sequence[Sequence[str]]) -> Iterable[str]:
 def _head(protocol: Protocol, language: str) -> Iterable[str]:
     study, device, scene = protocol.study, protocol.device, protocol.scene
     sizes = " × ".join(f"{size:g}" for size in device.workspace_mm)
+    ball_mm = scene.body.diameter_m * 1000
     rows = [
         ("Languages", ", ".join(study.languages)),
         ("Parts", f"{protocol.parts}"),
@@ -89,7 +94,7 @@ def _head(protocol: Protocol, language: str) -> Iterable[str]:
         ("Force limit", f"{device.force_limit_n:g} N"),
         ("Servo", f"{device.rate_hz:g} Hz"),
         ("Tank", f"{sizes} mm of the hand, drawn and felt {scene.scale:g} times as large"),
-        ("Ball", f"{scene.body.diameter_m * 1000:g} mm, {scene.body.diameter_m * 1000 / scene.scale:g} mm of the hand"),
+        ("Ball", f"{ball_mm:g} mm, {ball_mm / scene.scale:.3g} mm of the hand"),
     ]
     return (f"{protocol.text(study.title, language)} ({study.name}, version {study.version})", *_aligned(rows))
 
@@ -180,10 +185,13 @@ def _liquids(protocol: Protocol) -> list[tuple[str, ...]]:
     rows: list[tuple[str, ...]] = [("", "density", "effects", "wake N", "S", "y", "")]
     used = {liquid for condition in protocol.conditions.values() for liquid in condition.liquid_ids}
     for name, liquid in protocol.liquids.items():
-        wake = liquid.wake if "wake" in liquid.effects else None
+        effects = resolve(protocol.scene_of(name)).liquids[0].effects
+        wake = liquid.wake if "wake" in effects else None
         numbers = ("–", "–", "–") if wake is None else (f"{wake.length}", f"{wake.scaling:g}", f"{wake.exponent:g}")
         unused = "" if name in used else "in no condition"
-        rows.append((name, f"{liquid.density_kg_m3:g} kg/m³", ", ".join(liquid.effects), *numbers, unused))
+        viscosity = "" if liquid.viscosity_pa_s is None else f", {liquid.viscosity_pa_s:g} Pa·s"
+        density = f"{liquid.density_kg_m3:g} kg/m³{viscosity}"
+        rows.append((name, density, ", ".join(effects) or "none", *numbers, unused))
     return rows
 
 
@@ -207,6 +215,12 @@ def _statements(protocol: Protocol, name: str, language: str) -> Iterable[str]:
         f"Statements of {name}, from 1 ({labels[0]}) to {len(labels)} ({labels[-1]}){off_scale}",
         *_aligned(rows),
     )
+
+
+def _warned(protocol: Protocol) -> Iterator[Iterable[str]]:
+    """Yield what to think over, if there is anything."""
+    if told := feeling.warnings(protocol):
+        yield "Warnings", *(f"  {warning}" for warning in told)
 
 
 def _limits(protocol: Protocol) -> list[tuple[str, str]]:

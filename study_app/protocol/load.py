@@ -19,7 +19,7 @@ from study_app.protocol.places import Places
 from study_app.protocol.problems import Fault, did_you_mean, faults_of
 from study_app.protocol.table import Table
 
-__all__ = ["load", "load_scene", "parse", "protocol_hash", "shipped", "source_bytes"]
+__all__ = ["load", "load_scene", "load_scenes", "parse", "protocol_hash", "shipped", "source_bytes"]
 
 M = TypeVar("M", bound=BaseModel)
 
@@ -74,22 +74,31 @@ def load_scene(name_or_path: str | Path, liquid_id: str) -> Scene:
     ProtocolError
         Every problem of the file, or a liquid that is not in it.
     """
+    scenes = load_scenes(name_or_path)
+    if liquid_id not in scenes:
+        fault = Fault(("liquids",), f'there is no liquid "{liquid_id}"', did_you_mean(liquid_id, scenes))
+        name = str(name_or_path)
+        _raise(name, [fault], _document(source_bytes(name_or_path), name)[1])
+    return scenes[liquid_id]
+
+
+def load_scenes(name_or_path: str | Path) -> dict[str, Scene]:
+    """Return a scene of each liquid of a protocol or scene file by its name, those of no condition too.
+
+    Raises
+    ------
+    ProtocolError
+        Every problem of the file.
+    """
     name = str(name_or_path)
     source = source_bytes(name_or_path)
     document, places = _document(source, name)
-    if not document.keys() & (Protocol.model_fields.keys() - SceneFile.model_fields.keys()):
-        _raise(name, _faults(SceneFile, document), places)
-        file = SceneFile.model_validate(document, strict=True)
-        table, liquids = file.scene, file.liquids
-    else:
+    if document.keys() & (Protocol.model_fields.keys() - SceneFile.model_fields.keys()):
         protocol = parse(source, name)
-        device = protocol.device
-        table = SceneTable(**dict(protocol.scene), rate_hz=device.rate_hz, force_limit_n=device.force_limit_n)
-        liquids = protocol.liquids
-    if liquid_id not in liquids:
-        fault = Fault(("liquids",), f'there is no liquid "{liquid_id}"', did_you_mean(liquid_id, liquids))
-        _raise(name, [fault], places)
-    return Scene(**dict(table), liquids=(liquids[liquid_id],))
+        return {liquid: protocol.scene_of(liquid) for liquid in protocol.liquids}
+    _raise(name, _faults(SceneFile, document), places)
+    file = SceneFile.model_validate(document, strict=True)
+    return {name: Scene(**dict(file.scene), liquids=(liquid,)) for name, liquid in file.liquids.items()}
 
 
 def _document(source: bytes, name: str) -> tuple[dict[str, Any], Places]:

@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal, Self, TypeAlias, TypeVar
 from pydantic import BaseModel, BeforeValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from study_app.haptics.scene import Body, Ewma, Knee, Liquid, Scene
+from study_app.haptics.scene import Accuracy, Body, Estimator, Ewma, Knee, Liquid, MotionBox, Scene
 from study_app.protocol.blocks import Block
 from study_app.protocol.questionnaires import Item, Questionnaire, Scale
 from study_app.protocol.table import Table
@@ -86,8 +86,10 @@ class SceneDefaults(Table):
         default=(0, 0, 0), description="Scene point under the hand's zero [m]."
     )
     body: Body = Field(default_factory=Body, description="The ball that is felt.")
-    velocity: Ewma = Field(default_factory=Ewma, description="How velocity is estimated from positions.")
+    velocity: Estimator = Field(default_factory=Ewma, description="How velocity is estimated from positions.")
     knee: Knee = Field(default_factory=Knee, description="How high speeds are lowered.")
+    motion: MotionBox = Field(default_factory=MotionBox, description="How the ball is expected to move, scene.")
+    accuracy: Accuracy = Field(default_factory=Accuracy, description='What effects = "auto" may leave out.')
 
 
 class Condition(Table):
@@ -190,14 +192,14 @@ class Protocol(Table):
 
     def scene_for(self, condition_id: str) -> Scene:
         """Return what is felt in a condition."""
+        return self.scene_of(*self.conditions[condition_id].liquid_ids)
+
+    def scene_of(self, *liquid_ids: str) -> Scene:
+        """Return a scene of some of the liquids, those of no condition too."""
         return Scene(
-            scale=self.scene.scale,
-            origin_m=self.scene.origin_m,
+            **dict(self.scene),
             rate_hz=self.device.rate_hz,
-            body=self.scene.body,
-            liquids=tuple(self.liquids[name] for name in self.conditions[condition_id].liquid_ids),
-            velocity=self.scene.velocity,
-            knee=self.scene.knee,
+            liquids=tuple(self.liquids[name] for name in liquid_ids),
             force_limit_n=self.device.force_limit_n,
         )
 

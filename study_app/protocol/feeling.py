@@ -1,0 +1,62 @@
+"""What a study's liquids will feel like, before anyone feels them: effects in and out, and what to think over."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import combinations
+
+from study_app.haptics.gate import describe_gate
+from study_app.haptics.steady import HAND_MPS, Steady, steady
+from study_app.protocol.model import Protocol
+
+TELLING = 0.39
+"""Twice the difference of viscosity that people just tell, 19 % (Jones, Hunter & Lafontaine 1997): what two liquids
+need to be told apart reliably; the thesis' water and honey differ by 40 %."""
+
+
+def effects(protocol: Protocol) -> tuple[str, ...]:
+    """Return which effects act in each liquid, and why, as lines of text."""
+    lines: list[str] = []
+    for name in protocol.liquids:
+        lines += [*describe_gate(protocol.scene_of(name)), ""]
+    return tuple(lines[:-1])
+
+
+def warnings(protocol: Protocol) -> tuple[str, ...]:
+    """Return what is permitted and may still be a mistake, a sentence each."""
+    felt = {name: steady(protocol.scene_of(name)) for name in protocol.liquids}
+    return (*_alike(protocol, felt), *_clipped(felt))
+
+
+def _alike(protocol: Protocol, felt: dict[str, Steady]) -> Iterator[str]:
+    """Yield the pairs of liquids of a block that are hard to tell apart."""
+    seen: set[frozenset[str]] = set()
+    for block in protocol.main_blocks:
+        names = dict.fromkeys(name for it in block.conditions for name in protocol.conditions[it].liquid_ids)
+        for one, other in combinations(names, 2):
+            pair = frozenset((one, other))
+            if _differ(felt[one].force_n, felt[other].force_n) or pair in seen:
+                continue
+            seen.add(pair)
+            yield (
+                f"{one} and {other} of block {block.id} are hard to tell apart: {felt[one].force_n:.2f} and "
+                f"{felt[other].force_n:.2f} N at {HAND_MPS:g} m/s of the hand, less than {TELLING:.0%} of the smaller "
+                "between them"
+            )
+
+
+def _differ(one_n: float, other_n: float) -> bool:
+    """Return whether two forces differ by at least 39 % of the smaller."""
+    smaller_n, greater_n = sorted((one_n, other_n))
+    return greater_n > 0 and greater_n - smaller_n >= TELLING * smaller_n
+
+
+def _clipped(felt: dict[str, Steady]) -> Iterator[str]:
+    """Yield the liquids whose drag the safety limits shorten."""
+    for name, it in felt.items():
+        if it.limit is not None:
+            limit = "the force limit" if it.limit == "norm" else "the slope limit, which keeps the servo stable,"
+            yield (
+                f"{name} is clipped: at {HAND_MPS:g} m/s of the hand {limit} lets {it.force_n:.2f} of its "
+                f"{it.drag_n:.2f} N through"
+            )
