@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import secrets
 import shutil
 import sys
@@ -11,6 +12,8 @@ from pathlib import Path
 from typing import BinaryIO
 
 from study_app.errors import StoreError
+
+_TEMPORARY = re.compile(r"\.[^.].*\.[0-9a-f]{8}\.tmp")  # not those of hidden files: markers come and go
 
 
 def write_file(path: Path, content: bytes) -> None:
@@ -24,16 +27,16 @@ def write_file(path: Path, content: bytes) -> None:
     StoreError
         The file cannot be written; names the file and the system's reason.
     """
-    beside = _beside(path)
+    half = beside(path)
     try:
-        _write_through(beside, content)
-        beside.replace(path)
+        _write_through(half, content)
+        half.replace(path)
         sync_folder(path.parent)
     except OSError as error:
         raise cannot_write(path, error) from error
     finally:
         with contextlib.suppress(OSError):
-            beside.unlink(missing_ok=True)
+            half.unlink(missing_ok=True)
 
 
 def create_folder(path: Path, files: dict[str, bytes]) -> bool:
@@ -47,20 +50,20 @@ def create_folder(path: Path, files: dict[str, bytes]) -> bool:
     StoreError
         The folder is neither there nor can be created.
     """
-    beside = _beside(path)
+    half = beside(path)
     try:
-        beside.mkdir()
+        half.mkdir()
         for name, content in files.items():
-            _write_through(beside / name, content)
-        sync_folder(beside)
-        beside.rename(path)
+            _write_through(half / name, content)
+        sync_folder(half)
+        half.rename(path)
         sync_folder(path.parent)
     except OSError as error:
         if any((path / name).exists() for name in files):
             return False
         raise cannot_write(path, error) from error
     finally:
-        shutil.rmtree(beside, ignore_errors=True)
+        shutil.rmtree(half, ignore_errors=True)
     return True
 
 
@@ -93,6 +96,60 @@ def write_whole(file: BinaryIO, content: bytes) -> None:
     rest = memoryview(content)
     while rest:
         rest = rest[file.write(rest) :]
+
+
+def beside(path: Path) -> Path:
+    """Return a new name in the folder of ``path`` for what is to become ``path`` in one step."""
+    return path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
+
+
+def temporaries(folder: Path) -> tuple[Path, ...]:
+    """Return what is half-written in ``folder`` itself, by a program that writes now or one that was killed."""
+    return tuple(sorted(path for path in folder.glob(".*.tmp") if _TEMPORARY.fullmatch(path.name)))
+
+
+def sweep(folder: Path) -> tuple[Path, ...]:
+    """Take away what a killed program left half-written in ``folder`` itself; return what it was.
+
+    Only for a folder that no other program writes into now.
+
+    Raises
+    ------
+    StoreError
+        Something cannot be taken away.
+    """
+    found = temporaries(folder)
+    for path in found:
+        try:
+            if path.is_dir():
+                shutil.rmtree(path)
+            else:
+                path.unlink(missing_ok=True)
+        except OSError as error:
+            raise cannot_write(path, error) from error
+    return found
+
+
+def probe(folder: Path) -> int:
+    """Return how many bytes are free in ``folder`` (or the nearest one above it that exists), having written there.
+
+    A small file is written through to the disk and taken away again; nothing else is touched.
+
+    Raises
+    ------
+    StoreError
+        Nothing can be written there.
+    """
+    place = next(path for path in (folder, *folder.absolute().parents) if is_there(path))
+    path = beside(place / "probe")
+    try:
+        _write_through(path, b"probe\n")
+        return shutil.disk_usage(place).free
+    except OSError as error:
+        raise cannot_write(folder, error) from error
+    finally:
+        with contextlib.suppress(OSError):
+            path.unlink(missing_ok=True)
 
 
 def sync_folder(path: Path) -> None:
@@ -139,10 +196,6 @@ def cannot_read(path: Path, error: OSError) -> StoreError:
 def cause(error: OSError) -> str:
     """Return the system's own word for ``error``, without the path (which the message names once)."""
     return error.strerror or type(error).__name__
-
-
-def _beside(path: Path) -> Path:
-    return path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
 
 
 def _ends_whole(file: BinaryIO, size: int) -> bool:

@@ -6,7 +6,7 @@ name mean the same in every table.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal, TypeAlias
 
 from study_app.haptics.layout import LIMITER_NAMES
@@ -178,6 +178,20 @@ TRIALS: tuple[Column, ...] = (
         "true where the trial kept the protocol's limits of lateness, gaps and delay error.",
         may_miss=True,
     ),
+    Column(
+        "recording",
+        "text",
+        "File of the trial's samples, in the session's folder; n/a where none was kept.",
+        may_miss=True,
+    ),
+    Column(
+        "recording_frames",
+        "text",
+        "File of the frames shown, in the session's folder; n/a where none was kept.",
+        may_miss=True,
+    ),
+    _count("samples_recorded", "Samples in the recording."),
+    _count("samples_unrecorded", "Samples that the recording lacks, since the disk did not keep up."),
     Column("marked", "flag", "true where the operator marked the trial."),
     Column(
         "notes",
@@ -198,7 +212,7 @@ PARTICIPANTS: tuple[Column, ...] = (
         "text",
         "How the session ended.",
         levels=(
-            ("complete", "it went to its last page"),
+            ("completed", "it went to its last page"),
             ("withdrawn", "the participant stopped"),
             ("aborted", "the operator stopped it"),
             ("broken", "the operator stopped it after device, servo or program had failed"),
@@ -208,6 +222,7 @@ PARTICIPANTS: tuple[Column, ...] = (
     ),
     Column("session_started_at", "time", "When the session began."),
     Column("session_ended_at", "time", "When the session ended.", may_miss=True),
+    Column("resumed", "integer", "How often it was taken up again after its program had ended.", minimum=0),
     Column("device", "text", "The haptic device.", may_miss=True),
     Column("language", "text", "Language of the participant's pages."),
     Column("trials", "integer", "Main trials that ran to their end.", minimum=0),
@@ -219,6 +234,15 @@ PARTICIPANTS: tuple[Column, ...] = (
         levels=(("valid", "all did"), ("invalid", "at least one did not")),
         may_miss=True,
     ),
+)
+
+EXCLUSIONS: tuple[Column, ...] = (
+    _PARTICIPANT,
+    _SESSION,
+    replace(_TRIAL, description="Number of the trial; n/a where the whole session is left out.", may_miss=True),
+    Column("rule_or_person", "text", "The rule, or the initials of the person, that leaves it out."),
+    Column("reason", "text", "Why it is left out of the analysis."),
+    Column("excluded_at", "time", "When that was decided."),
 )
 
 TABLES: dict[str, tuple[Column, ...]] = {
@@ -245,7 +269,7 @@ def variable(column: Column) -> dict[str, Any]:
         "@type": "PropertyValue",
         "name": column.name,
         "description": f"{column.description} Levels: {meanings}." if meanings else column.description,
-        "valuePattern": _pattern(column),
+        "valuePattern": cell_pattern(column),
     }
     if column.unit:
         described["unitText"] = column.unit
@@ -265,7 +289,7 @@ _PATTERNS: dict[Kind, str] = {
 }
 
 
-def _pattern(column: Column) -> str:
+def cell_pattern(column: Column) -> str:
     """Return the regular expression of a whole cell."""
     value = "|".join(level for level, _ in column.levels) if column.levels else _PATTERNS[column.kind]
     return f"({value}|{MISSING})" if column.may_miss else f"({value})"

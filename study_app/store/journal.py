@@ -21,7 +21,7 @@ from types import TracebackType
 from typing import Any, BinaryIO, TypeAlias
 
 from study_app.errors import StoreError
-from study_app.store.atomic import cannot_read, cannot_write, sync_folder, write_whole
+from study_app.store.atomic import cannot_read, cannot_write, sync_folder, write_file, write_whole
 
 Line: TypeAlias = dict[str, Any]
 
@@ -36,13 +36,23 @@ class SessionClock:
     now_ns : callable
         The monotonic clock [ns]: the servo's own, so that recordings and journal share an axis.
     origin_at : datetime, optional
-        Wall time at the origin, with its zone; now by default.
+        Wall time at the origin, with its zone; by default so that the present moment is now.
+    shown_s : float
+        What the clock shows at present: more than 0 in a session that goes on [s].
     """
 
-    def __init__(self, now_ns: Callable[[], int] = time.monotonic_ns, origin_at: datetime | None = None) -> None:
+    def __init__(
+        self,
+        now_ns: Callable[[], int] = time.monotonic_ns,
+        origin_at: datetime | None = None,
+        *,
+        shown_s: float = 0.0,
+    ) -> None:
         self._now_ns = now_ns
-        self.origin_ns = now_ns()
-        self.origin_at = origin_at if origin_at is not None else datetime.now().astimezone()
+        self.origin_ns = now_ns() - round(shown_s * 1e9)
+        if origin_at is None:
+            origin_at = datetime.now().astimezone() - timedelta(seconds=shown_s)
+        self.origin_at = origin_at
 
     def seconds(self) -> float:
         """Return the seconds since the origin."""
@@ -81,6 +91,30 @@ class Journal:
         except OSError as error:
             raise cannot_write(path, error) from error
         return cls(path, file, clock if clock is not None else SessionClock())
+
+    @classmethod
+    def reopen(cls, path: Path, contents: Contents, clock: SessionClock) -> Journal:
+        """Open the file to go on after the last whole line of ``contents``, which `scan` has just read.
+
+        A torn tail is cut off by writing the whole lines anew, in one step.
+
+        Raises
+        ------
+        StoreError
+            It cannot be read or written, or has changed since.
+        """
+        try:
+            if contents.torn_bytes:
+                write_file(path, path.read_bytes()[: contents.whole_bytes])
+            file = path.open("r+b", buffering=0)
+            if file.seek(0, os.SEEK_END) != contents.whole_bytes:
+                file.close()
+                raise StoreError(f"{path} has changed while it was opened: is another program writing it?")
+        except OSError as error:
+            raise cannot_write(path, error) from error
+        journal = cls(path, file, clock)
+        journal._lines, journal._size = len(contents.lines), contents.whole_bytes
+        return journal
 
     def append(self, event: str, *, t_s: float | None = None, **fields: Any) -> Line:
         """Write one line and wait for the disk; return the line as a reader will see it.
@@ -121,6 +155,11 @@ class Journal:
         self._size += len(content)
         self._lines += 1
         return line
+
+    @property
+    def closed(self) -> bool:
+        """Whether it takes no more lines."""
+        return self._file.closed
 
     def close(self) -> None:
         """Close the file; every line is on the disk already."""
@@ -163,10 +202,21 @@ def read(path: Path) -> list[Line]:
     StoreError
         It cannot be read, or is damaged elsewhere than at its end.
     """
+    return whole(path).lines
+
+
+def whole(path: Path) -> Contents:
+    """Read the journal to its last whole line; what follows it is a torn tail and nothing worse.
+
+    Raises
+    ------
+    StoreError
+        It cannot be read, or is damaged elsewhere than at its end.
+    """
     contents = scan(path)
     if contents.damage is not None:
         raise StoreError(contents.damage)
-    return contents.lines
+    return contents
 
 
 def scan(path: Path) -> Contents:

@@ -3,15 +3,15 @@
 ::
 
     results/<study>/
-      dataset_description.json  exclusions.csv
+      dataset_description.json  exclusions.csv  .psychds-ignore
       blinding/key.sealed  blinding/reveals.jsonl
       data/
         study-<study>_description-participants_data.csv
         sub-P007/ses-01/
-          journal.jsonl  receipt.json
+          journal.jsonl  receipt.json  checksums.sha256
           subject-P007_session-01_task-<study>_description-responses_data.csv
           subject-P007_session-01_task-<study>_description-trials_data.csv
-          recordings/
+          recordings/trial-003.parquet  recordings/trial-003_frames.parquet  recordings/trial-003_attempt-2.parquet ...
 
 Names follow Psych-DS: key-value pairs whose values are letters and digits only.
 """
@@ -53,6 +53,11 @@ class SessionFolder:
         return self.path / "receipt.json"
 
     @property
+    def checksums(self) -> Path:
+        """SHA-256 of every file, when the session had ended."""
+        return self.path / "checksums.sha256"
+
+    @property
     def recordings(self) -> Path:
         """Samples and frames of the trials."""
         return self.path / "recordings"
@@ -74,6 +79,11 @@ class StudyFolder:
     def description(self) -> Path:
         """The Psych-DS description of every column."""
         return self.path / "dataset_description.json"
+
+    @property
+    def ignore(self) -> Path:
+        """What a validator of Psych-DS need not look at."""
+        return self.path / ".psychds-ignore"
 
     @property
     def exclusions(self) -> Path:
@@ -120,6 +130,23 @@ class StudyFolder:
     def ids(self) -> tuple[str, ...]:
         """Return the participant ids that were used, sorted."""
         return tuple(sorted({session.participant for session in self.sessions()}))
+
+
+def locate(path: Path) -> tuple[StudyFolder, SessionFolder]:
+    """Return the study and the session whose folder ``path`` is.
+
+    Raises
+    ------
+    StoreError
+        It is no session's folder.
+    """
+    folder = path.resolve()
+    number = _SESSION_FOLDER.fullmatch(folder.name)
+    participant = folder.parent.name.removeprefix("sub-")
+    named = number is not None and folder.parent.name.startswith("sub-") and _ID.fullmatch(participant)
+    if not named or folder.parent.parent.name != "data" or not folder.is_dir():
+        raise StoreError(f"{path} is no session's folder: name one such as results/rek2024/data/sub-P007/ses-01")
+    return StudyFolder(folder.parents[2]), SessionFolder(folder, participant, int(number[1]) if number else 0)
 
 
 def study_folder(results: Path, study: str, *, pilot: bool = False) -> StudyFolder:

@@ -5,20 +5,23 @@ from __future__ import annotations
 from study_app.store import journal, tables
 from study_app.store.atomic import is_there, write_file
 from study_app.store.columns import PARTICIPANTS
-from study_app.store.layout import StudyFolder
+from study_app.store.layout import SessionFolder, StudyFolder
 
 
 def participants(folder: StudyFolder) -> list[tables.Row]:
     """Return one row per session that has begun its journal, by participant and number."""
-    rows: list[tables.Row] = []
-    for session in folder.sessions():
-        if not is_there(session.journal):
-            continue  # claimed, and not begun
-        contents = journal.scan(session.journal)
-        if contents.lines:
-            damaged = {} if contents.damage is None else {"status": "damaged"}
-            rows.append(tables.participant(contents.lines) | damaged)
-    return rows
+    return [row for session in folder.sessions() for row in row_of(session)]
+
+
+def row_of(session: SessionFolder) -> list[tables.Row]:
+    """Return the row of one session; none if it has not begun its journal."""
+    if not is_there(session.journal):
+        return []
+    contents = journal.scan(session.journal)
+    if not contents.lines:
+        return []
+    damaged = {} if contents.damage is None else {"status": "damaged"}
+    return [tables.participant(contents.lines) | damaged]
 
 
 def write_participants(folder: StudyFolder, study: str) -> None:
@@ -32,9 +35,12 @@ def write_participants(folder: StudyFolder, study: str) -> None:
     StoreError
         The table cannot be written, or a journal cannot be read.
     """
+    path = folder.participants(study)
     content = tables.csv_bytes(PARTICIPANTS, participants(folder))
+    if path.is_file() and path.read_bytes() == content:
+        return
     while True:
-        write_file(folder.participants(study), content)
+        write_file(path, content)
         again = tables.csv_bytes(PARTICIPANTS, participants(folder))
         if again == content:
             return

@@ -2,7 +2,8 @@
 
 The receipt holds the protocol without its liquids, its conditions and the blocks' lists of conditions (which are sealed
 in the key), the SHA-256 of the whole protocol file and of the sealed key, the seed and what it seeds, versions, device,
-screens and the clock's origin. It is written before the first trial and once more, with the status, at the end.
+screens and the clock's origin. It is written before the first trial, when the session is resumed, and once more, with
+the status, at the end.
 """
 
 from __future__ import annotations
@@ -27,7 +28,38 @@ GENERATOR = (
 )
 UNFINISHED = "unfinished"
 
-_LIBRARIES = ("numpy", "numba", "pydantic", "PySide6-Essentials", "pyqtgraph")
+_LIBRARIES = ("numpy", "numba", "pydantic", "PySide6-Essentials", "pyqtgraph", "pyarrow")
+
+# What every receipt holds; the first of these lines are the journal's too, word for word.
+FACTS = (
+    "participant",
+    "session",
+    "study",
+    "seed",
+    "language",
+    "operator",
+    "simulated",
+    "pilot",
+    "recordings",
+    "key_hash",
+    "protocol_hash",
+    "version",
+)
+FIELDS = (
+    "format",
+    "status",
+    "reason",
+    "started_at",
+    "ended_at",
+    "resumed",
+    *FACTS,
+    "generator",
+    "versions",
+    "device",
+    "screens",
+    "clock",
+    "protocol",
+)
 
 
 def without_conditions(protocol: Protocol) -> dict[str, Any]:

@@ -18,7 +18,8 @@ Row: TypeAlias = dict[str, Any]
 
 _SESSION_COLUMNS = ("study", "participant", "session", "simulated", "pilot")
 _TRIAL_COLUMNS = ("trial", "attempt", "block", "phase", "part", "index", "code")
-_DERIVED = ("trial_started_at", "trial_started_s", "outcome", "valid", "marked", "notes")
+_RECORDED = ("recording", "recording_frames", "samples_recorded", "samples_unrecorded")
+_DERIVED = ("trial_started_at", "trial_started_s", "outcome", "valid", *_RECORDED, "marked", "notes")
 _MEASURED = tuple(name for name in header(TRIALS) if name not in (*_SESSION_COLUMNS, *_TRIAL_COLUMNS, "of", *_DERIVED))
 
 # What is judged in a trial's row by which limit of the protocol.
@@ -57,8 +58,11 @@ def trials(lines: Sequence[Line]) -> list[Row]:
                 row = _row_of(rows, line)
                 row |= {name: line.get(name) for name in _MEASURED}
                 row |= {"outcome": line["outcome"], "valid": _verdict(row, limits)}
-            case "session_ended":
+            case "session_ended" | "session_resumed":
                 _interrupt(rows)
+            case "recorded":
+                row = _row_of(rows, line)
+                row |= {name: line[name] for name in _RECORDED}
             case "note" if rows:
                 _note(rows[-1], line["text"], mark=line["kind"] == "mark")
             case "repeat" if rows:
@@ -80,6 +84,7 @@ def participant(lines: Sequence[Line]) -> Row:
         "status": ends[-1]["status"] if ends else "unfinished",
         "session_started_at": start["at"],
         "session_ended_at": ends[-1]["at"] if ends else None,
+        "resumed": sum(line["event"] == "session_resumed" for line in lines),
         "device": start.get("device"),
         "language": start["language"],
         "trials": len(main),
@@ -154,7 +159,7 @@ def _row_of(rows: list[Row], line: Line) -> Row:
     for row in reversed(rows):
         if (row["trial"], row["attempt"]) == (line["trial"], line["attempt"]):
             return row
-    raise StoreError(f"the journal's line {line['n']} ends trial {line['trial']}, which never started")
+    raise StoreError(f"the journal's line {line['n']} is about trial {line['trial']}, which never started")
 
 
 def _interrupt(rows: list[Row]) -> None:

@@ -9,9 +9,10 @@ from datetime import datetime, timedelta, timezone
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
-from study_app.haptics.layout import LIMITER_NAMES
+from study_app.haptics.layout import LIMITER_NAMES, SAMPLE
 from study_app.protocol.model import Protocol
 from study_app.protocol.schedule import build_schedule
 from study_app.store.journal import SessionClock
@@ -186,3 +187,32 @@ def attend(protocol: Protocol) -> Callable[[SessionStore], None]:
                 store.write_tables()
 
     return attended
+
+
+def made_samples(count: int, *, first_tick: int = 0, scene: int = 1, seed: int = 5) -> np.ndarray[Any, Any]:
+    """A hand that wanders, with a servo that is late by different amounts; numbers as full of digits as they can be."""
+    generator = np.random.default_rng(seed)
+    samples = np.zeros(count, SAMPLE)
+    t_s = (first_tick + np.arange(count)) / 1000
+    samples["tick"] = first_tick + np.arange(count)
+    samples["lateness_ns"] = (90_000 * generator.lognormal(0.0, 0.6, count)).astype(np.int64)
+    samples["time_ns"] = 10**15 + samples["tick"] * 1_000_000 + samples["lateness_ns"]
+    for axis in range(3):
+        phase, rate = generator.uniform(0, 6), generator.uniform(0.5, 2.0)
+        samples["position_m"][:, axis] = 0.04 * np.sin(rate * t_s + phase) + generator.normal(0, 1e-6, count)
+        samples["velocity_mps"][:, axis] = 0.4 * np.cos(rate * t_s + phase) + generator.normal(0, 1e-3, count)
+        samples["wake_mps"][:, axis] = 0.3 * np.cos(rate * t_s + phase + 0.2)
+        samples["force_n"][:, axis] = 4 * np.cos(rate * t_s + phase) + generator.normal(0, 1e-2, count)
+    samples["device_force_n"] = samples["force_n"]
+    limited = generator.random(count) < 0.1
+    samples["device_force_n"][limited] *= 0.8
+    samples["limiters"][limited] = 8
+    samples["fresh"] = generator.random(count) < 0.9
+    samples["buttons"] = np.arange(count) // 700 % 16
+    samples["scene"] = scene
+    return samples
+
+
+@pytest.fixture
+def samples_of() -> Callable[..., np.ndarray[Any, Any]]:
+    return made_samples

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from study_app.errors import StoreError
-from study_app.store.atomic import append_line, create_folder, is_there, write_file
+from study_app.store.atomic import append_line, beside, create_folder, is_there, probe, sweep, temporaries, write_file
 
 FullDisk = Callable[[int], AbstractContextManager[None]]
 
@@ -82,3 +82,43 @@ def test_a_line_that_does_not_fit_is_taken_back(tmp_path: Path, files_up_to: Ful
     with files_up_to(100), pytest.raises(StoreError, match=r"reveals\.jsonl cannot be written"):
         append_line(path, b"x" * 5000 + b"\n")
     assert path.read_bytes() == b"1\n"
+
+
+def test_what_is_half_written_is_known_by_its_name_and_swept(tmp_path: Path) -> None:
+    half = [beside(tmp_path / name) for name in ("table.csv", "trial-001.parquet", "folder")]
+    kept = [
+        "table.csv",
+        ".table.csv.tmp",
+        "notes.0123abcd.tmp",
+        ".open-0123abcd.json",
+        "..open-01234567.json.0123abcd.tmp",
+    ]
+    for path in half[:2]:
+        path.write_text("half")
+    half[2].mkdir()
+    (half[2] / "inside").write_text("half")
+    for name in kept:
+        (tmp_path / name).write_text("kept")
+    (tmp_path / "below").mkdir()
+    below = beside(tmp_path / "below" / "table.csv")
+    below.write_text("kept")
+    assert temporaries(tmp_path) == tuple(sorted(half))
+    assert sweep(tmp_path) == tuple(sorted(half))
+    assert names_in(tmp_path) == sorted([*kept, "below"])
+    assert below.exists()
+    assert sweep(tmp_path) == sweep(tmp_path / "none") == ()
+
+
+def test_where_one_can_write_free_space_is_told_and_nothing_left(tmp_path: Path) -> None:
+    assert probe(tmp_path) > 0
+    assert probe(tmp_path / "results" / "not" / "yet") > 0
+    assert names_in(tmp_path) == []
+
+
+def test_where_one_cannot_write_is_told_before_anything_is_begun(tmp_path: Path, files_up_to: FullDisk) -> None:
+    with files_up_to(3), pytest.raises(StoreError, match=r"results cannot be written \(File too large\): free space"):
+        probe(tmp_path / "results")
+    assert names_in(tmp_path) == []
+    (tmp_path / "file").touch()
+    with pytest.raises(StoreError, match=r"file cannot be written \(Not a directory\)"):
+        probe(tmp_path / "file")

@@ -188,7 +188,7 @@ def test_a_key_of_a_later_format_is_refused(tmp_path: Path, protocol: Protocol) 
 
 
 def test_a_tampered_key_is_found_by_the_receipts(start: Callable[..., SessionStore], tmp_path: Path) -> None:
-    start("P001").finish("complete")
+    start("P001").finish("completed")
     folder = tmp_path / "study"
     content = content_of(folder)
     codes = content["codes"]["liquids"]
@@ -202,7 +202,7 @@ def test_a_tampered_key_is_found_by_the_receipts(start: Callable[..., SessionSto
 
 
 def test_a_lost_key_is_not_drawn_anew(start: Callable[..., SessionStore], tmp_path: Path) -> None:
-    start("P001").finish("complete")
+    start("P001").finish("completed")
     sealed(tmp_path / "study").unlink()
     with pytest.raises(StoreError, match=r"key\.sealed is missing, though 1 sessions ran under it"):
         start("P002")
@@ -211,7 +211,7 @@ def test_a_lost_key_is_not_drawn_anew(start: Callable[..., SessionStore], tmp_pa
 
 def test_a_reveal_is_recorded_before_it_tells(start: Callable[..., SessionStore], tmp_path: Path) -> None:
     store = start("P001")
-    store.finish("complete")
+    store.finish("completed")
     folder = tmp_path / "study"
     assert revealed(folder) is None
     assert revealed_key(folder) is None
@@ -229,14 +229,14 @@ def test_a_reveal_is_recorded_before_it_tells(start: Callable[..., SessionStore]
 def test_a_reveal_needs_a_name_and_a_reason(
     start: Callable[..., SessionStore], tmp_path: Path, by: str, reason: str, named: str
 ) -> None:
-    start("P001").finish("complete")
+    start("P001").finish("completed")
     with pytest.raises(StoreError, match=f"{named} is empty"):
         reveal(tmp_path / "study", by, reason)
     assert not (tmp_path / "study" / "blinding" / "reveals.jsonl").exists()
 
 
 def test_a_reveal_that_cannot_be_recorded_tells_nothing(start: Callable[..., SessionStore], tmp_path: Path) -> None:
-    start("P001").finish("complete")
+    start("P001").finish("completed")
     (tmp_path / "study" / "blinding" / "reveals.jsonl").mkdir()
     with pytest.raises(StoreError, match=r"reveals\.jsonl cannot be"):
         reveal(tmp_path / "study", "AB", "analysis")

@@ -212,6 +212,40 @@ def test_the_clock_is_the_systems_by_default() -> None:
     assert clock.seconds() >= 0
 
 
+def test_a_clock_that_goes_on_shows_more_than_nothing_and_now() -> None:
+    now = [7_000]
+    clock = SessionClock(lambda: now[0], shown_s=3600.0)
+    now[0] += 2_500_000_000
+    assert clock.seconds() == 3602.5
+    assert abs(datetime.fromisoformat(clock.at(3600.0)) - datetime.now().astimezone()) < timedelta(minutes=1)
+
+
+def test_a_journal_that_changed_while_it_was_opened_is_refused(tmp_path: Path) -> None:
+    path = three_answers(tmp_path / "journal.jsonl")
+    contents = scan(path)
+    with path.open("ab") as file:
+        file.write(b'{"n":5}\n')
+    before = path.read_bytes()
+    with pytest.raises(StoreError, match="has changed while it was opened: is another program writing it"):
+        Journal.reopen(path, contents, SessionClock())
+    assert path.read_bytes() == before
+
+
+def test_a_reopened_journal_goes_on_after_its_last_whole_line(tmp_path: Path) -> None:
+    path = three_answers(tmp_path / "journal.jsonl")
+    whole = path.read_bytes()
+    for torn in (b"", b'{"n":5,"ev', b"\0" * 99):
+        path.write_bytes(whole + torn)
+        with Journal.reopen(path, scan(path), SessionClock()) as journal:
+            line = journal.append("choice", value=4)
+            assert not journal.closed
+        assert journal.closed
+        assert line["n"] == 5
+        assert read(path)[-1] == line
+        assert path.read_bytes().startswith(whole + b'{"n":5')
+    assert [name.name for name in tmp_path.iterdir()] == ["journal.jsonl"]
+
+
 def test_numbers_become_plain_and_those_that_are_none_null() -> None:
     mixed = {"a": np.int64(3), "b": np.float32(0.5), "c": float("nan"), "d": (np.inf, np.array([1.0, np.nan])), 5: True}
     assert plain(mixed) == {"a": 3, "b": 0.5, "c": None, "d": [None, [1.0, None]], "5": True}

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from study_app.errors import StoreError
-from study_app.store.layout import StudyFolder, check_participant, check_unused, study_folder, suggest_id
+from study_app.store.layout import StudyFolder, check_participant, check_unused, locate, study_folder, suggest_id
 
 
 def with_sessions(path: Path, *names: str) -> StudyFolder:
@@ -109,3 +109,23 @@ def test_an_id_that_differs_in_capitals_alone_is_refused(tmp_path: Path) -> None
 def test_session_numbers_have_two_digits(tmp_path: Path, number: int) -> None:
     with pytest.raises(StoreError, match=f"session number {number} cannot be used: it must be from 1 to 99"):
         check_unused(StudyFolder(tmp_path), "P001", number)
+
+
+def test_a_sessions_folder_is_known_from_its_path(tmp_path: Path) -> None:
+    study = StudyFolder(tmp_path.resolve() / "rek2024")
+    session = study.session("P007", 3)
+    session.path.mkdir(parents=True)
+    assert locate(session.path) == (study, session)
+    (tmp_path / "link").symlink_to(session.path)
+    assert locate(tmp_path / "link") == (study, session)
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["rek2024/data/sub-P007", "rek2024/data/P007/ses-01", "rek2024/data/sub-P-7/ses-01", "sub-P007/ses-01", "gone"],
+)
+def test_other_folders_are_no_sessions(tmp_path: Path, name: str) -> None:
+    if name != "gone":
+        (tmp_path / name).mkdir(parents=True)
+    with pytest.raises(StoreError, match="is no session's folder: name one such as results/rek2024/data"):
+        locate(tmp_path / name)

@@ -22,14 +22,14 @@ def test_every_session_has_its_row_and_its_status(
 ) -> None:
     store = start("P002")
     attend(store)
-    store.finish("complete")
+    store.finish("completed")
     start("P001").finish("withdrawn", "tired")
     start("P001", session=2).close()
     rows = table(tmp_path / "study")
     assert [(row["participant"], row["session"], row["status"]) for row in rows] == [
         ("P001", "1", "withdrawn"),
         ("P001", "2", "unfinished"),
-        ("P002", "1", "complete"),
+        ("P002", "1", "completed"),
     ]
     assert (rows[2]["trials"], rows[2]["responses"], rows[2]["validity"]) == ("4", "12", "valid")
     assert (rows[2]["device"], rows[2]["language"]) == ("scripted", "en")
@@ -37,7 +37,7 @@ def test_every_session_has_its_row_and_its_status(
 
 
 def test_no_name_or_initials_are_in_it(tmp_path: Path, start: Callable[..., SessionStore]) -> None:
-    start("P001", operator="ZQX").finish("complete")
+    start("P001", operator="ZQX").finish("completed")
     assert "ZQX" not in StudyFolder(tmp_path / "study").participants("brackish").read_text(encoding="utf-8")
 
 
@@ -46,12 +46,12 @@ def test_a_damaged_journal_stops_nobody_and_is_marked(
 ) -> None:
     store = start("P001")
     attend(store)
-    store.finish("complete")
+    store.finish("completed")
     lines = store.folder.journal.read_bytes().split(b"\n")
     lines[5] = b"\0" * 30
     store.folder.journal.write_bytes(b"\n".join(lines))
-    start("P002").finish("complete")
-    assert [row["status"] for row in table(tmp_path / "study")] == ["damaged", "complete"]
+    start("P002").finish("completed")
+    assert [row["status"] for row in table(tmp_path / "study")] == ["damaged", "completed"]
 
 
 def test_a_claimed_folder_without_a_journal_has_no_row(tmp_path: Path, start: Callable[..., SessionStore]) -> None:
@@ -59,7 +59,7 @@ def test_a_claimed_folder_without_a_journal_has_no_row(tmp_path: Path, start: Ca
     begun = tmp_path / "study" / "data" / "sub-P003" / "ses-01"
     begun.mkdir(parents=True)
     (begun / "journal.jsonl").touch()
-    start("P002").finish("complete")
+    start("P002").finish("completed")
     assert [row["participant"] for row in table(tmp_path / "study")] == ["P002"]
 
 
@@ -76,5 +76,5 @@ def test_of_two_programs_the_last_to_write_has_seen_both(
         write(path, content)
 
     monkeypatch.setattr(participants, "write_file", late)
-    store.finish("complete")
-    assert [row["status"] for row in table(tmp_path / "study")] == ["complete", "withdrawn"]
+    store.finish("completed")
+    assert [row["status"] for row in table(tmp_path / "study")] == ["completed", "withdrawn"]

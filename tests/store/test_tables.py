@@ -227,7 +227,7 @@ def test_lines_that_are_no_session_are_refused(lines: list[dict[str, Any]]) -> N
 def test_the_end_of_a_trial_that_never_started_is_refused() -> None:
     script = Script()
     script.end(4)
-    with pytest.raises(StoreError, match="line 2 ends trial 4, which never started"):
+    with pytest.raises(StoreError, match="line 2 is about trial 4, which never started"):
         trials(script.lines)
 
 
@@ -244,7 +244,7 @@ def test_headers_are_the_same_bytes_for_every_participant(
             store.append(
                 "trial_started", trial=1, attempt=1, block="b", phase="main", part=None, index=1, of=1, code="L1"
             )
-        store.finish("complete")
+        store.finish("completed")
         for table, seen in heads.items():
             seen.add(store.folder.table("brackish", table).read_bytes().split(b"\n")[0])
     assert heads == {table: {",".join(header(TABLES[table])).encode()} for table in heads}
@@ -256,7 +256,7 @@ def test_every_cell_of_a_session_matches_its_columns_pattern(
     store = start()
     attend(store)
     store.append("note", kind="note", text="a\nb")
-    store.finish("complete")
+    store.finish("completed")
     for name, path in {
         "participants": store.place.study_folder.participants("brackish"),
         "responses": store.folder.table("brackish", "responses"),
@@ -274,7 +274,7 @@ def test_tables_come_from_the_journal_alone(
 ) -> None:
     store = start()
     attend(store)
-    store.finish("complete")
+    store.finish("completed")
     lines = read(store.folder.journal)
     for name, rows in (("responses", responses(lines)), ("trials", trials(lines))):
         path = store.folder.table("brackish", name)

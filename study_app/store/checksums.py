@@ -1,0 +1,113 @@
+"""``checksums.sha256``: what every file of a session was when it had ended, in the form that ``sha256sum -c`` reads."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Collection, Mapping
+from pathlib import Path
+
+from study_app.errors import StoreError
+from study_app.store.atomic import cannot_read, write_file
+from study_app.store.layout import SessionFolder
+
+_LINE = re.compile(r"([0-9a-f]{64})  (.+)")
+
+
+def write_checksums(session: SessionFolder, known: Mapping[str, str]) -> None:
+    """Write the SHA-256 of every file of the session; those of ``known`` (by path in the folder) are taken as they are.
+
+    Raises
+    ------
+    StoreError
+        A file cannot be read, or the list not written.
+    """
+    sums = {name: known.get(name) or hashed(session, name) for name in files(session)}
+    write_file(session.checksums, checksum_bytes(sums))
+
+
+def renew_checksums(session: SessionFolder, rewritten: Collection[Path], known: Mapping[str, str]) -> bool:
+    """Bring the list up to date with files that were ``rewritten``; return whether it changed.
+
+    What it says of all others stays, so that it never vouches for a file it has not seen when the session ended; a list
+    that is missing or none is made anew.
+
+    Raises
+    ------
+    StoreError
+        A file cannot be read, or the list not written.
+    """
+    try:
+        before = session.checksums.read_bytes()
+        listed = read_checksums(session)
+    except (OSError, StoreError):
+        write_checksums(session, known)
+        return True
+    ours = [path.relative_to(session.path).as_posix() for path in rewritten if path.is_relative_to(session.path)]
+    after = checksum_bytes(listed | {name: hashed(session, name) for name in ours})
+    if after == before:
+        return False
+    write_file(session.checksums, after)
+    return True
+
+
+def checksum_bytes(sums: Mapping[str, str]) -> bytes:
+    """Return the list: SHA-256 and path in the folder, by path."""
+    return "".join(f"{sums[name]}  {name}\n" for name in sorted(sums)).encode()
+
+
+def hashed(session: SessionFolder, name: str) -> str:
+    """Return the SHA-256 of the file ``name`` in the session's folder."""
+    return sha256(session.path / name)
+
+
+def read_checksums(session: SessionFolder) -> dict[str, str]:
+    """Return path in the folder → SHA-256.
+
+    Raises
+    ------
+    StoreError
+        The list cannot be read, or is none.
+    """
+    try:
+        text = session.checksums.read_text(encoding="utf-8")
+    except OSError as error:
+        raise cannot_read(session.checksums, error) from error
+    except UnicodeDecodeError as error:
+        raise StoreError(f"{session.checksums} is no list of checksums: restore it from a copy") from error
+    found: dict[str, str] = {}
+    for line in text.splitlines():
+        match = _LINE.fullmatch(line)
+        if match is None:
+            raise StoreError(f"{session.checksums} has a line that is no checksum: restore it from a copy")
+        found[match[2]] = match[1]
+    if not found:
+        raise StoreError(f"{session.checksums} is empty: restore it from a copy")
+    return found
+
+
+def files(session: SessionFolder) -> tuple[str, ...]:
+    """Return the session's files, by path in its folder; not the list itself, nor what is hidden or half-written."""
+    found = (path.relative_to(session.path) for path in session.path.rglob("*") if path.is_file())
+    return tuple(
+        sorted(
+            name.as_posix()
+            for name in found
+            if name.name != session.checksums.name and not any(part.startswith(".") for part in name.parts)
+        )
+    )
+
+
+def sha256(path: Path) -> str:
+    """Return the SHA-256 of a file.
+
+    Raises
+    ------
+    StoreError
+        It cannot be read.
+    """
+    try:
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise cannot_read(path, error) from error

@@ -1,0 +1,186 @@
+"""A session that is open: appended to while it runs, closed with a status.
+
+While it runs it is open in one program alone. The journal is the truth; tables, receipt and checksums follow from it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from study_app.errors import StoreError
+from study_app.store import receipt, tables
+from study_app.store.atomic import write_file
+from study_app.store.blinding import Key
+from study_app.store.checksums import write_checksums
+from study_app.store.columns import RESPONSES, TRIALS
+from study_app.store.journal import Journal, Line
+from study_app.store.layout import SessionFolder, StudyFolder
+from study_app.store.opening import Opening
+from study_app.store.participants import write_participants
+from study_app.store.recorder import Kept, Recorder, event_of, hashes_of
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a session's files go: the study's folder, the session's in it, and the study's name."""
+
+    study_folder: StudyFolder
+    folder: SessionFolder
+    study: str
+
+
+class SessionStore:
+    """The open session: ``append`` is durable when it returns, tables follow the journal, ``finish`` says how it ended.
+
+    ``key`` translates codes while the session runs; ``clock`` is the one the journal is stamped from; ``recorder``
+    takes the trials' samples and frames, or is None in a session without recordings; ``behind`` is why the tables on
+    disk are older than the journal, or None. Made by `begin`; by ``resume.reopen`` from ``lines`` written before.
+    """
+
+    def __init__(
+        self,
+        place: Place,
+        journal: Journal,
+        key: Key,
+        session_receipt: dict[str, Any],
+        opening: Opening,
+        *,
+        lines: Sequence[Line] = (),
+        recorder: Recorder | None = None,
+    ) -> None:
+        self.place = place
+        self.key = key
+        self.clock = journal.clock
+        self.recorder = recorder
+        self.behind: StoreError | None = None
+        self._journal = journal
+        self._receipt = session_receipt
+        self._opening = opening
+        self._lines: list[Line] = list(lines)
+        self._written: dict[Path, bytes] = {}
+        self._kept: list[Kept] = []
+
+    @property
+    def folder(self) -> SessionFolder:
+        """The session's folder."""
+        return self.place.folder
+
+    @property
+    def lines(self) -> tuple[Line, ...]:
+        """The journal so far."""
+        return tuple(self._lines)
+
+    def append(self, event: str, *, t_s: float | None = None, **fields: Any) -> None:
+        """Put an event into the journal; it is on the disk when this returns.
+
+        ``t_s`` is when it happened [s since the clock's origin], by default now.
+
+        Raises
+        ------
+        StoreError
+            It is not on the disk; the journal is as before and can be tried again.
+        """
+        self._lines.append(self._journal.append(event, t_s=t_s, **fields))
+
+    def write_tables(self) -> None:
+        """Bring the session's tables up to date with its journal.
+
+        A table that cannot be replaced now (open in another program, no space) stops no session: nothing is lost, since
+        tables are made from the journal. ``behind`` says why, and the next call tries again. What became of recordings
+        since the last call is journalled first.
+        """
+        try:
+            self._keep_recordings()
+            for path, content in table_files(self.place, self._lines):
+                if self._written.get(path) != content:
+                    write_file(path, content)
+                    self._written[path] = content
+        except StoreError as error:
+            self.behind = error
+        else:
+            self.behind = None
+
+    def finish(self, status: str, reason: str = "") -> None:
+        """Write the session's last line, its receipt and all tables, and close it.
+
+        Raises
+        ------
+        StoreError
+            One of them could not be written; what was journalled before is safe.
+        """
+        if self.recorder is not None:
+            self.recorder.close()
+        self._keep_recordings()
+        self.append("session_ended", status=status, reason=reason)
+        self._journal.close()
+        self._receipt |= {"status": status, "reason": reason, "ended_at": self._lines[-1]["at"]}
+        self.write_tables()
+        failures = [] if self.behind is None else [self.behind]
+        for write in (self._write_receipt, self._write_participants, self._write_checksums):
+            try:
+                write()
+            except StoreError as error:
+                failures.append(error)
+        self._opening.release()
+        if failures:
+            raise failures[0]
+
+    def close(self) -> None:
+        """Let go of the session without an end; it stays unfinished."""
+        if self.recorder is not None:
+            self.recorder.close()
+        if not self._journal.closed:
+            with contextlib.suppress(StoreError):  # `reopen` finds the files that no line tells of
+                self._keep_recordings()
+        self._journal.close()
+        self._opening.release()
+
+    def note_resumed(self, what: Mapping[str, Any]) -> None:
+        """Add to the receipt what the session goes on with.
+
+        Raises
+        ------
+        StoreError
+            The receipt cannot be written.
+        """
+        self._receipt["resumed"] = [*self._receipt.get("resumed", ()), dict(what)]
+        self._write_receipt()
+
+    def _write_receipt(self) -> None:
+        receipt.write(self.folder.receipt, self._receipt)
+
+    def _write_participants(self) -> None:
+        write_participants(self.place.study_folder, self.place.study)
+
+    def _write_checksums(self) -> None:
+        write_checksums(self.folder, hashes_of(self._lines))
+
+    def _keep_recordings(self) -> None:
+        """Journal what became of recordings: which files they are, or why there are none."""
+        if self.recorder is not None:
+            self._kept += self.recorder.kept()
+        while self._kept:
+            event, fields = event_of(self._kept[0])
+            self.append(event, **fields)
+            del self._kept[0]
+
+    def __enter__(self) -> SessionStore:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def table_files(place: Place, lines: Sequence[Line]) -> tuple[tuple[Path, bytes], ...]:
+    """Return the session's tables as files: paths and contents, from the journal's lines alone."""
+    return (
+        (place.folder.table(place.study, "responses"), tables.csv_bytes(RESPONSES, tables.responses(lines))),
+        (place.folder.table(place.study, "trials"), tables.csv_bytes(TRIALS, tables.trials(lines))),
+    )

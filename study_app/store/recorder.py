@@ -1,0 +1,296 @@
+"""Recordings are written beside the session: what happens at 1 kHz goes into a queue, a thread of its own to the disk.
+
+Handing samples over never waits for the disk. Where the disk cannot keep up for two minutes, or takes nothing at all,
+samples are dropped and counted and the session goes on: answers are worth more than recordings. In a rehearsal, where
+time waits for the program, handing over waits instead, and nothing is lost.
+"""
+
+from __future__ import annotations
+
+import threading
+from array import array
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+
+from study_app.store.atomic import cause
+from study_app.store.journal import Line
+
+if TYPE_CHECKING:
+    from study_app.store.recording import SamplesFile, Written
+
+ROOM = 120_000  # samples that may wait: two minutes at 1 kHz, 23 MB
+ENOUGH = 5_000  # samples that are worth waking the thread for
+PATIENCE_S = 30.0  # how long the end of a session waits for the disk
+
+
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """A recording that is whole on the disk."""
+
+    trial: int
+    attempt: int
+    samples: Written
+    frames: Written
+    dropped: int
+
+
+@dataclass(frozen=True, slots=True)
+class Lost:
+    """A recording that could not be kept, and why."""
+
+    trial: int
+    attempt: int
+    reason: str
+
+
+Kept: TypeAlias = Recorded | Lost
+
+
+@dataclass(frozen=True, slots=True)
+class _Begin:
+    trial: int
+    attempt: int
+    rate_hz: float
+
+
+@dataclass(frozen=True, slots=True)
+class _End:
+    frames: array[int]
+    dropped: int
+
+
+class Recorder:
+    """Keeps the recordings of one session, a trial at a time: `start`, `append` and `frame`, `stop`.
+
+    All but `close` return at once; use it from one thread.
+
+    Parameters
+    ----------
+    folder : Path
+        Where the files go; made when the first is written.
+    facts : mapping
+        What every file says of itself. Nothing that tells a condition.
+    waits : bool
+        Whether `append` waits for room instead of dropping: for rehearsals.
+    room : int
+        How many samples may wait.
+    """
+
+    def __init__(self, folder: Path, facts: Mapping[str, Any], *, waits: bool = False, room: int = ROOM) -> None:
+        # The Parquet library takes a while to load: now, before a participant sits down, and only where it is needed.
+        from study_app.store import recording  # noqa: PLC0415
+
+        self._files = recording
+        self._folder = folder
+        self._facts = dict(facts)
+        self._waits = waits
+        self._room = room
+        self._thread: threading.Thread | None = None
+        self._changed = threading.Condition()
+        self._queue: deque[Any] = deque()
+        self._waiting = 0
+        self._closing = False
+        self._kept: list[Kept] = []
+        self._underway: tuple[int, int] | None = None
+        self._expected: dict[tuple[int, int], None] = {}
+        self._frames = array("q")
+        self._dropped = 0
+
+    def start(self, trial: int, attempt: int, rate_hz: float) -> None:
+        """Begin the recording of a trial; one that is under way is stopped first.
+
+        The first sample may be the one before the trial's first: what the hand felt last is what the force moves from.
+        """
+        self.stop()
+        self._underway = trial, attempt
+        self._frames, self._dropped = array("q"), 0
+        with self._changed:
+            if self._closing:
+                self._underway = None
+                return
+            self._expected[trial, attempt] = None
+            self._queue.append(_Begin(trial, attempt, rate_hz))
+            if self._thread is None:
+                self._thread = threading.Thread(target=self._write, name="recorder", daemon=True)
+                self._thread.start()
+            self._changed.notify_all()
+
+    def append(self, samples: Any) -> None:
+        """Hand over the next samples, in order (array of ``layout.SAMPLE``), which nobody changes afterwards."""
+        count = len(samples)
+        if self._underway is None or count == 0:
+            return
+        with self._changed:
+            while self._waits and self._waiting and self._waiting + count > self._room and self._works():
+                self._changed.wait()
+            if self._waiting and self._waiting + count > self._room:
+                self._dropped += count
+                return
+            self._queue.append(samples)
+            self._waiting += count
+            if self._waiting >= min(ENOUGH, self._room):
+                self._changed.notify_all()
+
+    def frame(self, painted_ns: int, sample_ns: int) -> None:
+        """Keep that a frame was painted at one moment and showed another [ns, the servo's clock]."""
+        if self._underway is not None:
+            self._frames.append(painted_ns)
+            self._frames.append(sample_ns)
+
+    def stop(self) -> None:
+        """End the recording under way, if any; `kept` will tell when it is on the disk."""
+        if self._underway is None:
+            return
+        self._underway = None
+        with self._changed:
+            self._queue.append(_End(self._frames, self._dropped))
+            self._changed.notify_all()
+
+    @property
+    def dropped(self) -> int:
+        """How many samples of the recording under way, or of the last one, were dropped."""
+        return self._dropped
+
+    def kept(self) -> tuple[Kept, ...]:
+        """Return what has become whole, or was lost, since the last call."""
+        with self._changed:
+            found, self._kept = tuple(self._kept), []
+        return found
+
+    def close(self, patience_s: float = PATIENCE_S) -> None:
+        """End what is under way and wait until all is on the disk, but not for ever; `kept` tells what became of it."""
+        self.stop()
+        with self._changed:
+            self._closing = True
+            self._changed.notify_all()
+        if self._thread is not None:
+            self._thread.join(patience_s)
+        with self._changed:
+            reason = "the disk did not take it in time" if self._works() else "its thread had ended"
+            self._kept += [Lost(trial, attempt, reason) for trial, attempt in self._expected]
+            self._expected.clear()
+
+    def _works(self) -> bool:
+        return self._thread is not None and self._thread.is_alive()
+
+    def _write(self) -> None:
+        """Work through the queue until it is empty and closed: the recorder's thread."""
+        while isinstance(begin := self._next(), _Begin):
+            kept = self._record(begin)
+            with self._changed:
+                if (begin.trial, begin.attempt) in self._expected:
+                    del self._expected[begin.trial, begin.attempt]
+                    self._kept.append(kept)
+                    self._changed.notify_all()
+
+    def _record(self, begin: _Begin) -> Kept:
+        """Write one trial's files; the queue is then past the trial's end, whatever became of them."""
+        samples_path, frames_path = recording_files(self._folder, begin.trial, begin.attempt)
+        facts = {**self._facts, "trial": begin.trial, "attempt": begin.attempt}
+        coming = _Coming(self._next)
+        file: SamplesFile | None = None
+        shown: Written | None = None
+        try:
+            self._folder.mkdir(exist_ok=True)
+            file = self._files.SamplesFile(samples_path, facts, begin.rate_hz)
+            for group in coming.groups(file.group_rows):
+                file.write(group)
+            end = coming.end
+            frames = np.frombuffer(end.frames, np.int64).reshape(-1, 2)
+            shown = self._files.write_frames(frames_path, frames, facts)
+            return Recorded(begin.trial, begin.attempt, file.finish(end.dropped), shown, end.dropped)
+        except OSError as error:
+            if file is not None:
+                file.abandon()
+            if shown is not None:
+                shown.path.unlink(missing_ok=True)
+            coming.skip()
+            return Lost(begin.trial, begin.attempt, cause(error))
+
+    def _next(self) -> Any:
+        """Wait for the next thing in the queue; None when it is closed and empty."""
+        with self._changed:
+            while not self._queue and not self._closing:
+                self._changed.wait()
+            if not self._queue:
+                return None
+            thing = self._queue.popleft()
+            if not isinstance(thing, _Begin | _End):
+                self._waiting -= len(thing)
+                self._changed.notify_all()
+            return thing
+
+
+class _Coming:
+    """What the queue still holds of the trial being written; ``end`` is its end, once that was met."""
+
+    def __init__(self, take: Callable[[], Any]) -> None:
+        self._take = take
+        self._ended = False
+        self.end = _End(array("q"), 0)
+
+    def groups(self, rows: int) -> Iterator[Any]:
+        """Yield the samples ``rows`` at a time, and the rest."""
+        held: list[Any] = []
+        count = 0
+        while (chunk := self._chunk()) is not None:
+            held.append(chunk)
+            count += len(chunk)
+            while count >= rows:
+                together = np.concatenate(held)
+                yield together[:rows]
+                held, count = [together[rows:]], count - rows
+        if count:
+            yield np.concatenate(held)
+
+    def skip(self) -> None:
+        """Pass over the rest of a trial that could not be kept."""
+        while self._chunk() is not None:
+            pass
+
+    def _chunk(self) -> Any:
+        """Return the next samples, or None at and after the end."""
+        if self._ended:
+            return None
+        thing = self._take()
+        self._ended = thing is None or isinstance(thing, _End)
+        if isinstance(thing, _End):
+            self.end = thing
+        return None if self._ended else thing
+
+
+def event_of(kept: Kept) -> tuple[str, dict[str, Any]]:
+    """Return the journal's event and fields about a recording; files by their path in the session's folder."""
+    which = {"trial": kept.trial, "attempt": kept.attempt}
+    if not isinstance(kept, Recorded):
+        return "recording_lost", {**which, "reason": kept.reason}
+    samples, frames = kept.samples, kept.frames
+    return "recorded", {
+        **which,
+        "recording": f"{samples.path.parent.name}/{samples.path.name}",
+        "recording_frames": f"{frames.path.parent.name}/{frames.path.name}",
+        "samples_recorded": samples.rows,
+        "samples_unrecorded": kept.dropped,
+        "frames_recorded": frames.rows,
+        "sha256": samples.sha256,
+        "frames_sha256": frames.sha256,
+    }
+
+
+def hashes_of(lines: Sequence[Line]) -> dict[str, str]:
+    """Return path in the session's folder → SHA-256 of every recording that the journal tells of."""
+    told = [line for line in lines if line["event"] == "recorded"]
+    return {line["recording"]: line["sha256"] for line in told} | {
+        line["recording_frames"]: line["frames_sha256"] for line in told
+    }
+
+
+def recording_files(folder: Path, trial: int, attempt: int) -> tuple[Path, Path]:
+    """Return the files of samples and of frames: trial-003.parquet, trial-003_attempt-2_frames.parquet ..."""
+    name = f"trial-{trial:03d}" + (f"_attempt-{attempt}" if attempt > 1 else "")
+    return folder / f"{name}.parquet", folder / f"{name}_frames.parquet"

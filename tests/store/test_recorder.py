@@ -1,0 +1,203 @@
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from study_app.store import recording
+from study_app.store.recorder import Lost, Recorded, Recorder, recording_files
+from study_app.store.recording import SamplesFile, read_facts, read_frames, read_samples
+
+Make = Callable[..., np.ndarray[Any, Any]]
+FullDisk = Callable[[int], AbstractContextManager[None]]
+
+FACTS = {"participant": "P007", "session": 1}
+
+
+@pytest.fixture
+def recorder(tmp_path: Path) -> Iterator[Recorder]:
+    made = Recorder(tmp_path / "recordings", FACTS)
+    yield made
+    made.close()
+
+
+class Disk:
+    """Files that are written only while the disk is let to."""
+
+    def __init__(self) -> None:
+        self.works = threading.Event()
+        self.asked = threading.Event()
+        disk = self
+
+        class SlowFile(SamplesFile):
+            def write(self, samples: Any) -> None:
+                disk.asked.set()
+                assert disk.works.wait(20)
+                super().write(samples)
+
+        self.files = SimpleNamespace(SamplesFile=SlowFile, write_frames=recording.write_frames)
+
+
+def slow(folder: Path, **given: Any) -> tuple[Recorder, Disk]:
+    recorder, disk = Recorder(folder, FACTS, **given), Disk()
+    recorder._files = disk.files  # type: ignore[assignment]
+    return recorder, disk
+
+
+def record(recorder: Recorder, samples: Any, *, trial: int = 3, attempt: int = 1, chunk: int = 17) -> None:
+    recorder.start(trial, attempt, 1000.0)
+    for first in range(0, len(samples), chunk):
+        recorder.append(samples[first : first + chunk])
+    recorder.frame(2_000, 1_000)
+    recorder.frame(3_000, 1_500)
+    recorder.stop()
+
+
+def test_a_trial_is_on_the_disk_under_its_name_after_its_end(
+    tmp_path: Path, recorder: Recorder, samples_of: Make
+) -> None:
+    samples = samples_of(70_001)
+    record(recorder, samples, chunk=1_234)
+    recorder.close()
+    (kept,) = recorder.kept()
+    assert isinstance(kept, Recorded)
+    assert (kept.trial, kept.attempt, kept.dropped, kept.samples.rows, kept.frames.rows) == (3, 1, 0, 70_001, 2)
+    assert sorted(path.name for path in (tmp_path / "recordings").iterdir()) == [
+        "trial-003.parquet",
+        "trial-003_frames.parquet",
+    ]
+    assert np.array_equal(read_samples(kept.samples.path)["position_m"], samples["position_m"])
+    assert read_frames(kept.frames.path)["age_ns"].tolist() == [1_000, 1_500]
+    assert read_facts(kept.samples.path).items() >= {**FACTS, "trial": 3, "attempt": 1, "dropped": 0}.items()
+    assert recorder.kept() == ()
+
+
+def test_the_same_samples_give_the_same_file_however_they_came(tmp_path: Path, samples_of: Make) -> None:
+    samples = samples_of(65_000)
+    sums = set()
+    for chunk in (16, 999, 65_000):
+        recorder = Recorder(tmp_path / str(chunk), FACTS, waits=True)
+        record(recorder, samples, chunk=chunk)
+        recorder.close()
+        (kept,) = recorder.kept()
+        assert isinstance(kept, Recorded)
+        sums.add((kept.samples.sha256, kept.frames.sha256))
+    assert len(sums) == 1
+
+
+def test_trials_and_attempts_have_files_of_their_own(tmp_path: Path, recorder: Recorder, samples_of: Make) -> None:
+    for trial, attempt in ((1, 1), (2, 1), (2, 2), (120, 1)):
+        record(recorder, samples_of(100 * trial + attempt), trial=trial, attempt=attempt)
+    recorder.close()
+    found = [(kept.trial, kept.attempt) for kept in recorder.kept()]
+    assert found == [(1, 1), (2, 1), (2, 2), (120, 1)]
+    assert recording_files(tmp_path, 2, 2) == (
+        tmp_path / "trial-002_attempt-2.parquet",
+        tmp_path / "trial-002_attempt-2_frames.parquet",
+    )
+    assert len(read_samples(recording_files(tmp_path / "recordings", 120, 1)[0])) == 12_001
+
+
+def test_beginning_the_next_trial_ends_the_one_before(recorder: Recorder, samples_of: Make) -> None:
+    recorder.start(1, 1, 1000.0)
+    recorder.append(samples_of(10))
+    recorder.start(2, 1, 1000.0)
+    recorder.append(samples_of(20))
+    recorder.close()
+    assert [kept.samples.rows for kept in recorder.kept() if isinstance(kept, Recorded)] == [10, 20]
+
+
+def test_between_trials_nothing_is_kept(recorder: Recorder, samples_of: Make) -> None:
+    recorder.append(samples_of(10))
+    recorder.frame(1, 0)
+    recorder.stop()
+    record(recorder, samples_of(5))
+    recorder.append(samples_of(10))
+    recorder.close()
+    assert [kept.samples.rows for kept in recorder.kept() if isinstance(kept, Recorded)] == [5]
+
+
+def test_a_disk_that_stands_still_holds_nobody_up_and_drops_are_counted(tmp_path: Path, samples_of: Make) -> None:
+    """Handing over goes on in this thread while the other waits for the disk; what finds no room is counted."""
+    recorder, disk = slow(tmp_path / "recordings", room=40_000)
+    recorder.start(1, 1, 1000.0)
+    samples = samples_of(100_000)
+    recorder.append(samples[:30_000])
+    assert disk.asked.wait(20)
+    for first in range(30_000, 100_000, 10_000):
+        recorder.append(samples[first : first + 10_000])
+    assert recorder.dropped == 30_000
+    disk.works.set()
+    recorder.close()
+    (kept,) = recorder.kept()
+    assert isinstance(kept, Recorded)
+    assert (kept.dropped, kept.samples.rows) == (30_000, 70_000)
+    assert read_samples(kept.samples.path)["tick"].tolist() == list(range(70_000))
+    assert read_facts(kept.samples.path)["dropped"] == 30_000
+
+
+def test_in_a_rehearsal_handing_over_waits_for_room_instead(tmp_path: Path, samples_of: Make) -> None:
+    recorder = Recorder(tmp_path / "recordings", FACTS, waits=True, room=500)
+    record(recorder, samples_of(90_000), chunk=700)
+    recorder.close()
+    (kept,) = recorder.kept()
+    assert isinstance(kept, Recorded)
+    assert (kept.dropped, kept.samples.rows) == (0, 90_000)
+
+
+@pytest.mark.parametrize("size", [200, 500_000], ids=["from the first byte", "after a while"])
+def test_a_full_disk_loses_a_recording_with_its_reason_and_the_next_is_kept(
+    tmp_path: Path, samples_of: Make, files_up_to: FullDisk, size: int
+) -> None:
+    recorder = Recorder(tmp_path / "recordings", FACTS, waits=True)
+    with files_up_to(size):
+        record(recorder, samples_of(70_000), trial=1)
+        with recorder._changed:
+            assert recorder._changed.wait_for(lambda: recorder._kept, 20)
+    assert recorder.kept() == (Lost(1, 1, "File too large"),)
+    record(recorder, samples_of(200), trial=2)
+    recorder.close()
+    (kept,) = recorder.kept()
+    assert isinstance(kept, Recorded)
+    assert sorted(path.name for path in (tmp_path / "recordings").iterdir()) == [
+        "trial-002.parquet",
+        "trial-002_frames.parquet",
+    ]
+
+
+def test_a_folder_that_cannot_be_made_loses_every_recording(tmp_path: Path, samples_of: Make) -> None:
+    (tmp_path / "recordings").write_text("a file is in the way")
+    recorder = Recorder(tmp_path / "recordings", FACTS)
+    record(recorder, samples_of(200), trial=1)
+    record(recorder, samples_of(200), trial=2)
+    recorder.close()
+    assert recorder.kept() == (Lost(1, 1, "File exists"), Lost(2, 1, "File exists"))
+
+
+def test_the_end_of_a_session_does_not_wait_for_ever(tmp_path: Path, samples_of: Make) -> None:
+    recorder, disk = slow(tmp_path / "recordings")
+    record(recorder, samples_of(40_000), chunk=5_000)
+    assert disk.asked.wait(20)
+    recorder.close(patience_s=0.0)
+    assert recorder.kept() == (Lost(3, 1, "the disk did not take it in time"),)
+    disk.works.set()
+    recorder.close()
+    assert recorder.kept() == ()
+
+
+def test_after_its_end_it_keeps_nothing(recorder: Recorder, samples_of: Make) -> None:
+    recorder.close()
+    record(recorder, samples_of(10))
+    recorder.close()
+    assert recorder.kept() == ()
+
+
+def test_a_session_without_trials_starts_no_thread(recorder: Recorder) -> None:
+    recorder.close()
+    assert "recorder" not in {thread.name for thread in threading.enumerate()}
