@@ -102,6 +102,17 @@ def open_or_draw_key(folder: Path, protocol: Protocol, random: Callable[[], floa
     return key
 
 
+def same_conditions(folder: Path, protocol: Protocol) -> bool:
+    """Return whether ``protocol`` has the liquids, conditions and blocks of conditions that the key was sealed for.
+
+    Raises
+    ------
+    StoreError
+        The key is missing, unreadable or not the one the sessions ran under.
+    """
+    return _verified_key(StudyFolder(folder)).tables_hash == _tables_hash(protocol)
+
+
 def reveal(folder: Path, by: str, reason: str) -> Codes:
     """Record who opens the key and why, then return block → code → condition id.
 
@@ -185,7 +196,7 @@ def _tables_hash(protocol: Protocol) -> str:
 
 def _verified_key(study: StudyFolder) -> Key:
     """Read the key and compare its hash with what every receipt published."""
-    key = _read(study.key)
+    key = read_key(study.path)
     for session in study.sessions():
         if is_there(session.receipt) and receipt.read(session.receipt)["key_hash"] != key.hash:
             raise StoreError(
@@ -195,7 +206,15 @@ def _verified_key(study: StudyFolder) -> Key:
     return key
 
 
-def _read(path: Path) -> Key:
+def read_key(folder: Path) -> Key:
+    """Open the key without looking whether it is the one the sessions ran under. Never print what it holds.
+
+    Raises
+    ------
+    StoreError
+        It is missing or no key.
+    """
+    path = StudyFolder(folder).key
     try:
         sealed = path.read_bytes()
     except OSError as error:

@@ -1,0 +1,86 @@
+"""All that follows from a session's journal, made again from it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from study_app.store import journal, receipt
+from study_app.store.atomic import is_there, sweep, write_file
+from study_app.store.checksums import renew_checksums
+from study_app.store.journal import Line
+from study_app.store.layout import SessionFolder, locate
+from study_app.store.open_session import Place, table_files
+from study_app.store.opening import open_alone
+from study_app.store.participants import write_participants
+from study_app.store.progress import progress_of
+from study_app.store.recorder import hashes_of
+
+
+@dataclass(frozen=True, slots=True)
+class Rebuilt:
+    """What `rebuild` did.
+
+    ``rewritten`` were missing or other than the journal says, ``swept`` were half-written by a program that was killed;
+    ``torn_bytes`` at the journal's end are a line that was never finished, and were left alone.
+    """
+
+    rewritten: tuple[Path, ...]
+    swept: tuple[Path, ...]
+    torn_bytes: int
+
+
+def rebuild(session_folder: Path) -> Rebuilt:
+    """Make again what follows from a session's journal.
+
+    These are its tables, the study's table of participants, the receipt's status and the checksums of a finished
+    session. Files that hold what they should are left as they are.
+
+    Raises
+    ------
+    StoreError
+        It is no session's folder, open in another program, or its journal is empty or damaged; or a file cannot be
+        written.
+    """
+    study_folder, folder = locate(session_folder)
+    opening = open_alone(folder.path)
+    try:
+        contents = journal.whole(folder.journal)
+        place = Place(study_folder, folder, progress_of(contents.lines).start["study"])
+        swept = sweep(folder.path) + (sweep(folder.recordings) if is_there(folder.recordings) else ())
+        table = study_folder.participants(place.study)
+        before = _content(table)
+        rewritten = [path for path, content in table_files(place, contents.lines) if _renew(path, content)]
+        rewritten += _renew_receipt(folder, contents.lines)
+        write_participants(study_folder, place.study)
+        rewritten += [table] if _content(table) != before else []
+        ended = contents.lines[-1]["event"] == "session_ended"
+        if ended and renew_checksums(folder, rewritten, hashes_of(contents.lines)):
+            rewritten.append(folder.checksums)
+        return Rebuilt(tuple(rewritten), swept, contents.torn_bytes)
+    finally:
+        opening.release()
+
+
+def _renew(path: Path, content: bytes) -> bool:
+    if _content(path) == content:
+        return False
+    write_file(path, content)
+    return True
+
+
+def _renew_receipt(folder: SessionFolder, lines: list[Line]) -> list[Path]:
+    """Give the receipt the end that the journal tells of; a receipt that is missing cannot be made again."""
+    last = lines[-1]
+    if last["event"] != "session_ended" or not is_there(folder.receipt):
+        return []
+    held = receipt.read(folder.receipt)
+    ended = {"status": last["status"], "reason": last["reason"], "ended_at": last["at"]}
+    if all(held.get(name) == value for name, value in ended.items()):
+        return []
+    receipt.write(folder.receipt, held | ended)
+    return [folder.receipt]
+
+
+def _content(path: Path) -> bytes | None:
+    return path.read_bytes() if path.is_file() else None

@@ -1,0 +1,185 @@
+"""Going on with a session whose program had ended: the journal is opened where it stopped, and says so."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import time
+from collections.abc import Callable, Iterator, Mapping
+from datetime import datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import study_app
+from study_app.errors import StoreError
+from study_app.protocol.load import protocol_hash
+from study_app.protocol.model import Protocol
+from study_app.protocol.schedule import stream
+from study_app.store import journal, receipt
+from study_app.store.atomic import is_there, sweep
+from study_app.store.blinding import open_or_draw_key, same_conditions
+from study_app.store.checksums import sha256
+from study_app.store.journal import Journal, Line, SessionClock
+from study_app.store.layout import SessionFolder, locate
+from study_app.store.open_session import Place, SessionStore
+from study_app.store.opening import open_alone
+from study_app.store.participants import write_participants
+from study_app.store.progress import attempts, progress_of
+from study_app.store.recorder import Lost, Recorded, event_of, recording_files
+from study_app.store.session import make_recorder, surroundings
+
+SHOWN_DIFFERENCES = 6
+SHOWN_LETTERS = 40
+
+
+def reopen(
+    session_folder: Path,
+    protocol: Protocol,
+    source: bytes,
+    *,
+    operator: str,
+    device: Mapping[str, Any],
+    screens: Mapping[str, Any],
+    now_ns: Callable[[], int] = time.monotonic_ns,
+    now: datetime | None = None,
+) -> SessionStore:
+    """Open an unfinished session to go on with it; ``progress.progress_of(store.lines)`` says where.
+
+    A torn tail of the journal is cut off, half-written files are taken away, and ``session_resumed`` is journalled with
+    the gap since the last line (null where the wall clock was set back, so that nobody knows). The session's clock goes
+    on from there, so that its times never go back.
+
+    Parameters
+    ----------
+    source : bytes
+        The protocol's file as it is; its hash must be the one the session began with.
+    now_ns : callable
+        The monotonic clock [ns] to go on with: the servo's.
+    now : datetime, optional
+        Wall time with its zone; by default the system's.
+
+    Raises
+    ------
+    StoreError
+        It is no session's folder, open in another program, finished, damaged, or of another protocol (the differences
+        are named where they are not blinded); the key is not in order; or the folder cannot be written. But for the
+        torn tail nothing has changed then.
+    """
+    study_folder, folder = locate(session_folder)
+    opening = open_alone(folder.path)
+    try:
+        contents = journal.whole(folder.journal)
+        start = _unfinished(folder, contents.lines)
+        place = Place(study_folder, folder, start["study"])
+        first = receipt.read(folder.receipt)
+        _same_protocol(place, first, start, protocol, source)
+        draw = stream(start["seed"], "blinding").random if start["simulated"] else None
+        key = open_or_draw_key(study_folder.path, protocol, draw)
+        gap_s, clock = _go_on(contents.lines, now_ns, now)
+        recorder = make_recorder(place, start, clock)
+        opened = Journal.reopen(folder.journal, contents, clock)
+    except BaseException:
+        opening.release()
+        raise
+    store = SessionStore(place, opened, key, first, opening, lines=contents.lines, recorder=recorder)
+    told = {"gap_s": gap_s, "operator": operator}
+    with contextlib.ExitStack() as failing:
+        failing.callback(store.close)
+        at_s = round(clock.seconds(), 6)
+        facts = {"torn_bytes": contents.torn_bytes, "device": device.get("name"), "version": study_app.__version__}
+        store.append("session_resumed", t_s=at_s, **told, **facts)
+        _sweep(folder)
+        for event, fields in _recordings_found(folder, contents.lines) if start.get("recordings") else ():
+            store.append(event, **fields)
+        store.note_resumed({"at": clock.at(at_s), **told, **surroundings(device, screens, clock)})
+        store.write_tables()
+        write_participants(study_folder, place.study)
+        failing.pop_all()
+    return store
+
+
+def difference(before: Any, after: Any, place: str = "") -> Iterator[str]:
+    """Yield what differs between two JSON values, each with its place: ``pages.consent.body: 'old' → 'new'``."""
+    if isinstance(before, dict) and isinstance(after, dict):
+        for name in {**before, **after}:
+            inside = f"{place}.{name}" if place else str(name)
+            if name not in after:
+                yield f"{inside}: {_short(before[name])} is gone"
+            elif name not in before:
+                yield f"{inside}: {_short(after[name])} is new"
+            else:
+                yield from difference(before[name], after[name], inside)
+    elif isinstance(before, list) and isinstance(after, list) and len(before) == len(after):
+        for index, (old, new) in enumerate(zip(before, after, strict=True), start=1):
+            yield from difference(old, new, f"{place}.{index}")
+    elif before != after:
+        yield f"{place}: {_short(before)} → {_short(after)}"
+
+
+def _short(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= SHOWN_LETTERS else f"{text[: SHOWN_LETTERS - 1]}…"
+
+
+def _unfinished(folder: SessionFolder, lines: list[Line]) -> Line:
+    """Return the first line of a session that can go on."""
+    if not lines:
+        raise StoreError(
+            f"{folder.journal} holds no line: the program ended before the session had begun; use a new session number"
+        )
+    done = progress_of(lines)
+    if done.ended is not None:
+        raise StoreError(
+            f"{folder.path} is finished ({done.ended}): it cannot go on; use a new session number for another visit"
+        )
+    return done.start
+
+
+def _same_protocol(place: Place, first: Mapping[str, Any], start: Line, protocol: Protocol, source: bytes) -> None:
+    """Refuse a protocol whose file is not the one the session began with, and say what differs."""
+    if protocol_hash(source) == start["protocol_hash"]:
+        return
+    found = list(difference(first["protocol"], json.loads(json.dumps(receipt.without_conditions(protocol)))))
+    if not same_conditions(place.study_folder.path, protocol):
+        found.append("conditions differ")
+    if not found:
+        found.append("comments, order or notation, nothing that is run")
+    listed = "; ".join(found[:SHOWN_DIFFERENCES])
+    more = f"; and {len(found) - SHOWN_DIFFERENCES} more" if len(found) > SHOWN_DIFFERENCES else ""
+    raise StoreError(
+        f"{place.folder.path} began with another protocol file and goes on with that one only: put it back, or use a "
+        f"new session number. What differs: {listed}{more}"
+    )
+
+
+def _go_on(lines: list[Line], now_ns: Callable[[], int], now: datetime | None) -> tuple[float | None, SessionClock]:
+    """Return the gap since the last line, if it is known [s], and the clock that goes on after it."""
+    now = now if now is not None else datetime.now().astimezone()
+    gap_s = (now - datetime.fromisoformat(lines[-1]["at"])).total_seconds()
+    shown_s = progress_of(lines).t_s + max(gap_s, 0.0)
+    clock = SessionClock(now_ns, now - timedelta(seconds=shown_s), shown_s=shown_s)
+    return (round(gap_s, 3) if gap_s >= 0 else None), clock
+
+
+def _sweep(folder: SessionFolder) -> None:
+    sweep(folder.path)
+    if is_there(folder.recordings):
+        sweep(folder.recordings)
+
+
+def _recordings_found(folder: SessionFolder, lines: list[Line]) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield the lines about recordings that the ended program did not write: whole after all, or lost."""
+    from study_app.store import recording  # noqa: PLC0415 - loads the Parquet library, where there are recordings
+
+    told = {(line["trial"], line["attempt"]) for line in lines if line["event"] in ("recorded", "recording_lost")}
+    for trial, attempt in attempts(lines):
+        if (trial, attempt) in told:
+            continue
+        samples, frames = recording_files(folder.recordings, trial, attempt)
+        try:
+            facts = recording.read_facts(samples)
+            shown = recording.Written(frames, recording.read_facts(frames)["rows"], sha256(frames))
+            felt = recording.Written(samples, facts["rows"], sha256(samples))
+            yield event_of(Recorded(trial, attempt, felt, shown, facts["dropped"]))
+        except StoreError:
+            yield event_of(Lost(trial, attempt, "the program ended before it was whole"))

@@ -1,0 +1,144 @@
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from study_app.errors import StoreError
+from study_app.protocol.model import Protocol
+from study_app.protocol.schedule import PageStep, build_schedule
+from study_app.store.progress import Given, Progress, progress, progress_of
+from study_app.store.session import SessionStore
+
+
+def lines_of(*events: dict[str, Any]) -> list[dict[str, Any]]:
+    start = {"event": "session_started", "participant": "P007", "seed": 11}
+    numbered = enumerate((start, *events), start=1)
+    return [{"n": number, "t_s": number / 2, **event} for number, event in numbered]
+
+
+def shown(page: str) -> dict[str, Any]:
+    return {"event": "page_shown", "page": page}
+
+
+def left(page: str) -> dict[str, Any]:
+    return {"event": "page_left", "page": page}
+
+
+def started(trial: int, attempt: int = 1) -> dict[str, Any]:
+    return {"event": "trial_started", "trial": trial, "attempt": attempt}
+
+
+def ended(trial: int, attempt: int = 1, outcome: str = "complete") -> dict[str, Any]:
+    return {"event": "trial_ended", "trial": trial, "attempt": attempt, "outcome": outcome}
+
+
+def chosen(item: str, value: int | None, at_s: float) -> dict[str, Any]:
+    return {"event": "choice", "trial": 1, "item": item, "value": value, "t_s": at_s}
+
+
+ENDED = {"event": "session_ended", "status": "aborted"}
+ANSWERED = {"event": "responses", "trial": 1, "attempt": 1, "items": []}
+
+
+@pytest.mark.parametrize(
+    ("events", "step", "under_way"),
+    [
+        ([], 0, {}),
+        ([shown("consent")], 0, {"page": "consent"}),
+        ([shown("consent"), left("consent")], 1, {}),
+        ([shown("consent"), left("consent"), started(1)], 1, {"trial": 1, "attempt": 1}),
+        ([started(1), ended(1)], 0, {"trial": 1, "attempt": 1, "task_done": True}),
+        ([started(1), ended(1, outcome="timeout")], 0, {"trial": 1, "attempt": 1, "task_done": True}),
+        ([started(1), ended(1, outcome="interrupted")], 0, {"trial": 1, "attempt": 1}),
+        ([started(1), ended(1), started(1, 2)], 0, {"trial": 1, "attempt": 2}),
+        ([started(1), ended(1), ANSWERED], 1, {}),
+        ([started(1), ended(1), started(2)], 1, {"trial": 2, "attempt": 1}),
+        ([started(1), ended(1), shown("rest")], 1, {"page": "rest"}),
+        ([shown("rest"), {"event": "session_resumed"}, shown("rest")], 0, {"page": "rest", "resumed": 1}),
+        ([started(1), {"event": "broke", "what": "device"}], 0, {"trial": 1, "attempt": 1}),
+        (
+            [started(1), {"event": "session_ended", "status": "aborted"}],
+            0,
+            {"trial": 1, "attempt": 1, "ended": "aborted"},
+        ),
+    ],
+)
+def test_it_stands_at_the_first_step_that_was_not_left(
+    events: list[dict[str, Any]], step: int, under_way: dict[str, Any]
+) -> None:
+    lines = lines_of(*events)
+    assert progress_of(lines) == Progress(lines[0], step=step, t_s=progress_of(lines).t_s, **under_way)
+
+
+def test_choices_of_the_attempt_are_told_as_they_would_be_answered() -> None:
+    lines = lines_of(
+        started(1),
+        {"event": "item_shown", "trial": 1, "item": "wet", "t_s": 3.0},
+        chosen("wet", 3, 3.5),
+        ended(1),
+        {"event": "item_shown", "trial": 1, "item": "wet", "t_s": 4.0},
+        {"event": "item_shown", "trial": 1, "item": "calm", "t_s": 4.0},
+        {"event": "item_shown", "trial": 1, "item": "wet", "t_s": 9.0},
+        chosen("wet", 5, 5.0),
+        chosen("wet", 5, 6.0),
+        chosen("wet", None, 7.0),
+    )
+    told = progress_of(lines)
+    assert told.answers["wet"] == Given(onset_s=3.0, first_s=3.5, last_s=7.0, changes=2, value=None)
+    assert told.answers["calm"] == Given(onset_s=4.0)
+
+
+def test_a_new_attempt_forgets_the_choices_of_the_one_before() -> None:
+    lines = lines_of(started(1), ended(1), chosen("wet", 5, 5.0), started(1, 2), ended(1, 2))
+    assert progress_of(lines).answers == {}
+
+
+def test_the_latest_moment_counts_however_lines_are_ordered() -> None:
+    assert progress_of(lines_of(shown("a"), chosen("wet", 1, 80.0), left("a"))).t_s == 80.0
+
+
+def test_wherever_a_session_stops_it_stands_where_its_schedule_was(
+    protocol: Protocol, start: Callable[..., SessionStore], attend: Callable[[SessionStore], None]
+) -> None:
+    """Cut after every line of a whole session: steps are left one by one, in the schedule's order."""
+    store = start()
+    store.append("page_shown", page="consent")
+    store.append("page_left", page="consent")
+    attend(store)
+    steps = build_schedule(protocol, "P007", 11).steps
+    stands = [progress_of(store.lines[:count]) for count in range(1, len(store.lines) + 1)]
+    store.close()
+    for told in stands:
+        step = steps[told.step] if told.step < len(steps) else None
+        if told.page is not None:
+            assert step == PageStep(told.page)
+        if told.trial is not None:
+            assert step is not None
+            assert not isinstance(step, PageStep)
+            assert step.number == told.trial
+    assert all(0 <= after.step - before.step <= 1 for before, after in itertools.pairwise(stands))
+    assert (stands[0].step, stands[-1].step) == (0, len(steps))
+
+
+def test_a_torn_line_counts_as_never_written(start: Callable[..., SessionStore]) -> None:
+    with start() as store:
+        store.append("page_shown", page="consent")
+    with store.folder.journal.open("ab") as file:
+        file.write(b'{"n":3,"event":"page_left"')
+    assert (progress(store.folder.path).step, progress(store.folder.path).page) == (0, "consent")
+
+
+def test_what_is_no_session_is_named(tmp_path: Path, start: Callable[..., SessionStore]) -> None:
+    with pytest.raises(StoreError, match="is no session's folder: name one such as"):
+        progress(tmp_path)
+    with pytest.raises(StoreError, match="does not begin with session_started"):
+        progress_of([])
+    with start() as store:
+        pass
+    store.folder.journal.unlink()
+    with pytest.raises(StoreError, match=r"journal\.jsonl cannot be read"):
+        progress(store.folder.path)
