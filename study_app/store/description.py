@@ -16,6 +16,19 @@ from study_app.store.atomic import cannot_read, is_there, write_file
 from study_app.store.columns import every_column, variable
 from study_app.store.layout import StudyFolder
 
+# What a study folder holds beside tables; patterns as in .gitignore.
+IGNORED = b"""\
+.psychds-ignore
+.*.tmp
+.open-*.json
+journal.jsonl
+receipt.json
+checksums.sha256
+recordings/
+blinding/
+exclusions.csv
+"""
+
 
 def description_bytes(study: StudyHead) -> bytes:
     """Return the file for ``study``; the same bytes for the same study on every machine."""
@@ -37,6 +50,8 @@ def write_description(folder: StudyFolder, study: StudyHead) -> None:
     content = description_bytes(study)
     if not is_there(folder.description) or _read(folder.description) != content:
         write_file(folder.description, content)
+    if not is_there(folder.ignore):
+        write_file(folder.ignore, IGNORED)
 
 
 def described_study(folder: StudyFolder) -> str | None:

@@ -1,0 +1,60 @@
+"""The column dictionary as text: the tables of README's section "What is on disk"."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from study_app.store.columns import EXCLUSIONS, MISSING, PARTICIPANTS, RESPONSES, TRIALS, Column
+from study_app.store.events import EVENTS
+from study_app.store.recorded_columns import FRAMES, SAMPLES
+
+SECTIONS: tuple[tuple[str, str, Sequence[Column]], ...] = (
+    ("Responses", "`subject-…_description-responses_data.csv`, a row a response", RESPONSES),
+    ("Trials", "`subject-…_description-trials_data.csv`, a row a presentation of a trial", TRIALS),
+    ("Participants", "`study-…_description-participants_data.csv`, a row a session", PARTICIPANTS),
+    ("Exclusions", "`exclusions.csv`, a row a session or trial that the analysis leaves out", EXCLUSIONS),
+    ("Samples", "`recordings/trial-….parquet`, a row a turn of the servo", SAMPLES),
+    ("Frames", "`recordings/trial-…_frames.parquet`, a row a frame shown", FRAMES),
+)
+
+_KINDS = {"integer": "whole number", "flag": "true, false", "time": "ISO 8601"}
+
+
+def dictionary_markdown() -> str:
+    """Return every file's columns, and the journal's events, as Markdown tables: names, kinds or levels, meanings."""
+    return "\n".join((*(_section(title, file, columns) for title, file, columns in SECTIONS), _journal()))
+
+
+def _section(title: str, file: str, columns: Sequence[Column]) -> str:
+    rows = [f"| `{column.name}` | {_kind(column)} | {_meaning(column)} |" for column in columns]
+    return "\n".join((f"**{title}** ({file})", "", "| column | kind | meaning |", "| --- | --- | --- |", *rows, ""))
+
+
+def _journal() -> str:
+    head = (
+        "**Journal** (`journal.jsonl`, a line an event)",
+        "",
+        "Every line has `n` (from 1, without a gap), `event`, `t_s` (on the session's clock) and `at` (ISO 8601).",
+        "",
+        "| event | fields | meaning |",
+        "| --- | --- | --- |",
+    )
+    fields = [", ".join(f"`{name}`" for name in event.fields) for event in EVENTS]
+    rows = [
+        f"| `{event.name}` | {listed} | {event.description} |" for event, listed in zip(EVENTS, fields, strict=True)
+    ]
+    return "\n".join((*head, *rows, ""))
+
+
+def _kind(column: Column) -> str:
+    kind = ", ".join(f"`{level}`" for level, _ in column.levels) or _KINDS.get(column.kind, column.kind)
+    bounds = (column.minimum, column.maximum)
+    if column.maximum is not None:
+        kind += f", {bounds[0]:g} to {bounds[1]:g}"
+    unit = f" [{column.unit}]" if column.unit else ""
+    return f"{kind}{unit}" + (f", or {MISSING}" if column.may_miss else "")
+
+
+def _meaning(column: Column) -> str:
+    levels = "; ".join(f"`{level}`: {meaning}" for level, meaning in column.levels)
+    return f"{column.description} {levels}." if levels else column.description

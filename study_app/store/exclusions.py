@@ -1,0 +1,142 @@
+"""What the analysis leaves out, by which rule or person and why. Data are never deleted; this list says what counts."""
+
+from __future__ import annotations
+
+import csv
+import io
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+
+from study_app.errors import StoreError
+from study_app.store import journal
+from study_app.store.atomic import cannot_read, write_file
+from study_app.store.columns import EXCLUSIONS, MISSING, header
+from study_app.store.layout import StudyFolder
+from study_app.store.opening import open_alone
+from study_app.store.progress import attempts
+from study_app.store.tables import csv_bytes
+
+NAMED_IDS = 6
+
+
+@dataclass(frozen=True, slots=True)
+class Exclusion:
+    """One session, or one trial of it, that is left out; a row of ``exclusions.csv``."""
+
+    participant: str
+    session: int
+    trial: int | None
+    rule_or_person: str
+    reason: str
+    excluded_at: str
+
+    @property
+    def what(self) -> tuple[str, int, int | None]:
+        """Participant, session and trial."""
+        return self.participant, self.session, self.trial
+
+
+def exclude(
+    folder: Path,
+    participant: str,
+    session: int,
+    *,
+    trial: int | None = None,
+    by: str,
+    reason: str,
+    now: datetime | None = None,
+) -> Exclusion:
+    """Leave a session of the study in ``folder``, or one of its trials, out of the analysis.
+
+    Parameters
+    ----------
+    by : str
+        The rule, or the initials of the person.
+    now : datetime, optional
+        Wall time with its zone; by default the system's.
+
+    Raises
+    ------
+    StoreError
+        There is no such session or trial, it is excluded already, ``by`` or ``reason`` is empty, or the list cannot be
+        read or written.
+    """
+    for name, text in (("by", by), ("reason", reason)):
+        if not text.strip():
+            raise StoreError(f"--{name} is empty: leaving data out is recorded with a rule or name, and a reason")
+    study = StudyFolder(folder)
+    _check_there(study, participant, session, trial)
+    at = (now if now is not None else datetime.now().astimezone()).isoformat(timespec="milliseconds")
+    new = Exclusion(participant, session, trial, by.strip(), reason.strip(), at)
+    opening = open_alone(folder)
+    try:
+        rows = exclusions(folder)
+        for row in rows:
+            if row.what in (new.what, (participant, session, None)):
+                raise StoreError(f"{named(new)} is left out already, since {row.excluded_at} ({row.reason})")
+        write_file(study.exclusions, exclusion_bytes((*rows, new)))
+    finally:
+        opening.release()
+    return new
+
+
+def exclusions(folder: Path) -> tuple[Exclusion, ...]:
+    """Return what is left out of the study in ``folder``, in the order of the decisions.
+
+    Raises
+    ------
+    StoreError
+        The list cannot be read, or a row of it makes no sense.
+    """
+    path = StudyFolder(folder).exclusions
+    try:
+        text = path.read_bytes().decode("utf-8")
+    except FileNotFoundError:
+        return ()
+    except OSError as error:
+        raise cannot_read(path, error) from error
+    except UnicodeDecodeError as error:
+        raise StoreError(f"{path} is no UTF-8: save it as CSV in UTF-8") from error
+    names, *rows = list(csv.reader(io.StringIO(text, newline=""))) or [[]]
+    if tuple(names) != header(EXCLUSIONS):
+        raise StoreError(f"{path}: its columns must be {', '.join(header(EXCLUSIONS))}, found {', '.join(names)}")
+    return tuple(_exclusion(path, number, row) for number, row in enumerate(rows, start=2))
+
+
+def exclusion_bytes(rows: tuple[Exclusion, ...]) -> bytes:
+    """Return ``exclusions.csv``."""
+    return csv_bytes(EXCLUSIONS, [{name: getattr(row, name) for name in header(EXCLUSIONS)} for row in rows])
+
+
+def _exclusion(path: Path, number: int, row: list[str]) -> Exclusion:
+    try:
+        participant, session, trial, by, reason, at = row
+        return Exclusion(participant, int(session), None if trial == MISSING else int(trial), by, reason, at)
+    except ValueError as error:
+        raise StoreError(f"{path}, row {number}: {','.join(row)!r} is no exclusion: mend or remove the row") from error
+
+
+def _check_there(study: StudyFolder, participant: str, session: int, trial: int | None) -> None:
+    place = study.session(participant, session)
+    if place not in study.sessions():
+        known = [str(one.number) for one in study.sessions() if one.participant == participant]
+        its = f"sessions of that participant: {', '.join(known)}" if known else f"participants: {_few(study.ids())}"
+        raise StoreError(f"{study.path} has no session {session} of participant {participant}; {its}")
+    if trial is None:
+        return
+    presented = {number for number, _ in attempts(journal.read(place.journal))}
+    if trial not in presented:
+        listed = ", ".join(map(str, sorted(presented))) or "none"
+        raise StoreError(f"participant {participant}, session {session} has no trial {trial}: it has {listed}")
+
+
+def _few(ids: tuple[str, ...]) -> str:
+    shown = ", ".join(ids[:NAMED_IDS]) or "none"
+    return f"{shown} … {ids[-1]}" if len(ids) > NAMED_IDS else shown
+
+
+def named(row: Exclusion) -> str:
+    """Return what is left out, in words."""
+    trial = "" if row.trial is None else f", trial {row.trial}"
+    return f"participant {row.participant}, session {row.session}{trial}"

@@ -1,0 +1,227 @@
+"""One session against its journal, its receipt, its checksums and its recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from itertools import zip_longest
+from pathlib import Path
+from typing import Any
+
+from study_app.errors import StoreError
+from study_app.store import cells, journal, receipt
+from study_app.store.atomic import is_there, temporaries
+from study_app.store.checksums import files, read_checksums, sha256
+from study_app.store.columns import TABLES
+from study_app.store.events import lacking_fields, unknown_events
+from study_app.store.findings import Gathered
+from study_app.store.journal import Line
+from study_app.store.layout import SessionFolder
+from study_app.store.open_session import Place, table_files
+from study_app.store.opening import is_open
+from study_app.store.progress import attempts, progress_of
+
+READERS = 4  # files whose checksums are computed at the same time
+
+
+def check_session(place: Place, key_hash: str | None, found: Gathered) -> list[Line]:
+    """Check one session and return its journal's lines, as far as they can be read."""
+    folder = place.folder
+    for path in (*temporaries(folder.path), *temporaries(folder.recordings)):
+        found.warning(path, "was left half-written by a program that was ended; rebuild takes it away")
+    lines = _journal(folder, found)
+    _receipt(folder, lines, key_hash, found)
+    if not lines:
+        return lines
+    _place(place, lines[0], found)
+    _tables(place, lines, found)
+    hashes = _hashes(folder)
+    _checksums(folder, lines, hashes, found)
+    _recordings(folder, lines, hashes, found)
+    return lines
+
+
+def _journal(folder: SessionFolder, found: Gathered) -> list[Line]:
+    if not is_there(folder.journal):
+        found.warning(folder.path, "was claimed, and its program was ended before it wrote a journal")
+        return []
+    try:
+        contents = journal.scan(folder.journal)
+    except StoreError as error:
+        found.failure(folder.journal, error)
+        return []
+    if contents.damage is not None:
+        found.error(folder.journal, contents.damage.removeprefix(f"{folder.journal}, "))
+    if contents.torn_bytes:
+        found.warning(folder.journal, f"its last {contents.torn_bytes} bytes are a line that was never finished")
+    if not contents.lines:
+        found.warning(folder.journal, "holds no whole line: nothing was recorded")
+        return []
+    if lacking := list(lacking_fields(contents.lines)):
+        more = f"; and {len(lacking) - 1} more lines" if len(lacking) > 1 else ""
+        found.error(folder.journal, f"{lacking[0]}{more}")
+        return []
+    for name in unknown_events(contents.lines):
+        found.warning(folder.journal, f"has events {name!r}, which this version does not know")
+    try:
+        done = progress_of(contents.lines)
+    except StoreError as error:
+        found.error(folder.journal, str(error))
+        return []
+    if done.ended is None:
+        runs = "runs in another program" if is_open(folder.path) else "is unfinished: resume it, or leave it so"
+        found.warning(folder.path, runs)
+    elif contents.lines[-1]["event"] != "session_ended":
+        found.error(folder.journal, "lines follow the session's end")
+    return contents.lines
+
+
+def _receipt(folder: SessionFolder, lines: list[Line], key_hash: str | None, found: Gathered) -> None:
+    path = folder.receipt
+    if not lines and not is_there(path):
+        return  # claimed and never begun
+    try:
+        held = receipt.read(path)
+    except StoreError as error:
+        found.failure(path, error)
+        return
+    if missing := [name for name in receipt.FIELDS if name not in held]:
+        found.error(path, f"lacks {', '.join(missing)}")
+    if key_hash is not None and held["key_hash"] != key_hash:
+        found.error(path, "published another key's hash than that of the sealed key")
+    if not lines:
+        return
+    if differing := [name for name in receipt.FACTS if name in held and held[name] != lines[0].get(name)]:
+        found.error(path, f"{', '.join(differing)}: not as in the journal")
+    last = lines[-1]
+    status = last["status"] if last["event"] == "session_ended" else receipt.UNFINISHED
+    if held.get("status") != status:
+        found.error(path, f"its status is {held.get('status')!r}, the journal's {status!r}; rebuild renews it")
+
+
+def _place(place: Place, start: Line, found: Gathered) -> None:
+    expected = {"participant": place.folder.participant, "session": place.folder.number, "study": place.study}
+    for name, value in expected.items():
+        if start.get(name) != value:
+            found.error(place.folder.journal, f"is of {name} {start.get(name)!r}, and lies among those of {value!r}")
+
+
+def _tables(place: Place, lines: list[Line], found: Gathered) -> None:
+    try:
+        expected = table_files(place, lines)
+    except StoreError as error:
+        found.error(place.folder.journal, f"gives no tables: {error}")
+        return
+    ended = lines[-1]["event"] == "session_ended"
+    for (path, content), name in zip(expected, ("responses", "trials"), strict=True):
+        check_table(path, content, name, found, may_be_behind=lambda _: not ended)
+
+
+def check_table(
+    path: Path, expected: bytes, name: str, found: Gathered, *, may_be_behind: Callable[[int], bool]
+) -> None:
+    """Compare a table with what the journals give, and its cells with the dictionary.
+
+    ``may_be_behind`` says of a line's number whether it is of a session that has not ended, whose tables follow its
+    journal with the next page or when it is rebuilt.
+    """
+    try:
+        content = path.read_bytes()
+    except OSError:
+        found.error(path, "is missing or cannot be read; rebuild makes it again")
+        return
+    if differing := _differing_lines(content, expected):
+        tell = found.warning if all(map(may_be_behind, differing)) else found.error
+        tell(path, f"is not what the journal gives, from line {differing[0]} on; rebuild renews it")
+    for problem in cells.problems(content, TABLES[name]):
+        found.error(path, problem)
+
+
+def _differing_lines(content: bytes, expected: bytes) -> list[int]:
+    pairs = zip_longest(content.split(b"\n"), expected.split(b"\n"))
+    return [number for number, (ours, theirs) in enumerate(pairs, start=1) if ours != theirs]
+
+
+def _hashes(folder: SessionFolder) -> dict[str, str]:
+    """Return the checksums of the session's files as they are now; a file that cannot be read has none."""
+
+    def hashed(name: str) -> str:
+        try:
+            return sha256(folder.path / name)
+        except StoreError:
+            return ""
+
+    names = files(folder)
+    with ThreadPoolExecutor(READERS) as readers:
+        return dict(zip(names, readers.map(hashed, names), strict=True))
+
+
+def _checksums(folder: SessionFolder, lines: list[Line], hashes: Mapping[str, str], found: Gathered) -> None:
+    if lines[-1]["event"] != "session_ended":
+        return
+    with found.reading(folder.checksums):
+        listed = read_checksums(folder)
+        for name in sorted(listed.keys() | hashes.keys()):
+            path = folder.path / name
+            if name not in hashes:
+                found.error(path, "is missing")
+            elif name not in listed:
+                found.error(path, "has come since the session ended")
+            elif not hashes[name]:
+                found.error(path, "cannot be read")
+            elif hashes[name] != listed[name]:
+                found.error(path, "has changed since the session ended (its checksum differs)")
+
+
+def _recordings(folder: SessionFolder, lines: list[Line], hashes: Mapping[str, str], found: Gathered) -> None:
+    """Check that every recording the journal tells of is there, whole and of this trial, and no other."""
+    told: set[str] = set()
+    known: set[tuple[int, int]] = set()
+    for line in lines:
+        if line["event"] not in ("recorded", "recording_lost"):
+            continue
+        which = f"trial {line['trial']}, attempt {line['attempt']}"
+        known.add((line["trial"], line["attempt"]))
+        if line["event"] == "recording_lost":
+            found.warning(folder.recordings, f"{which} has none: {line['reason']}")
+            continue
+        if line["samples_unrecorded"]:
+            found.warning(folder.path / line["recording"], f"lacks {line['samples_unrecorded']} samples")
+        for kind, name, rows, digest in (
+            ("samples", line["recording"], line["samples_recorded"], line["sha256"]),
+            ("frames", line["recording_frames"], line["frames_recorded"], line["frames_sha256"]),
+        ):
+            told.add(name)
+            if name not in hashes:
+                found.error(folder.path / name, f"is missing, though the journal tells of it ({which})")
+                continue
+            if hashes[name] != digest:
+                found.error(folder.path / name, f"has changed since it was recorded ({which})")
+            _facts(folder, line, kind, name, rows, found)
+    ends = lines[-1]["event"] == "session_ended"
+    if lines[0].get("recordings"):
+        for trial, attempt in attempts(lines)[: None if ends else -1]:
+            if (trial, attempt) not in known:
+                found.warning(folder.recordings, f"trial {trial}, attempt {attempt} has none, and no line says why")
+    for name in sorted(hashes.keys() - told):
+        if name.endswith(".parquet"):
+            found.warning(folder.path / name, "is in no line of the journal; resuming the session takes it up")
+
+
+def _facts(folder: SessionFolder, line: Line, kind: str, name: str, rows: int, found: Gathered) -> None:
+    from study_app.store import recording  # noqa: PLC0415 - loads the Parquet library, where there are recordings
+
+    path = folder.path / name
+    with found.reading(path):
+        facts: dict[str, Any] = recording.read_facts(path)
+        expected = {
+            "participant": folder.participant,
+            "session": folder.number,
+            "trial": line["trial"],
+            "attempt": line["attempt"],
+            "kind": kind,
+            "rows": rows,
+        }
+        for fact, value in expected.items():
+            if facts.get(fact) != value:
+                found.error(path, f"holds {fact} {facts.get(fact)!r}, the journal says {value!r}")

@@ -1,0 +1,177 @@
+from __future__ import annotations
+
+import csv
+import io
+import subprocess
+import sys
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from datetime import datetime, timedelta, timezone
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from study_app.errors import StoreError
+from study_app.store.exclusions import Exclusion, exclude, exclusions
+from study_app.store.opening import is_open
+from study_app.store.session import SessionStore
+
+FullDisk = Callable[[int], AbstractContextManager[None]]
+
+NOW = datetime(2026, 3, 2, 9, 30, tzinfo=timezone(timedelta(hours=1)))
+AWKWARD = 'comma, "quote"\nnew line\ttab 🌊 =SUM(A1) ' + "é" * 10_000
+
+
+@pytest.fixture
+def folder(tmp_path: Path, start: Callable[..., SessionStore], attend: Callable[[SessionStore], None]) -> Path:
+    """P007 with five trials, P008 with none."""
+    store = start()
+    attend(store)
+    store.finish("completed")
+    start("P008").finish("withdrawn")
+    return tmp_path / "study"
+
+
+def test_a_session_and_a_trial_are_left_out_with_their_reasons(folder: Path) -> None:
+    assert exclusions(folder) == ()
+    first = exclude(folder, "P008", 1, by="rule 3", reason="withdrew", now=NOW)
+    second = exclude(folder, "P007", 1, trial=2, by=" AB ", reason=" the phone rang ", now=NOW)
+    assert first == Exclusion("P008", 1, None, "rule 3", "withdrew", "2026-03-02T09:30:00.000+01:00")
+    assert second == Exclusion("P007", 1, 2, "AB", "the phone rang", "2026-03-02T09:30:00.000+01:00")
+    assert exclusions(folder) == (first, second)
+    assert (folder / "exclusions.csv").read_text(encoding="utf-8") == (
+        "participant,session,trial,rule_or_person,reason,excluded_at\n"
+        "P008,1,n/a,rule 3,withdrew,2026-03-02T09:30:00.000+01:00\n"
+        "P007,1,2,AB,the phone rang,2026-03-02T09:30:00.000+01:00\n"
+    )
+
+
+def test_no_data_are_touched(folder: Path) -> None:
+    before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    exclude(folder, "P007", 1, by="AB", reason="tired")
+    after = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    assert {path for path in after if after[path] != before.get(path)} == {folder / "exclusions.csv"}
+
+
+def test_any_reason_comes_back(folder: Path) -> None:
+    exclude(folder, "P007", 1, by="AB", reason=AWKWARD)
+    exclude(folder, "P008", 1, by="AB", reason="after it")
+    assert [row.reason for row in exclusions(folder)] == [AWKWARD.strip(), "after it"]
+    text = (folder / "exclusions.csv").read_bytes().decode()
+    assert [row["reason"] for row in csv.DictReader(io.StringIO(text, newline=""))] == [AWKWARD.strip(), "after it"]
+
+
+@pytest.mark.parametrize(
+    ("given", "sentence"),
+    [
+        ({"participant": "P009"}, "has no session 1 of participant P009; participants: P007, P008"),
+        ({"session": 2}, "has no session 2 of participant P007; sessions of that participant: 1"),
+        ({"trial": 9}, "participant P007, session 1 has no trial 9: it has 1, 2, 3, 4, 5"),
+        ({"participant": "P008", "trial": 1}, "participant P008, session 1 has no trial 1: it has none"),
+        ({"by": " "}, "--by is empty"),
+        ({"reason": ""}, "--reason is empty"),
+    ],
+)
+def test_what_cannot_be_left_out_is_refused_untouched(folder: Path, given: dict[str, Any], sentence: str) -> None:
+    arguments: dict[str, Any] = {"participant": "P007", "session": 1, "by": "AB", "reason": "tired"}
+    with pytest.raises(StoreError) as refusal:
+        exclude(folder, **(arguments | given))
+    assert sentence in str(refusal.value)
+    assert "\n" not in str(refusal.value)
+    assert not (folder / "exclusions.csv").exists()
+    assert not is_open(folder)
+
+
+def test_what_is_left_out_already_is_refused(folder: Path) -> None:
+    exclude(folder, "P007", 1, trial=2, by="AB", reason="the phone rang", now=NOW)
+    with pytest.raises(
+        StoreError, match=r"session 1, trial 2 is left out already, since 2026-03-02.*\(the phone rang\)"
+    ):
+        exclude(folder, "P007", 1, trial=2, by="CD", reason="again")
+    exclude(folder, "P007", 1, by="AB", reason="all of it")
+    with pytest.raises(StoreError, match=r"trial 3 is left out already.*\(all of it\)"):
+        exclude(folder, "P007", 1, trial=3, by="CD", reason="again")
+    assert len(exclusions(folder)) == 2
+
+
+def test_many_participants_are_not_all_listed(tmp_path: Path, start: Callable[..., SessionStore]) -> None:
+    for number in range(1, 9):
+        start(f"P{number:03d}").finish("completed")
+    with pytest.raises(StoreError, match=r"participants: P001, P002, P003, P004, P005, P006 … P008$"):
+        exclude(tmp_path / "study", "P099", 1, by="AB", reason="tired")
+
+
+def test_a_full_disk_leaves_the_list_as_it_was(folder: Path, files_up_to: FullDisk) -> None:
+    exclude(folder, "P008", 1, by="AB", reason="withdrew")
+    before = (folder / "exclusions.csv").read_bytes()
+    with files_up_to(2000), pytest.raises(StoreError, match=r"exclusions\.csv cannot be written \(File too large\)"):
+        exclude(folder, "P007", 1, by="AB", reason=AWKWARD)
+    assert (folder / "exclusions.csv").read_bytes() == before
+    exclude(folder, "P007", 1, by="AB", reason="tired")
+    assert len(exclusions(folder)) == 2
+
+
+@pytest.mark.parametrize(
+    ("content", "sentence"),
+    [
+        (b"", "its columns must be participant, session, trial, rule_or_person, reason, excluded_at, found "),
+        (b"participant,why\n", "found participant, why"),
+        (b"\xff", "is no UTF-8"),
+        (
+            b"participant,session,trial,rule_or_person,reason,excluded_at\nP007,one,1,AB,x,y\n",
+            "row 2: 'P007,one,1,AB,x,y'",
+        ),
+        (b"participant,session,trial,rule_or_person,reason,excluded_at\nP007,1\n", "row 2: 'P007,1' is no exclusion"),
+    ],
+)
+def test_a_list_that_makes_no_sense_is_named(folder: Path, content: bytes, sentence: str) -> None:
+    (folder / "exclusions.csv").write_bytes(content)
+    with pytest.raises(StoreError) as refusal:
+        exclusions(folder)
+    assert sentence in str(refusal.value)
+    with pytest.raises(StoreError):
+        exclude(folder, "P007", 1, by="AB", reason="tired")
+    assert (folder / "exclusions.csv").read_bytes() == content
+
+
+EXCLUDER = """
+import sys
+from pathlib import Path
+from study_app.errors import StoreError
+from study_app.store.exclusions import exclude
+print("ready", flush=True)
+for line in sys.stdin:
+    participant, by = line.split()
+    try:
+        exclude(Path(sys.argv[1]), participant, 1, by=by, reason="tired")
+    except StoreError as error:
+        print("refused", error, flush=True)
+    else:
+        print("excluded", flush=True)
+"""
+
+
+def test_of_two_people_at_once_no_decision_is_lost(tmp_path: Path, start: Callable[..., SessionStore]) -> None:
+    """Whoever is told that it was written finds it in the list; the other is told to try again."""
+    for number in range(40):
+        start(f"P{number:03d}").finish("completed")
+    command = [sys.executable, "-c", EXCLUDER, str(tmp_path / "study")]
+    people = [subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) for _ in range(2)]
+    done = []
+    try:
+        assert [one.stdout.readline() for one in people if one.stdout] == ["ready\n"] * 2
+        for number in range(0, 40, 2):
+            for which, one in enumerate(people):
+                assert one.stdin
+                one.stdin.write(f"P{number + which:03d} {'AB'[which]}\n")
+                one.stdin.flush()
+            for which, one in enumerate(people):
+                assert one.stdout
+                told = one.stdout.readline()
+                assert told == "excluded\n" or "is open in another program" in told
+                done += [f"P{number + which:03d}"] if told == "excluded\n" else []
+    finally:
+        for one in people:
+            one.communicate()
+    assert sorted(row.participant for row in exclusions(tmp_path / "study")) == sorted(done)

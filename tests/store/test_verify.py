@@ -1,0 +1,315 @@
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from study_app.errors import StoreError
+from study_app.protocol.model import Protocol
+from study_app.protocol.schedule import build_schedule
+from study_app.store import blinding, journal, receipt
+from study_app.store.exclusions import exclude
+from study_app.store.session import SessionStore
+from study_app.store.verify import Findings, verify
+
+SESSION = "data/sub-P007/ses-01"
+
+
+@pytest.fixture
+def study(
+    tmp_path: Path,
+    protocol: Protocol,
+    start: Callable[..., SessionStore],
+    samples_of: Callable[..., Any],
+    summary: dict[str, Any],
+    attend: Callable[[SessionStore], None],
+) -> Path:
+    """Two finished sessions: P007 with recordings, one trial of it presented twice; P008 withdrawn."""
+    store = start(recordings=True)
+    recorder = store.recorder
+    assert recorder is not None
+    for trial in build_schedule(protocol, "P007", 11).trials:
+        told = {name: getattr(trial, name) for name in ("block", "phase", "part", "index", "of", "code")}
+        for attempt in (1, 2) if trial.number == 2 else (1,):
+            store.append("trial_started", trial=trial.number, attempt=attempt, **told)
+            recorder.start(trial.number, attempt, 1000.0)
+            recorder.append(samples_of(500 + trial.number))
+            recorder.frame(9, 4)
+            recorder.stop()
+            store.append("trial_ended", trial=trial.number, attempt=attempt, outcome="complete", **summary)
+        items = [
+            {"item": item, "number": n, "value": 4, "onset_s": 1.5, "first_s": 2.25, "last_s": 2.25, "changes": 0}
+            for n, item in enumerate(trial.items, start=1)
+        ]
+        if items:
+            store.append("responses", trial=trial.number, attempt=attempt, items=items)
+        store.write_tables()
+    store.append("note", kind="mark", text='comma, "quote"\nnew line')
+    store.finish("completed")
+    start("P008").finish("withdrawn", "tired")
+    return tmp_path / "study"
+
+
+def told(findings: Findings) -> str:
+    return "\n".join(map(str, findings.errors))
+
+
+def warned(findings: Findings) -> str:
+    return "\n".join(map(str, findings.warnings))
+
+
+def test_what_was_written_is_found_sound(study: Path) -> None:
+    findings = verify(study)
+    assert (findings.errors, findings.warnings, findings.psychds.errors) == ((), (), ())
+    assert findings.sound
+    assert findings.sessions == 2
+
+
+def test_nothing_is_changed_by_looking(study: Path) -> None:
+    before = {path: (path.stat().st_mtime_ns, path.is_file() and path.read_bytes()) for path in study.rglob("*")}
+    verify(study)
+    after = {path: (path.stat().st_mtime_ns, path.is_file() and path.read_bytes()) for path in study.rglob("*")}
+    assert after == before
+
+
+def replace(old: str, new: str, count: int = 1) -> Callable[[Path], None]:
+    def act(path: Path) -> None:
+        text = path.read_bytes()
+        assert old.encode() in text
+        path.write_bytes(text.replace(old.encode(), new.encode(), count))
+
+    return act
+
+
+def append(content: bytes) -> Callable[[Path], None]:
+    return lambda path: path.write_bytes(path.read_bytes() + content)
+
+
+def without_line(number: int) -> Callable[[Path], None]:
+    def act(path: Path) -> None:
+        lines = path.read_bytes().splitlines(keepends=True)
+        path.write_bytes(b"".join(lines[: number - 1] + lines[number:]))
+
+    return act
+
+
+def of_receipt(**changes: Any) -> Callable[[Path], None]:
+    def act(path: Path) -> None:
+        held = receipt.read(path) | changes
+        receipt.write(path, {name: value for name, value in held.items() if value is not ...})
+
+    return act
+
+
+RESPONSES = f"{SESSION}/subject-P007_session-01_task-brackish_description-responses_data.csv"
+TRIALS = f"{SESSION}/subject-P007_session-01_task-brackish_description-trials_data.csv"
+PARTICIPANTS = "data/study-brackish_description-participants_data.csv"
+RECORDING = f"{SESSION}/recordings/trial-001.parquet"
+FRAMES = f"{SESSION}/recordings/trial-002_attempt-2_frames.parquet"
+
+
+@pytest.mark.parametrize(
+    ("name", "act", "sentence"),
+    [
+        (RESPONSES, replace(",4,", ",5,"), "is not what the journal gives, from line 2 on; rebuild renews it"),
+        (RESPONSES, append(b"x\n"), "is not what the journal gives, from line 14 on"),
+        (RESPONSES, append(b"x\n"), "row 14 has 1 cells, not 21"),
+        (RESPONSES, replace(",4,", ",9,"), "row 2, response: '9' is not a whole number from 1 to 7 or n/a"),
+        (RESPONSES, replace("number", "place"), "columns are missing: number"),
+        (RESPONSES, replace(",item,number,", ",number,item,"), "columns are in another order"),
+        (RESPONSES, Path.unlink, "is missing or cannot be read; rebuild makes it again"),
+        (TRIALS, replace("true", "True"), "'True' is not true or false or n/a"),
+        (TRIALS, replace(",9.0,", ",-9.0,"), "row 2, duration_s: '-9.0' is not a number of at least 0 or n/a"),
+        (TRIALS, replace("complete", "over"), "outcome: 'over' is not one of complete, timeout, interrupted or n/a"),
+        (PARTICIPANTS, replace("withdrawn", "completed"), "is not what the journal gives, from line 3 on"),
+        (f"{SESSION}/journal.jsonl", replace('"outcome":"complete"', '"outcome":"timeout"'), "checksum differs"),
+        (f"{SESSION}/journal.jsonl", without_line(3), "line 3: its n is 4: lines are missing or doubled"),
+        (f"{SESSION}/journal.jsonl", replace('"event":"trial_started"', '"event":'), "line 2: damaged"),
+        (f"{SESSION}/journal.jsonl", replace('"attempt":1', '"attempts":1'), "line 2 (trial_started) lacks attempt"),
+        (f"{SESSION}/journal.jsonl", replace('"seed":11', '"seed":12'), "seed: not as in the journal"),
+        (
+            f"{SESSION}/journal.jsonl",
+            replace('"participant":"P007"', '"participant":"P003"'),
+            "is of participant 'P003'",
+        ),
+        (f"{SESSION}/receipt.json", of_receipt(seed=12), "seed: not as in the journal"),
+        (f"{SESSION}/receipt.json", of_receipt(screens=...), "lacks screens"),
+        (f"{SESSION}/receipt.json", of_receipt(status="aborted"), "its status is 'aborted', the journal's 'completed'"),
+        (f"{SESSION}/receipt.json", of_receipt(key_hash="0" * 64), "another key's hash"),
+        (f"{SESSION}/receipt.json", append(b"}"), "is no receipt"),
+        (f"{SESSION}/receipt.json", Path.unlink, "receipt.json: cannot be read"),
+        (f"{SESSION}/checksums.sha256", Path.unlink, "checksums.sha256: cannot be read"),
+        (f"{SESSION}/checksums.sha256", append(b"\xff"), "is no list of checksums"),
+        (f"{SESSION}/mood.txt", lambda path: path.write_text("fine"), "mood.txt: has come since the session ended"),
+        (RECORDING, Path.unlink, "is missing, though the journal tells of it (trial 1, attempt 1)"),
+        (RECORDING, append(b"x"), "has changed since it was recorded (trial 1, attempt 1)"),
+        (RECORDING, lambda path: path.write_bytes(path.read_bytes()[:-9]), "is damaged"),
+        (
+            FRAMES,
+            lambda path: path.write_bytes((path.parent / "trial-001.parquet").read_bytes()),
+            "holds kind 'samples'",
+        ),
+        ("blinding/key.sealed", Path.unlink, "key.sealed: cannot be read"),
+        ("blinding/key.sealed", append(b"eA=="), "another key's hash than that of the sealed key"),
+        ("blinding/key.sealed", lambda path: path.write_bytes(b"***"), "is no sealed key any more"),
+        ("blinding/reveals.jsonl", lambda path: path.write_text('{"at":"now","by":"AB"}\n'), "reveal 1 lacks reason"),
+        ("dataset_description.json", replace("Brackish", "Brine"), "is not what this version writes"),
+        (
+            "exclusions.csv",
+            lambda path: path.write_text("participant\nP007\n"),
+            "its columns must be participant, session",
+        ),
+    ],
+)
+def test_what_is_not_as_it_was_is_found_and_named(
+    study: Path, name: str, act: Callable[[Path], Any], sentence: str
+) -> None:
+    act(study / name)
+    findings = verify(study)
+    assert not findings.sound
+    assert sentence in told(findings)
+    places = {error.place for error in findings.errors}
+    assert name in places or f"{SESSION}/receipt.json" in places
+    assert str(study) not in told(findings)
+
+
+def test_a_psych_ds_rule_that_is_not_kept_is_an_error_of_its_own(study: Path) -> None:
+    (study / "data" / "extra_data.csv").write_text("mood\nfine\n")
+    findings = verify(study)
+    assert findings.errors == ()
+    assert {issue.code for issue in findings.psychds.errors} == {
+        "FILENAME_KEYWORD_FORMATTING_ERROR",
+        "CSV_COLUMN_MISSING_FROM_METADATA",
+    }
+    assert not findings.sound
+
+
+def test_what_should_be_known_is_a_warning(study: Path, start: Callable[..., SessionStore]) -> None:
+    with start("P009", recordings=True) as store:
+        told_of = {"block": "b", "phase": "main", "part": 1, "index": 1, "of": 1, "code": "L1"}
+        for trial in (1, 2):
+            store.append("trial_started", trial=trial, attempt=1, **told_of)
+        store.append("recording_lost", trial=1, attempt=1, reason="No space left on device")
+        store.append("weather", sky="blue")
+        store.write_tables()
+    with store.folder.journal.open("ab") as file:
+        file.write(b'{"n":')
+    (store.folder.path / ".receipt.json.0123abcd.tmp").write_bytes(b"{")
+    (study / "data" / ".x.csv.0123abcd.tmp").write_bytes(b"{")
+    store.folder.recordings.mkdir()
+    (store.folder.recordings / "trial-009.parquet").write_bytes(b"PAR1")
+    (study / "data" / "sub-P010" / "ses-01").mkdir(parents=True)
+    open_one = start("P011")
+    findings = verify(study)
+    open_one.close()
+    for sentence in (
+        "sub-P009/ses-01: is unfinished: resume it, or leave it so",
+        "sub-P009/ses-01/journal.jsonl: its last 5 bytes are a line that was never finished",
+        "sub-P009/ses-01/journal.jsonl: has events 'weather', which this version does not know",
+        "sub-P009/ses-01/.receipt.json.0123abcd.tmp: was left half-written",
+        "sub-P009/ses-01/recordings: trial 1, attempt 1 has none: No space left on device",
+        "sub-P009/ses-01/recordings/trial-009.parquet: is in no line of the journal",
+        "sub-P010/ses-01: was claimed, and its program was ended before it wrote a journal",
+        "sub-P011/ses-01: runs in another program",
+        "data/.x.csv.0123abcd.tmp: was left half-written by a program that was ended, or is just being written",
+    ):
+        assert sentence in warned(findings)
+    assert told(findings) == ""
+
+
+def test_tables_of_a_session_that_has_not_ended_may_be_behind_its_journal(
+    study: Path, start: Callable[..., SessionStore], summary: dict[str, Any]
+) -> None:
+    """Its program was killed before it wrote them; those of the others may not."""
+    told_of = {"block": "b", "phase": "main", "part": 1, "index": 1, "of": 1, "code": "L1"}
+    with start("P000") as store:
+        store.append("trial_started", trial=1, attempt=1, **told_of)
+        store.append("trial_ended", trial=1, attempt=1, outcome="complete", **summary)
+    findings = verify(study)
+    assert findings.errors == ()
+    for path in (PARTICIPANTS, "sub-P000/ses-01/subject-P000_session-01_task-brackish_description-trials_data.csv"):
+        assert f"{path}: is not what the journal gives, from line 2 on; rebuild renews it" in warned(findings)
+    replace("withdrawn", "completed")(study / PARTICIPANTS)
+    assert f"{PARTICIPANTS}: is not what the journal gives" in told(verify(study))
+
+
+def test_a_trial_without_its_recording_is_known_at_the_end(study: Path, start: Callable[..., SessionStore]) -> None:
+    store = start("P009", recordings=True)
+    told_of = {"block": "b", "phase": "main", "part": 1, "index": 1, "of": 1, "code": "L1"}
+    store.append("trial_started", trial=1, attempt=1, **told_of)
+    store.finish("aborted")
+    assert "recordings: trial 1, attempt 1 has none, and no line says why" in warned(verify(study))
+
+
+def test_samples_that_were_dropped_are_known(study: Path) -> None:
+    path = study / SESSION / "journal.jsonl"
+    replace('"samples_unrecorded":0', '"samples_unrecorded":7')(path)
+    assert "recordings/trial-001.parquet: lacks 7 samples" in warned(verify(study))
+
+
+def test_lines_after_the_end_are_found(study: Path) -> None:
+    path = study / SESSION / "journal.jsonl"
+    last = journal.read(path)[-1]
+    append(json.dumps(last | {"n": last["n"] + 1, "event": "resumed"}).encode() + b"\n")(path)
+    assert "lines follow the session's end" in told(verify(study))
+
+
+def test_exclusions_are_checked_against_the_sessions(study: Path) -> None:
+    exclude(study, "P007", 1, trial=2, by="AB", reason="the phone rang")
+    exclude(study, "P008", 1, by="RT rule", reason="withdrew")
+    assert verify(study).sound
+    replace("P008", "P009")(study / "exclusions.csv")
+    replace("P007,1,2", "P007,1,77")(study / "exclusions.csv")
+    assert told(verify(study)).splitlines() == [
+        "exclusions.csv: there is no participant P007, session 1, trial 77",
+        "exclusions.csv: there is no participant P009, session 1",
+    ]
+    replace(",1,77,", ",1,x,")(study / "exclusions.csv")
+    assert told(verify(study)).startswith("exclusions.csv: row 2: 'P007,1,x,AB,the phone rang")
+
+
+def test_a_condition_that_is_told_is_found_but_not_repeated(
+    study: Path, tmp_path: Path, start: Callable[..., SessionStore]
+) -> None:
+    store = start("P009")
+    store.append("note", kind="note", text="this must be mildew")
+    store.append("note", kind="note", text="density 1013.7, I think")
+    store.append("note", kind="note", text="137 seconds")
+    store.finish("completed")
+    found = [line for line in warned(verify(study)).splitlines() if "tells a condition" in line]
+    place = "data/sub-P009/ses-01/journal.jsonl"
+    assert [line.split(", line ")[1][0] for line in found] == ["2", "3"]
+    assert all(place in line for line in found)
+    assert "mildew" not in warned(verify(study))
+    blinding.reveal(study, "AB", "done")
+    assert "tells a condition" not in warned(verify(study))
+
+
+def test_a_key_of_another_study_under_the_reveals_is_found(study: Path) -> None:
+    blinding.reveal(study, "AB", "done")
+    replace(blinding.reveals(study)[0]["key_hash"], "0" * 64)(study / "blinding" / "reveals.jsonl")
+    assert "reveals.jsonl: reveal 1 was of another key" in told(verify(study))
+
+
+def test_nothing_of_the_key_is_shown(study: Path) -> None:
+    """Whatever is broken, no sentence tells a condition."""
+    content = json.loads(base64.b64decode((study / "blinding" / "key.sealed").read_bytes()))
+    for path in sorted(study.rglob("*")):
+        if path.is_file() and path.name != "key.sealed":
+            path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    try:
+        findings = verify(study)
+    except StoreError as error:
+        shown = str(error)
+    else:
+        shown = told(findings) + warned(findings)
+    assert not [word for word in content["tables"]["conditions"] if word in shown]
+
+
+def test_a_folder_that_is_no_study_is_named(tmp_path: Path) -> None:
+    with pytest.raises(StoreError, match="is no study's folder"):
+        verify(tmp_path)
