@@ -104,7 +104,8 @@ class Recorder:
     def start(self, trial: int, attempt: int, rate_hz: float) -> None:
         """Begin the recording of a trial; one that is under way is stopped first.
 
-        The first sample may be the one before the trial's first: what the hand felt last is what the force moves from.
+        Its first sample is best the one before the trial's first, of another scene: the force that the hand felt last
+        is what the trial's force moves from when it is computed again.
         """
         self.stop()
         self._underway = trial, attempt

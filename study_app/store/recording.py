@@ -28,6 +28,7 @@ from study_app.errors import StoreError
 from study_app.haptics.layout import SAMPLE, records
 from study_app.store.atomic import beside, cannot_read, sync_folder
 from study_app.store.columns import Column
+from study_app.store.journal import plain
 from study_app.store.recorded_columns import FRAMES, SAMPLES
 
 FORMAT = 1
@@ -91,6 +92,8 @@ class SamplesFile:
 
     def write(self, samples: Any) -> None:
         """Add a group of samples (array of ``SAMPLE``): ``group_rows`` of them, except the last time."""
+        if self.rows == 0:
+            self._facts["first_device_force_n"] = plain(samples["device_force_n"][:1].ravel())
         self._device += crcs(samples["device_force_n"], self.check_rows)
         self._effect += crcs(samples["force_n"], self.check_rows)
         self._half.write(sample_columns(samples))
@@ -128,12 +131,14 @@ def write_frames(path: Path, frames: NDArray[np.int64], facts: Mapping[str, Any]
 def read_samples(path: Path) -> Any:
     """Return the samples (n,) as a recarray of ``SAMPLE``; ``busy_ns``, which is not recorded, is 0.
 
+    The first sample's force on the hand, from which the next one moves, is exact.
+
     Raises
     ------
     StoreError
         It cannot be read, or is no recording of samples.
     """
-    columns = _read(path, "samples")
+    columns, facts = _read(path, "samples")
     samples = records(SAMPLE, len(columns["tick"]))
     for name in ("tick", "time_ns", "fresh", "buttons", "limiters", "scene", "status"):
         samples[name] = columns[name]
@@ -145,6 +150,8 @@ def read_samples(path: Path) -> Any:
         device = columns[f"device_force_{axis}_n"].astype(np.float64)
         samples["device_force_n"][:, i] = device
         samples["force_n"][:, i] = device + columns[f"withheld_{axis}_n"]
+    if len(samples) and None not in facts["first_device_force_n"]:
+        samples["device_force_n"][0] = facts["first_device_force_n"]
     return samples
 
 
@@ -156,7 +163,7 @@ def read_frames(path: Path) -> Any:
     StoreError
         It cannot be read, or is no recording of frames.
     """
-    columns = _read(path, "frames")
+    columns, _ = _read(path, "frames")
     frames = records(FRAME, len(columns["painted_ns"]))
     for name in FRAME.names or ():
         frames[name] = columns[name]
@@ -300,7 +307,7 @@ def _array(values: NDArray[Any], of: pa.DataType) -> pa.Array:
     return pa.Array.from_buffers(of, len(values), [None, pa.py_buffer(kept)])
 
 
-def _read(path: Path, kind: str) -> dict[str, NDArray[Any]]:
+def _read(path: Path, kind: str) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
     try:
         with parquet.ParquetFile(path) as file:
             facts = _facts(path, file.metadata)
@@ -311,7 +318,7 @@ def _read(path: Path, kind: str) -> dict[str, NDArray[Any]]:
         raise cannot_read(path, error) from error
     except pa.ArrowException as error:
         raise _damaged(path, error) from error
-    return {name: _numbers(table.column(name), facts["rows"]) for name in table.column_names}
+    return {name: _numbers(table.column(name), facts["rows"]) for name in table.column_names}, facts
 
 
 def _numbers(column: pa.ChunkedArray, rows: int) -> NDArray[Any]:

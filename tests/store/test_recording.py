@@ -54,7 +54,9 @@ def test_times_and_places_come_back_to_the_last_bit_and_the_rest_to_its_step(tmp
         assert np.abs(read[name] - samples[name]).max() <= 2.0**-13
     for name in ("force_n", "device_force_n"):
         assert np.abs(read[name] - samples[name]).max() <= 2.0**-15
+    assert read["device_force_n"][0].tolist() == samples["device_force_n"][0].tolist()
     untouched = (samples["device_force_n"] == samples["force_n"]).all(axis=1)
+    untouched[0] = False
     assert (read["device_force_n"][untouched] == read["force_n"][untouched]).all()
 
 
@@ -69,6 +71,13 @@ def test_numbers_of_a_fault_come_back_as_they_are(tmp_path: Path, samples_of: Ma
     assert np.array_equal(read["velocity_mps"][1], [np.inf, -np.inf, np.nan], equal_nan=True)
     assert np.array_equal(read["force_n"][1], [np.nan, np.inf, np.inf], equal_nan=True)
     assert read["device_force_n"][1].tolist() == [0.5, 0.25, 0.0]
+
+
+def test_a_first_force_that_is_no_number_is_none(tmp_path: Path, samples_of: Make) -> None:
+    samples = samples_of(2)
+    samples["device_force_n"][0] = [np.nan, 0.0, 0.0]
+    read = read_samples(write(tmp_path / "trial-003.parquet", samples).path)
+    assert np.array_equal(read["device_force_n"][0], [np.nan, 0.0, 0.0], equal_nan=True)
 
 
 @given(
@@ -112,6 +121,7 @@ def test_half_an_hour_takes_at_most_sixty_megabytes(tmp_path: Path, samples_of: 
 def test_a_recording_says_what_it_is_without_being_read(tmp_path: Path, samples_of: Make) -> None:
     facts = read_facts(write(tmp_path / "trial-003.parquet", samples_of(2_500), rate_hz=500).path)
     assert facts.pop("crc32")["rows"] == 500
+    assert len(facts.pop("first_device_force_n")) == 3
     assert facts == {"format": 1, "kind": "samples", **FACTS, "rate_hz": 500, "dropped": 0, "rows": 2_500}
 
 
