@@ -1,0 +1,114 @@
+"""What a scene costs: nanoseconds a tick by the servo's own code, and how many of them each effect takes."""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Mapping
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from study_app.haptics.bounds import bounds
+from study_app.haptics.compiled import kernel
+from study_app.haptics.gate import describe_gate, resolve
+from study_app.haptics.layout import SAMPLE, Record, records
+from study_app.haptics.motion import Floats
+from study_app.haptics.pack import pack
+from study_app.haptics.safety import new_safety
+from study_app.haptics.scene import Effect, Liquid, Scene
+from study_app.haptics.tick import tick
+
+BATCH: Final = 1_000
+BATCHES: Final = 200
+WARM_UP: Final = 10_000
+_THROUGH_DRAG: Final = ("wake", "local_wake", "current")
+
+
+class Cost(NamedTuple):
+    """Medians over batches of 1,000 ticks [ns a tick]: the scene, the scene without liquids, and each effect.
+
+    An effect's cost is what it adds to its liquid without effects; what acts through drag, to the liquid with drag.
+    """
+
+    scene_ns: float
+    rest_ns: float
+    effects_ns: Mapping[tuple[str, Effect], float]
+
+
+def measure(scene: Scene, *, batches: int = BATCHES) -> Cost:
+    """Measure a scene and its variants, batch about batch, so that what else the machine does strikes all alike."""
+    scene = resolve(scene)
+    rest = scene.model_copy(update={"liquids": ()})
+    pairs = _pairs(scene)
+    benches = {it: _Bench(it) for it in dict.fromkeys([scene, rest, *(it for pair in pairs.values() for it in pair)])}
+    for _ in range(batches):
+        for bench in benches.values():
+            bench.batch()
+    cost_ns = {it: statistics.median(bench.costs_ns) for it, bench in benches.items()}
+    effects_ns = {effect: cost_ns[having] - cost_ns[lacking] for effect, (having, lacking) in pairs.items()}
+    return Cost(cost_ns[scene], cost_ns[rest], effects_ns)
+
+
+def report(scene: Scene, *, batches: int = BATCHES) -> str:
+    """Return which effects a scene calls for, why, and what each costs, as text."""
+    cost = measure(scene, batches=batches)
+    percent = 100 * cost.scene_ns * 1e-9 * scene.rate_hz
+    whole = f"one tick: {cost.scene_ns:.0f} ns, {percent:.2f} % of the time between two"
+    return "\n".join(
+        (*describe_gate(scene, cost.effects_ns), "", f"{whole}; {cost.rest_ns:.0f} ns of it without any liquid")
+    )
+
+
+def hand(ticks: int = WARM_UP) -> Floats:
+    """Return positions (ticks, 3) of a hand [m] at 1 kHz: circles of 30 mm that slow down, turn back and rest."""
+    t_s = np.arange(ticks) / 1000
+    angle = 4 * np.sin(2 * np.pi * np.minimum(t_s % 10, 8.0) / 4)
+    return 0.03 * np.column_stack([np.cos(angle), 0.2 * np.sin(3 * angle), np.sin(angle)])
+
+
+class _Bench:
+    """One scene on the bench: its memory, and the cost of every batch so far."""
+
+    def __init__(self, scene: Scene) -> None:
+        self._model, self._safety, self._sample = pack(scene), new_safety(), records(SAMPLE, 1)
+        self._positions_m = hand()
+        self._ticks = 0
+        self.costs_ns: list[float] = []
+        self._run(WARM_UP)
+
+    def batch(self) -> None:
+        began = time.perf_counter_ns()
+        self._run(BATCH)
+        self.costs_ns.append((time.perf_counter_ns() - began) / BATCH)
+
+    def _run(self, ticks: int) -> None:
+        _take(self._model, self._safety[0], self._sample[0], self._positions_m, self._ticks, ticks)
+        self._ticks += ticks
+
+
+@kernel
+def _take(model: Any, safety: Record, sample: Record, positions_m: Any, start: int, ticks: int) -> None:
+    """Take ``ticks`` samples, one a millisecond."""
+    for k in range(start, start + ticks):
+        sample.time_ns = k * 1_000_000
+        sample.fresh = 1
+        for axis in range(3):
+            sample.position_m[axis] = positions_m[k % len(positions_m), axis]
+        tick(model, safety, sample)
+
+
+def _pairs(scene: Scene) -> dict[tuple[str, Effect], tuple[Scene, Scene]]:
+    """Return for each effect a scene with and one without it."""
+    found: dict[tuple[str, Effect], tuple[Scene, Scene]] = {}
+    for liquid in scene.liquids:
+        for effect in bounds(scene, liquid):
+            others: tuple[Effect, ...] = ("drag",) if effect in _THROUGH_DRAG else ()
+            found[liquid.id, effect] = _with(scene, liquid, (*others, effect)), _with(scene, liquid, others)
+    return found
+
+
+def _with(scene: Scene, liquid: Liquid, effects: tuple[Effect, ...]) -> Scene:
+    """Return the scene with other effects in one liquid."""
+    changed = liquid.model_copy(update={"effects": effects})
+    return scene.model_copy(update={"liquids": tuple(changed if it is liquid else it for it in scene.liquids)})
