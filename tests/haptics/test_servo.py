@@ -524,6 +524,8 @@ from study_app.haptics.servo import Servo
 from tests.haptics.probe import PROBE, Probe
 from tests.haptics.test_servo import HONEY, force_n, wait_until
 
+signal.signal(signal.SIGINT, signal.default_int_handler)  # who runs the tests may have switched signals off
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
 memory = np.memmap(sys.argv[1], dtype=PROBE, mode="r+", shape=(1,)).view(np.recarray)
 servo = Servo(Probe(memory=memory))
 servo.start()
