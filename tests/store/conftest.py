@@ -73,6 +73,12 @@ def study_tables(**changes: Any) -> dict[str, Any]:
     return tables | changes
 
 
+@pytest.fixture(autouse=True)
+def _no_plug_is_pulled(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Waiting for the disk has tests of its own; in all others the system's memory of a file will do."""
+    monkeypatch.setattr("os.fsync", lambda _: None)
+
+
 @pytest.fixture
 def tables_of_study() -> Callable[..., dict[str, Any]]:
     return study_tables

@@ -122,3 +122,15 @@ def test_where_one_cannot_write_is_told_before_anything_is_begun(tmp_path: Path,
     (tmp_path / "file").touch()
     with pytest.raises(StoreError, match=r"file cannot be written \(Not a directory\)"):
         probe(tmp_path / "file")
+
+
+def test_a_file_is_on_the_disk_before_it_takes_its_place_and_its_place_after(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """So that a power cut leaves the old file or the new one."""
+    path = tmp_path / "table.csv"
+    write_file(path, b"old\n")
+    seen: list[tuple[bytes, int]] = []
+    monkeypatch.setattr("os.fsync", lambda _: seen.append((path.read_bytes(), len(names_in(tmp_path)))))
+    write_file(path, b"new\n")
+    assert seen == [(b"old\n", 2), (b"new\n", 1)]

@@ -88,12 +88,11 @@ def three_answers(store: SessionStore) -> None:
 
 
 def test_of_a_journal_cut_at_any_byte_everything_whole_is_rebuilt_and_the_journal_left_alone(
-    start: Callable[..., SessionStore], monkeypatch: pytest.MonkeyPatch
+    start: Callable[..., SessionStore],
 ) -> None:
     """The tables are those of the whole lines; the torn tail is counted; without a whole line there is nothing."""
     with start() as store:
         three_answers(store)
-    monkeypatch.setattr("study_app.store.atomic.os.fsync", lambda _: None)  # nobody pulls the plug here
     path = store.folder.journal
     content, lines = path.read_bytes(), journal.read(path)
     ends = [end + 1 for end, byte in enumerate(content) if byte == ord("\n")]
