@@ -122,6 +122,44 @@ def wakes(
 
 
 @workings
+def local_wakes(
+    h_mps: Any,
+    position_m: Any,
+    interval_s: Any,
+    length: int,
+    scaling: float,
+    exponent: float,
+    decay: float,
+    reach_m: float,
+    spreading_m2ps: float,
+) -> Any:
+    """Return v_wake (n, 3) of a local wake whose every element keeps its own place and age, however many there are.
+
+    v_tail = (1/S) Σ_j (σ_0/σ_j)³ exp(−r_j²/2σ_j²) λ^age_j e_j over the newest N elements, zero ones included, with
+    σ_j² = σ_0² + 2ν age_j; then the response to the fill, whose mean speed is weighted likewise.
+    """
+    ticks = len(h_mps)
+    wake_mps = np.zeros((ticks, 3))
+    for k in range(ticks):
+        tail, speeds, squares, age_s = np.zeros(3), 0.0, 0.0, 0.0
+        for j in range(k - 1, max(k - 1 - length, -1), -1):
+            speed = _size(h_mps[j])
+            if speed >= 1e-3:
+                wide_m2 = reach_m**2 + 2 * spreading_m2ps * age_s
+                fades = decay ** (age_s / 1e-3)
+                felt = (reach_m**2 / wide_m2) ** 1.5 * math.exp(
+                    -0.5 * _size(position_m[k] - position_m[j]) ** 2 / wide_m2
+                )
+                tail += felt * fades * h_mps[j] / scaling
+                speeds += felt * fades * speed
+                squares += felt * (fades * speed) ** 2
+            age_s += interval_s[j]
+        if speeds > 0.0:
+            wake_mps[k] = tail * _gain(_size(tail) * speeds / squares, exponent)
+    return wake_mps
+
+
+@workings
 def _wake(element: Any, segment: Any, count: int, scaling: float, exponent: float) -> Any:
     """Return v_wake of a list and Σ|e|/S: eq. (1), then the response to the fill."""
     tail, speeds, squares = np.zeros(3), 0.0, 0.0
@@ -138,9 +176,7 @@ def _wake(element: Any, segment: Any, count: int, scaling: float, exponent: floa
     tail = (tail + direction * summed) / scaling
     if speeds == 0.0:
         return np.zeros(3), 0.0
-    fill = _size(tail) / (squares / speeds)
-    gain = fill ** (exponent - 1.0) if exponent >= 1.0 else (fill**2 + 0.05**2) ** ((exponent - 1.0) / 2.0)
-    return tail * gain, speeds / scaling
+    return tail * _gain(_size(tail) / (squares / speeds), exponent), speeds / scaling
 
 
 @workings
@@ -167,6 +203,12 @@ def _breaks(
     e = element[reference]
     along = h[0] * e[0] + h[1] * e[1] + h[2] * e[2]
     return bool(along < (breaking_cosine - 1e-12) * _size(h) * _size(e))
+
+
+@workings
+def _gain(fill: float, exponent: float) -> float:
+    """Return what the response to a fill makes of the tail."""
+    return fill ** (exponent - 1.0) if exponent >= 1.0 else (fill**2 + 0.05**2) ** ((exponent - 1.0) / 2.0)
 
 
 @workings

@@ -91,7 +91,7 @@ def act(model: Any, i: int, interval_s: float) -> None:
     if liquid.effects & EFFECT_WAKE:
         flow(liquid, local, model.segments)
     if liquid.effects & EFFECT_LOCAL_WAKE:
-        linger(liquid, local, state, model.cells)
+        linger(liquid, local, state, model.cells, interval_s)
     subtract(local.motion_mps, local.wake_mps, local.relative_mps)
     copy(local.wake_mps, state.wake_mps)
     if liquid.effects & EFFECT_SURFACE:

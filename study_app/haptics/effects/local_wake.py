@@ -6,10 +6,11 @@ each, and a cell acts by its distance r from the body:
 
     v_tail = (1/S) Σ_c w_c λ^age_c Σ_{j in c} e_j ,   w_c = (σ_0/σ_c)³ exp(−r²/2σ_c²) ,   σ_c² = σ_0² + s_c + 2ν age_c .
 
-σ_0 is the reach, about a diameter; the momentum of a cell spreads as in a viscous liquid, ever wider and weaker; s_c is
-what merging added. Elements are summed as vectors, so there are no segments: a turn on the spot cancels, and a circle
-leaves every part of it in its own place. v_wake = v_tail · response(|v_tail| / m̄) as in ``wake``, with m̄ weighted
-likewise. As w_c ≤ 1 and N ≤ S, the liquid never outruns the body. Places drift with the current. [choice]
+σ_0 is the reach, about a diameter; the momentum of a cell spreads as in a viscous liquid, ever wider and weaker: its
+age counts from its last element, s_c is how far its elements had spread by then, and how far merged cells were apart.
+Elements are summed as vectors, so there are no segments: a turn on the spot cancels, and a circle leaves every part of
+it in its own place. v_wake = v_tail · response(|v_tail| / m̄) as in ``wake``, with m̄ weighted likewise. As w_c ≤ 1 and
+N ≤ S, the liquid never outruns the body. Places drift with the current. [choice]
 """
 
 from __future__ import annotations
@@ -27,9 +28,11 @@ FARTHEST = 40.0  # r²/2σ² beyond which a cell is not felt: e^-40
 
 
 @part
-def linger(liquid: Record, local: Record, state: Record, cells: Any) -> None:
+def linger(liquid: Record, local: Record, state: Record, cells: Any, interval_s: float) -> None:
     """Set the liquid's velocity at the body, ``local.wake_mps`` (3,) [m/s], from the cells near it."""
     wake, tracks, out = liquid.local_wake, local.local_wake, local.wake_mps
+    for axis in range(3):
+        tracks.drift_m[axis] += (state.velocity_mps[axis] - local.motion_mps[axis]) * interval_s
     clear(out)
     speeds = squares = 0.0
     x, y, z = _place(tracks, state)
@@ -60,11 +63,9 @@ def linger(liquid: Record, local: Record, state: Record, cells: Any) -> None:
 
 @part
 def leave_behind(liquid: Record, local: Record, state: Record, cells: Any, interval_s: float) -> None:
-    """Let the wake take in this tick, after the force: time, drift, and one element, zero below 1 mm/s."""
+    """Let the wake take in this tick, after the force: its time, and one element, zero below 1 mm/s."""
     wake, tracks, h = liquid.local_wake, local.local_wake, local.motion_mps
     tracks.time_s += interval_s
-    for axis in range(3):
-        tracks.drift_m[axis] += (state.velocity_mps[axis] - h[axis]) * interval_s
     hx, hy, hz = h[0], wake.vertical * h[1], h[2]
     speed_mps = math.sqrt(hx * hx + hy * hy + hz * hz)
     moves = speed_mps >= REST_MPS
@@ -149,13 +150,17 @@ def _merge_oldest(wake: Record, tracks: Record, cells: Any) -> None:
 def _grow(wake: Record, tracks: Record, cell: Record, x_m: float, y_m: float, z_m: float) -> None:
     """Bring the newest cell to the present, and count one more element at this place."""
     tracks.held += 1
-    keep = math.exp(wake.log_decay_per_s * (tracks.time_s - cell.time_s))
-    _weaken(cell, keep)
+    elapsed_s = tracks.time_s - cell.time_s
+    _weaken(cell, math.exp(wake.log_decay_per_s * elapsed_s))
     cell.time_s = tracks.time_s
     cell.count += 1
-    cell.place_m[0] += (x_m - cell.place_m[0]) / cell.count
-    cell.place_m[1] += (y_m - cell.place_m[1]) / cell.count
-    cell.place_m[2] += (z_m - cell.place_m[2]) / cell.count
+    share = 1.0 / cell.count
+    dx, dy, dz = x_m - cell.place_m[0], y_m - cell.place_m[1], z_m - cell.place_m[2]
+    cell.place_m[0] += share * dx
+    cell.place_m[1] += share * dy
+    cell.place_m[2] += share * dz
+    spread_m2 = cell.spread_m2 + 2.0 * wake.spreading_m2ps * elapsed_s
+    cell.spread_m2 = (1.0 - share) * spread_m2
 
 
 @part

@@ -197,7 +197,7 @@ CELL = np.dtype(
         ("square_m2ps2", np.float64),  # Σ|e|²
         ("count", np.int64),  # its elements, those at rest too
         ("time_s", np.float64),  # when the last of them was stored
-        ("spread_m2", np.float64),  # variance of its elements' places along each axis, where cells were merged
+        ("spread_m2", np.float64),  # s_c, along each axis, at ``time_s``
     ],
     align=True,
 )
