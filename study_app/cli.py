@@ -15,8 +15,10 @@ from study_app import __version__
 from study_app.errors import StudyError
 
 EXIT_USER_ERROR = 2
+EXIT_FOUND = 3
 
 _FILE = click.argument("protocol", metavar="FILE")
+_SESSION = click.argument("session", type=click.Path(path_type=Path))
 _RESULTS = click.option(
     "--results",
     type=click.Path(path_type=Path),
@@ -86,6 +88,28 @@ def _assignment(change: str) -> tuple[str, str]:
 
 
 @commands.command()
+@click.argument("scene", metavar="FILE")
+@click.option("--liquid", metavar="NAME", help="Only this one; default: every liquid of the file.")
+def scene(scene: str, liquid: str | None) -> None:
+    """Print which effects a scene calls for, why, and the measured cost of each."""
+    from study_app.evaluation.cost import report
+    from study_app.protocol.load import load_scene, load_scenes
+
+    chosen = [load_scene(scene, liquid)] if liquid else list(load_scenes(scene).values())
+    click.echo("\n\n".join(report(one) for one in chosen))
+
+
+@commands.command()
+@click.option("--to", required=True, type=click.Path(path_type=Path), metavar="DIR", help="Folder to write into.")
+def figures(to: Path) -> None:
+    """Draw the thesis' Figs 3 to 8 anew: force over time on programmed paths, with captions."""
+    from study_app.evaluation.figures import figures as draw
+
+    for written in draw(to):
+        click.echo(written)
+
+
+@commands.command()
 @_FILE
 @click.option("--participant", metavar="ID", required=True, help="Letters and digits, such as P007.")
 @click.option("--session", type=click.IntRange(1, 99), default=1, show_default=True, help="Session number.")
@@ -125,6 +149,18 @@ def run(
         results=results,
     )
     click.get_current_context().exit(code)
+
+
+@commands.command()
+@_FILE
+@click.option("--participants", type=click.IntRange(1, 9999), required=True)
+@click.option("--seed", type=click.IntRange(0), default=1, show_default=True)
+def design(protocol: str, participants: int, seed: int) -> None:
+    """Count positions and carry-over of the orders of N participants, before anyone is invited."""
+    from study_app.protocol.design import balance, describe_balance, numbered
+    from study_app.protocol.load import load
+
+    click.echo(describe_balance(balance(load(protocol), numbered(participants), seed)))
 
 
 @commands.command()
@@ -173,6 +209,70 @@ def unblind(results: Path, by: str, reason: str) -> None:
     for block, codes in reveal(results, by=by, reason=reason).items():
         for code, condition in codes.items():
             click.echo(f"{block}  {code}  {condition}")
+
+
+@commands.command()
+@_SESSION
+def rebuild(session: Path) -> None:
+    """Make a session's tables again from its journal."""
+    from study_app.store.rebuild import rebuild as rebuild_session
+
+    made = rebuild_session(session)
+    for path in made.rewritten:
+        click.echo(f"rewritten  {path}")
+    for path in made.swept:
+        click.echo(f"removed    {path}, left half-written")
+    if made.torn_bytes:
+        click.echo(f"the journal ends in {made.torn_bytes} bytes of a line that was never finished; left as they are")
+    if not (made.rewritten or made.swept):
+        click.echo("nothing to do: every table is what the journal says")
+
+
+@commands.command()
+@_SESSION
+def reproduce(session: Path) -> None:
+    """Make a session's orders again from its receipt and compare them with those that were run."""
+    from study_app.store.reproduced import reproduced
+
+    differences = reproduced(session)
+    for difference in differences:
+        click.echo(difference)
+    click.echo("the orders differ" if differences else "reproduced: trials and statements came in the receipt's order")
+    if differences:
+        click.get_current_context().exit(EXIT_FOUND)
+
+
+@commands.command()
+@click.argument("folder", type=click.Path(path_type=Path))
+def verify(folder: Path) -> None:
+    """Check everything in a study's folder: columns, checksums, receipts, journals, key, recordings, Psych-DS."""
+    from study_app.store.verify import verify as verify_study
+
+    found = verify_study(folder)
+    for kind, findings in (
+        ("error", (*found.errors, *found.psychds.errors)),
+        ("warning", (*found.warnings, *found.psychds.warnings)),
+    ):
+        for finding in findings:
+            click.echo(f"{kind}: {finding}")
+    click.echo(f"{found.sessions} sessions: {'sound' if found.sound else 'not sound'}")
+    if not found.sound:
+        click.get_current_context().exit(EXIT_FOUND)
+
+
+@commands.command()
+@click.argument("results", type=click.Path(path_type=Path))
+@click.option("--participant", required=True, metavar="ID")
+@click.option("--session", type=click.IntRange(1, 99), default=1, show_default=True)
+@click.option("--trial", type=click.IntRange(1), help="Only this trial; default: the whole session.")
+@click.option("--by", required=True, metavar="NAME", help="Who decides, or the rule's name.")
+@click.option("--reason", required=True, metavar="TEXT")
+def exclude(results: Path, participant: str, session: int, trial: int | None, by: str, reason: str) -> None:
+    """Leave a session or a trial out of the analysis, with a reason; nothing is deleted."""
+    from study_app.store.exclusions import exclude as exclude_from
+    from study_app.store.exclusions import named
+
+    click.echo(named(exclude_from(results, participant, session, trial=trial, by=by, reason=reason)))
 
 
 def main() -> None:

@@ -1,0 +1,28 @@
+"""A session's orders made again from its receipt and compared with its journal; the key stays sealed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from study_app.errors import StoreError
+from study_app.protocol.reproduce import recorded_trials, reproduce
+from study_app.store import journal, receipt
+from study_app.store.layout import locate
+
+
+def reproduced(session_folder: Path) -> tuple[str, ...]:
+    """Return how the orders of trials and items that were run differ from those the receipt gives: () if nowhere.
+
+    Raises
+    ------
+    StoreError
+        It is no session's folder, or its receipt or journal cannot be read.
+    """
+    _, folder = locate(session_folder)
+    ran = receipt.read(folder.receipt)
+    try:
+        recorded = recorded_trials(journal.read(folder.journal))
+        complete = ran["status"] == "completed"
+        return reproduce(ran["protocol"], ran["seed"], ran["participant"], recorded, complete=complete)
+    except KeyError as missing:
+        raise StoreError(f"{folder.path}: receipt or journal lack {missing}: verify the study's folder") from missing
