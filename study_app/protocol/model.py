@@ -52,6 +52,9 @@ class StudyHead(Table):
     languages: tuple[Language, ...] = Field(
         min_length=1, description="Languages every text exists in; the first is preset."
     )
+    resume: Literal["trial", "block"] = Field(
+        default="trial", description="Where a session goes on that was interrupted: its trial again, or its block."
+    )
 
 
 class DeviceNeeds(Table):
