@@ -64,6 +64,7 @@ class SessionStore:
         self._lines: list[Line] = list(lines)
         self._written: dict[Path, bytes] = {}
         self._kept: list[Kept] = []
+        self._over = False
 
     @property
     def folder(self) -> SessionFolder:
@@ -111,14 +112,15 @@ class SessionStore:
         Raises
         ------
         StoreError
-            One of them could not be written; what was journalled before is safe.
+            One of them could not be written; what was journalled before is safe. Called again, it goes on from there.
         """
-        if self.recorder is not None:
-            self.recorder.close()
-        self._keep_recordings()
-        self.append("session_ended", status=status, reason=reason)
-        self._journal.close()
-        self._receipt |= {"status": status, "reason": reason, "ended_at": self._lines[-1]["at"]}
+        if self._over or not self._journal.closed:
+            if self.recorder is not None:
+                self.recorder.close()
+            self._keep_recordings()
+            self.append("session_ended", status=status, reason=reason)
+            self._journal.close()
+            self._receipt |= {"status": status, "reason": reason, "ended_at": self._lines[-1]["at"]}
         self.write_tables()
         failures = [] if self.behind is None else [self.behind]
         for write in (self._write_receipt, self._write_participants, self._write_checksums):
@@ -129,9 +131,11 @@ class SessionStore:
         self._opening.release()
         if failures:
             raise failures[0]
+        self._over = True
 
     def close(self) -> None:
         """Let go of the session without an end; it stays unfinished."""
+        self._over = True
         if self.recorder is not None:
             self.recorder.close()
         if not self._journal.closed:

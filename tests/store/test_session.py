@@ -510,3 +510,20 @@ def test_a_disk_that_becomes_read_only_leaves_whole_lines_and_is_tried_again(
     store.finish("completed")
     texts = [line.get("text") for line in journal.read(store.folder.journal)]
     assert texts == [None, "before", "after", None]
+
+
+def test_an_end_that_was_half_written_is_finished_by_another_call(
+    start: Callable[..., SessionStore], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store = start()
+
+    def full(*_: object) -> None:
+        raise StoreError("no space left")
+
+    with monkeypatch.context() as patched:
+        patched.setattr("study_app.store.open_session.write_participants", full)
+        with pytest.raises(StoreError, match="no space"):
+            store.finish("completed")
+    store.finish("completed")
+    assert [line["event"] for line in store.lines].count("session_ended") == 1
+    assert store.folder.checksums.exists()
