@@ -36,7 +36,8 @@ from study_app.session.events import (
     ResumeAsked,
 )
 from study_app.session.pages import Page, TaskPage
-from study_app.session.runner import Ports, Runner, ServoPort, TankView
+from study_app.session.ports import Ports, ServoPort
+from study_app.session.runner import Runner, TankView
 
 TRACE_MS = 33
 TILES_MS = 500
@@ -131,6 +132,7 @@ class SessionBridge(QObject):
         self._reader = parts.servo.telemetry.reader()
         self._hand: Hand | None = None
         self._gone = False
+        self._stalled: str | None = None
         self._hook_before = sys.excepthook
         self._timers = (
             self._timer(max(4, round(1000 / refresh_hz)), self._frame, precise=True),
@@ -252,6 +254,9 @@ class SessionBridge(QObject):
 
     def _changed(self) -> None:
         """Show the news; at the end bring the operator's window back, should the participant's cover it."""
+        if (stalled := self.runner.stalled) != self._stalled:
+            self._stalled = stalled
+            log.warning("the disk takes data again" if stalled is None else f"the session waits: {stalled}")
         self._show()
         if self.runner.finished and self.participant.isFullScreen():
             QTimer.singleShot(END_SHOWN_MS, self.operator, self.operator.come_forward)
@@ -268,7 +273,8 @@ class SessionBridge(QObject):
             self.health.vitals(),
             now_s=self._now(),
             force_on=parts.servo.force_is_on,
-            trouble=self.trouble or parts.servo.fault or "",
+            trouble=self.trouble or parts.servo.fault or self.runner.stalled or "",
+            waits=self.runner.stalled is not None and not self.trouble,
             rate_hz=parts.servo.rate_hz,
         )
 

@@ -76,7 +76,7 @@ class ForceStopped:
     """The force was switched off (the servo already sends zero); the session pauses."""
 
     at_s: float
-    by: Literal["participant", "operator", "device"]
+    by: Literal["participant", "operator", "device", "program"]
 
 
 @dataclass(frozen=True, slots=True)

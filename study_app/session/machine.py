@@ -40,6 +40,7 @@ from study_app.session.events import (
     Submitted,
     TaskDone,
 )
+from study_app.session.resume import FIRST, Start
 from study_app.session.state import Phase, Plan, SessionState
 
 Move: TypeAlias = Callable[[SessionState, Any], tuple[SessionState, tuple[Command, ...]]]
@@ -91,9 +92,13 @@ TRANSITIONS: dict[tuple[Phase, type[Event]], Move] = {
 
 
 def open_session(
-    protocol: Protocol, schedule: Schedule, key: Mapping[str, Mapping[str, str]], language: str
+    protocol: Protocol,
+    schedule: Schedule,
+    key: Mapping[str, Mapping[str, str]],
+    language: str,
+    start: Start = FIRST,
 ) -> SessionState:
-    """Return the state before ``Begin``; ``key`` is block → code → condition.
+    """Return the state before ``Begin``; ``key`` is block → code → condition, ``start`` where a resumed one goes on.
 
     Raises
     ------
@@ -103,7 +108,7 @@ def open_session(
     if language not in protocol.study.languages:
         known = ", ".join(protocol.study.languages)
         raise SessionError(f"language {language!r}: {protocol.study.name} is written in {known}; choose one of these")
-    return SessionState(Plan(protocol, schedule, key, language))
+    return SessionState(Plan(protocol, schedule, key, language, start))
 
 
 def advance(state: SessionState, event: Event) -> tuple[SessionState, tuple[Command, ...]]:

@@ -44,8 +44,8 @@ Result: TypeAlias = tuple[SessionState, Commands]
 
 
 def begin(state: SessionState, _event: Begin) -> Result:
-    """Go to the first step."""
-    return _enter(state, 0)
+    """Go to the first step, or to where an interrupted session goes on."""
+    return _enter(state, state.plan.start.step)
 
 
 def read_on(state: SessionState, _event: Continue) -> Result:
@@ -172,7 +172,8 @@ def _enter(state: SessionState, index: int, done: Commands = ()) -> Result:
         state = replace(state, phase=Phase.COMPLETE)
         return state, (*done, Finish("completed"), _show(state))
     if isinstance(state.step, Trial):
-        return _start_trial(state, done)
+        before = state.plan.start.presented.get(state.step.number, 0)
+        return _start_trial(replace(state, attempt=before + 1), done)
     state = replace(state, phase=Phase.READING)
     return state, (*done, Write("page_shown", {"page": state.page_id}), WriteTables(), _show(state))
 

@@ -3,38 +3,50 @@
 The machine, the runner, the servo's compiled loop, the store and the checks of every questionnaire are the same; only
 the device, the clock, the screen and the participant are simulated. Time is the servo's virtual clock, so that the same
 call into another folder gives the same tables but for wall-clock times. Every row says that it is simulated.
+
+What a participant does and answers in a trial is drawn from streams of that trial, so that a rehearsal that was killed
+and resumed answers as one that was not.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from datetime import datetime
 from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
 
 import numpy as np
 
 from study_app.devices.scripted import ScriptedDevice
-from study_app.errors import SessionError
+from study_app.errors import SessionError, StoreError
 from study_app.haptics.clock import VirtualClock
 from study_app.haptics.pack import elements_needed
 from study_app.haptics.servo import Servo
 from study_app.protocol.answers import rate, rater
-from study_app.protocol.load import load, source_bytes
+from study_app.protocol.load import parse, source_bytes
 from study_app.protocol.model import Protocol, Reach
-from study_app.protocol.schedule import build_schedule, stream
-from study_app.session.events import Begin, Chosen, Continue, ItemShown, Submitted
+from study_app.protocol.schedule import Schedule, build_schedule, stream
+from study_app.session.events import Begin, Chosen, Continue, Event, ItemShown, Submitted
 from study_app.session.pages import Page, QuestionnairePage, TaskPage, TextPage
-from study_app.session.runner import Ports, Runner
+from study_app.session.ports import Ports
+from study_app.session.resume import FIRST, Start, find_protocol, resume_at
+from study_app.session.runner import Runner
 from study_app.session.simulated import Draw, Explorer, Reacher, Senses, choices, reading_s
+from study_app.store import journal
 from study_app.store.journal import SessionClock
-from study_app.store.layout import StudyFolder, check_unused
-from study_app.store.session import SessionStore, begin
+from study_app.store.layout import StudyFolder, check_unused, locate
+from study_app.store.open_session import SessionStore
+from study_app.store.progress import progress_of
+from study_app.store.resume import reopen
+from study_app.store.session import begin
 
 LOOK_S = 0.05  # the session looks at the device so often
 IDLE_S = 0.5  # and while reading and answering
 FRAME_S = 1 / 60
 PAINT_S = (0.002, 0.006)  # from looking at the clock to the frame being on the screen
+SCREENS: dict[str, Any] = {"participant": "simulated", "refresh_hz": 60}
 
 
 def rehearse(
@@ -43,6 +55,7 @@ def rehearse(
     participants: int,
     seed: int,
     results: Path | None = None,
+    recordings: bool = True,
     progress: Callable[[str], object] | None = None,
 ) -> Path:
     """Run a session each of P001, P002 … and return the study folder.
@@ -53,6 +66,7 @@ def rehearse(
     participants : how many
     seed : all randomness comes from it, the key's too
     results : study folder; by default ``results/<study>``
+    recordings : whether every turn of the servo and every frame of a trial is kept
     progress : is told a line after each session
 
     Raises
@@ -64,100 +78,168 @@ def rehearse(
     SessionError
         A session broke; what was kept before is safe.
     """
-    study = load(protocol)
     source = source_bytes(protocol)
+    study = parse(source, str(protocol))
     folder = Path("results") / study.study.name if results is None else Path(results)
     people = [f"P{number:03d}" for number in range(1, participants + 1)]
     for person in people:
         check_unused(StudyFolder(folder), person, 1)
     for person in people:
         began = time.perf_counter()
-        lasted_s, answers = _session(study, source, person, seed, folder)
+        with _Machine(study, person, seed) as machine:
+            store = begin(
+                folder,
+                study,
+                source,
+                person,
+                seed=seed,
+                operator="",
+                language=study.study.languages[0],
+                device=machine.described,
+                screens=SCREENS,
+                simulated=True,
+                recordings=recordings,
+                clock=SessionClock(machine.servo.now_ns),
+            )
+            lasted_s, answers = _run(study, build_schedule(study, person, seed), machine, store, FIRST)
         if progress is not None:
             took_s = time.perf_counter() - began
             progress(f"{person}: {answers} responses, {lasted_s / 60:.1f} min of session in {took_s:.1f} s (simulated)")
     return folder
 
 
-def _session(study: Protocol, source: bytes, person: str, seed: int, folder: Path) -> tuple[float, int]:
-    """Run one session; return how long it lasted in its own time [s], and how many responses it left."""
-    x, y, z = study.device.workspace_m
-    device = ScriptedDevice(
-        stream(seed, f"rehearsal/{person}/hand"),
-        workspace_m=(x / 2, y / 2, z / 2),
-        force_limit_n=study.device.force_limit_n,
-    )
-    elements = max(elements_needed(study.scene_for(condition)) for condition in study.conditions)
-    servo = Servo(device, clock=VirtualClock(), rate_hz=study.device.rate_hz, elements=elements)
-    with device, servo:
-        clock = SessionClock(servo.now_ns)
-        store = begin(
-            folder,
+def is_rehearsal(session_receipt: Mapping[str, Any]) -> bool:
+    """Return whether a session's receipt says that its participant was simulated, and so its screen."""
+    return dict(session_receipt["screens"]) == SCREENS
+
+
+def resume(session_folder: Path, *, protocol: str | Path | None = None) -> None:
+    """Go on with a rehearsed session whose program was ended, to its last page.
+
+    Parameters
+    ----------
+    protocol : file or name of its protocol; by default it is looked for
+
+    Raises
+    ------
+    StoreError
+        The session cannot be opened, is finished, or began with another protocol.
+    SessionError
+        No protocol at hand is the session's, or the session broke; what was kept before is safe.
+    """
+    lines = journal.read(locate(session_folder)[1].journal)
+    begun = progress_of(lines).start
+    name = find_protocol(begun) if protocol is None else str(protocol)
+    source = source_bytes(name)
+    study = parse(source, name)
+    person, seed = begun["participant"], begun["seed"]
+    with _Machine(study, person, seed) as machine:
+        store = reopen(
+            session_folder,
             study,
             source,
-            person,
-            seed=seed,
             operator="",
-            language=study.study.languages[0],
-            device=device.describe() | _told(servo),
-            screens={"participant": "simulated", "refresh_hz": 60},
-            simulated=True,
-            clock=clock,
+            device=machine.described,
+            screens=SCREENS,
+            now_ns=machine.servo.now_ns,
+            now=max(datetime.now().astimezone(), datetime.fromisoformat(lines[-1]["at"])),
         )
-        with store:
-            rehearsal = _Rehearsal(study, _Parts(device, servo, store, clock), person, seed)
-            rehearsal.run()
-        return clock.seconds(), rehearsal.answers
+        schedule = build_schedule(study, person, seed)
+        _run(study, schedule, machine, store, resume_at(study, schedule, lines))
 
 
-def _told(servo: Servo) -> dict[str, object]:
-    """Return what the receipt may say of the servo: the size of its wake would name a parameter of a liquid."""
-    return {name: value for name, value in servo.describe().items() if name != "elements"}
+class _Machine:
+    """A scripted device and its servo on a clock that stands still but for the servo; they end with the block."""
+
+    def __init__(self, study: Protocol, person: str, seed: int) -> None:
+        x, y, z = study.device.workspace_m
+        self.device = ScriptedDevice(
+            stream(seed, f"rehearsal/{person}/hand"),
+            workspace_m=(x / 2, y / 2, z / 2),
+            force_limit_n=study.device.force_limit_n,
+        )
+        elements = max(elements_needed(study.scene_for(condition)) for condition in study.conditions)
+        self.servo = Servo(self.device, clock=VirtualClock(), rate_hz=study.device.rate_hz, elements=elements)
+
+    @property
+    def described(self) -> dict[str, Any]:
+        """What the receipt may say: the size of the servo's wake would name a parameter of a liquid."""
+        told = {name: value for name, value in self.servo.describe().items() if name != "elements"}
+        return self.device.describe() | told
+
+    def __enter__(self) -> Self:
+        self.device.open()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.servo.stop()
+        self.device.close()
 
 
-@dataclass(frozen=True, slots=True)
-class _Parts:
-    device: ScriptedDevice
-    servo: Servo
-    store: SessionStore
-    clock: SessionClock
+def _run(
+    study: Protocol, schedule: Schedule, machine: _Machine, store: SessionStore, start: Start
+) -> tuple[float, int]:
+    """Run an open session to its end; return how long it lasted in its own time [s], and its answers."""
+    with store:
+        rehearsal = _Rehearsal(study, schedule, machine, store, start)
+        rehearsal.run()
+    return store.clock.seconds(), rehearsal.answers
 
 
 class _Rehearsal:
     """One session and its simulated participant."""
 
-    def __init__(self, study: Protocol, parts: _Parts, person: str, seed: int) -> None:
+    def __init__(
+        self, study: Protocol, schedule: Schedule, machine: _Machine, store: SessionStore, start: Start
+    ) -> None:
         self.answers = 0
         self._study = study
-        self._parts = parts
-        self._now_s = parts.clock.seconds
+        self._machine = machine
+        self._seed = schedule.seed
+        self._who = schedule.participant
+        self._now_s = store.clock.seconds
         self._page: Page | None = None
-        self._draw: Draw = stream(seed, f"rehearsal/{person}/behaviour").random
-        self._paint: Draw = stream(seed, f"rehearsal/{person}/screen").random
-        self._answer: Draw = stream(seed, f"rehearsal/{person}/answers").random
-        self._person = rater(stream(seed, f"rehearsal/{person}/person").random)
+        self._person = rater(self._stream("person"))
         self._felt = Senses(study.scene.scale).felt()
-        self._touch = parts.servo.telemetry.reader()
+        self._touch = machine.servo.telemetry.reader()
         self._next_frame_ns = 0
-        ports = Ports(parts.servo, parts.store, self._present, self._now_s)
-        schedule = build_schedule(study, person, seed)
-        self._runner = Runner(study, schedule, parts.store.key.codes, ports, study.study.languages[0])
+        self._paint: Draw = self._stream("screen")
+        ports = Ports(machine.servo, store, self._present, self._now_s, store.recorder)
+        self._runner = Runner(study, schedule, store.key.codes, ports, study.study.languages[0], start)
+
+    def _stream(self, name: str) -> Draw:
+        return stream(self._seed, f"rehearsal/{self._who}/{name}").random
+
+    def _post(self, event: Event) -> None:
+        self._runner.post(event)
+        self._notice()
+
+    def _poll(self) -> None:
+        self._runner.poll()
+        self._notice()
+
+    def _notice(self) -> None:
+        """End where a person would wait for the disk."""
+        if self._runner.stalled is not None:
+            raise StoreError(self._runner.stalled)
 
     def run(self) -> None:
         """Go from the first page to the last."""
-        self._runner.post(Begin(self._now_s()))
+        self._post(Begin(self._now_s()))
         while not self._runner.finished:
             match self._page:
                 case TextPage() as page:
                     self._pass(reading_s(page))
                     if page is self._page:
-                        self._runner.post(Continue(self._now_s()))
+                        self._post(Continue(self._now_s()))
                 case TaskPage() as page:
                     self._do(page)
                 case QuestionnairePage() as page:
                     self._fill_in(page)
                 case _:
-                    raise SessionError(f"the rehearsal broke: {self._parts.servo.fault or self._page}")
+                    raise SessionError(f"the rehearsal broke: {self._machine.servo.fault or self._page}")
 
     def _present(self, page: Page) -> None:
         self._page = page
@@ -168,33 +250,34 @@ class _Rehearsal:
         page = self._page
         while self._now_s() < end_s and page is self._page:
             self._advance(min(IDLE_S, end_s - self._now_s()))
-            self._runner.poll()
+            self._poll()
 
     def _advance(self, seconds: float) -> None:
-        self._parts.servo.advance(max(1, round(seconds * self._parts.servo.rate_hz)))
+        self._machine.servo.advance(max(1, round(seconds * self._machine.servo.rate_hz)))
 
     def _do(self, page: TaskPage) -> None:
         """Do a task until its page is left, seeing every frame and feeling every tick."""
-        device, draw = self._parts.device, self._draw
+        device, draw = self._machine.device, self._stream(f"{page.trial}/behaviour")
+        self._paint = self._stream(f"{page.trial}/screen")
         senses = Senses(self._study.scene.scale)
         self._touch.read()
-        self._next_frame_ns = self._parts.servo.now_ns()
+        self._next_frame_ns = self._machine.servo.now_ns()
         task = page.task
         hand = Reacher(task, device, draw) if isinstance(task, Reach) else Explorer(task, device, draw, self._now_s())
         while page is self._page:
             self._advance(LOOK_S)
             wants_to_go_on = self._see(senses, hand)
             senses.feel(np.asarray(self._touch.read()))
-            self._runner.poll()
+            self._poll()
             if wants_to_go_on and page is self._page:
-                self._runner.post(Continue(self._now_s()))
+                self._post(Continue(self._now_s()))
         device.rest()
         self._felt = senses.felt()
 
     def _see(self, senses: Senses, hand: Explorer | Reacher) -> bool:
         """Show the frames since the last look, and let the hand act on the newest; return whether it is done."""
         view = None
-        while self._next_frame_ns <= self._parts.servo.now_ns():
+        while self._next_frame_ns <= self._machine.servo.now_ns():
             view = self._runner.view(self._next_frame_ns)
             if view is not None:
                 low, high = PAINT_S
@@ -207,13 +290,14 @@ class _Rehearsal:
     def _fill_in(self, page: QuestionnairePage) -> None:
         """Answer every statement by what was felt, and confirm."""
         for item in page.items:
-            self._runner.post(ItemShown(self._now_s(), item.id))
-        answers = rate([item.id for item in page.items], self._felt, self._person, self._answer)
-        for choice in choices(answers, self._draw, len(page.labels)):
+            self._post(ItemShown(self._now_s(), item.id))
+        draw = self._stream(f"{page.trial}/answers")
+        answers = rate([item.id for item in page.items], self._felt, self._person, draw)
+        for choice in choices(answers, draw, len(page.labels)):
             self._pass(choice.after_s)
             if page is not self._page:
                 return
-            self._runner.post(Chosen(self._now_s(), choice.item, choice.value))
+            self._post(Chosen(self._now_s(), choice.item, choice.value))
         self._pass(1.0)
-        self._runner.post(Submitted(self._now_s()))
+        self._post(Submitted(self._now_s()))
         self.answers += len(answers)

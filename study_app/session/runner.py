@@ -3,20 +3,22 @@
 Everything that touches something goes through ``Ports``. Events come from windows (``post``) and from the device
 (``poll``, once a frame); what the participant sees comes from ``view``, what was seen goes into ``frame_shown``. All of
 it in one thread; a window that answers a page while it is being presented is heard after the commands under way.
+
+Where the disk takes nothing, the session stalls: zero force, a calm page, and what was to be done is kept and tried
+again until it is done, in order and once. Then the session is paused, and goes on when somebody asks for it.
 """
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import Any, Protocol
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from study_app.errors import SessionError, StoreError, StudyError
-from study_app.haptics.scene import Scene
 from study_app.protocol.model import Protocol as Study
 from study_app.protocol.schedule import Schedule
 from study_app.session import compose
@@ -32,48 +34,18 @@ from study_app.session.commands import (
     Write,
     WriteTables,
 )
-from study_app.session.events import Broke, Continue, Event, ForceStopped, TaskDone
+from study_app.session.events import Broke, Continue, EndAsked, Event, ForceStopped, TaskDone
 from study_app.session.machine import advance, open_session
-from study_app.session.pages import Page
+from study_app.session.ports import Ports
+from study_app.session.recording import Recording
+from study_app.session.resume import FIRST, Start
 from study_app.session.state import FINAL, Phase, SessionState
 from study_app.session.statistics import TrialStatistics
 from study_app.session.tasks import TaskView, Tracker, track
 
 BUTTON_CONTINUE = 1 << 0
 BUTTON_STOP = 1 << 3
-
-
-class ServoPort(Protocol):
-    """What is asked of the servo (``haptics.servo.Servo``)."""
-
-    rate_hz: float
-    telemetry: Any
-
-    @property
-    def fault(self) -> str | None: ...  # noqa: D102
-    def load(self, scene: Scene) -> int: ...  # noqa: D102
-    def rest(self) -> None: ...  # noqa: D102
-    def stop_force(self) -> None: ...  # noqa: D102
-    def fade_in(self) -> None: ...  # noqa: D102
-    def now_ns(self) -> int: ...  # noqa: D102
-
-
-class JournalPort(Protocol):
-    """What is asked of the store (``store.session.SessionStore``)."""
-
-    def append(self, event: str, *, t_s: float | None = None, **fields: Any) -> None: ...  # noqa: D102
-    def write_tables(self) -> None: ...  # noqa: D102
-    def finish(self, status: str, reason: str = "") -> None: ...  # noqa: D102
-
-
-@dataclass(frozen=True, slots=True)
-class Ports:
-    """The world: ``present`` shows a page, ``clock`` gives seconds since the session's origin."""
-
-    servo: ServoPort
-    journal: JournalPort
-    present: Callable[[Page], None]
-    clock: Callable[[], float]
+RETRY_S = 1.0  # a disk that took nothing is tried again so often
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,6 +70,16 @@ class _Running:
     dropped_before: int
 
 
+@dataclass(frozen=True, slots=True)
+class _Stall:
+    """What the disk did not take: why, and the commands that are still to be carried out."""
+
+    reason: str
+    commands: tuple[Command, ...]
+    at_s: float
+    retry_s: float
+
+
 class Runner:
     """Runs one session.
 
@@ -106,6 +88,7 @@ class Runner:
     protocol, schedule, language : what is run, in what order, in which language
     key : block → code → condition
     ports : the world
+    start : where a resumed session goes on
     """
 
     def __init__(
@@ -115,17 +98,20 @@ class Runner:
         key: Mapping[str, Mapping[str, str]],
         ports: Ports,
         language: str,
+        start: Start = FIRST,
     ) -> None:
         self._protocol = protocol
         self._ports = ports
-        self._state = open_session(protocol, schedule, key, language)
+        self._state = open_session(protocol, schedule, key, language, start)
         self._reader = ports.servo.telemetry.reader()
+        self._recording = Recording(ports.recorder, ports.servo.rate_hz)
         self._running: _Running | None = None
         self._measured: dict[str, Any] = {}
         self._buttons = 0
         self._page_since_ns = 0
         self._waiting: deque[Event] = deque()
         self._busy = False
+        self._stall: _Stall | None = None
         self._listeners: list[Callable[[SessionState], None]] = []
 
     @property
@@ -137,6 +123,11 @@ class Runner:
     def finished(self) -> bool:
         """Whether the session is over."""
         return self._state.phase in FINAL
+
+    @property
+    def stalled(self) -> str | None:
+        """Why the disk takes nothing, for the operator; None while it does."""
+        return None if self._stall is None else self._stall.reason
 
     @property
     def task(self) -> TaskView | None:
@@ -155,7 +146,7 @@ class Runner:
         SessionError
             It cannot happen now; nothing was changed.
         StoreError
-            It could not be kept. The force is off and the operator is called for; what was kept before is safe.
+            The session was to end while it stalled, and its end could not be written: it stays unfinished.
         """
         if isinstance(event, ForceStopped):
             self._ports.servo.stop_force()
@@ -176,14 +167,13 @@ class Runner:
             raise refused
 
     def poll(self) -> None:
-        """Look at the device: follow the task, hear its buttons, notice a fault. Call it once a frame.
-
-        Raises
-        ------
-        StoreError
-            As ``post``.
-        """
+        """Look at the device: follow the task, hear its buttons, notice a fault. Call it once a frame."""
         samples = np.asarray(self._reader.read())  # fields of a plain array are found faster
+        self._recording.take(samples)
+        if self._stall is not None:
+            if self._ports.clock() >= self._stall.retry_s:
+                self._try_again(self._stall)
+            return
         fault = self._ports.servo.fault
         if fault is not None and self._state.phase not in {Phase.TROUBLE, *FINAL}:
             self.post(Broke(self._ports.clock(), fault))
@@ -206,19 +196,38 @@ class Runner:
         """Keep the age of what a frame showed: painted at one time, true of another [ns, servo's clock]."""
         if self._running is not None:
             self._running.statistics.frame(painted_ns, sample_ns)
+            self._recording.frame(painted_ns, sample_ns)
 
     def _take(self, event: Event) -> None:
+        if self._stall is not None and not self._take_while_stalled(event, self._stall):
+            return
         if isinstance(event, Continue) and self._state.phase is Phase.TASK:
             self._leave_task()
             return
         self._state, commands = advance(self._state, event)
-        try:
-            for command in commands:
-                self._carry_out(command, event.at_s)
-        except StudyError as error:
-            self._give_up(error)
+        self._carry_out_all(commands, event.at_s)
+        if self._stall is None:
+            self._tell()
+
+    @property
+    def _stalls(self) -> bool:
+        return self._stall is not None
+
+    def _tell(self) -> None:
         for listener in self._listeners:
             listener(self._state)
+
+    def _carry_out_all(self, commands: Sequence[Command], at_s: float) -> None:
+        for index, command in enumerate(commands):
+            try:
+                self._carry_out(command, at_s)
+            except StoreError as error:
+                self._hold(commands[index:], at_s, error)
+                return
+            except StudyError as error:
+                self._ports.servo.stop_force()
+                self._waiting.append(Broke(self._ports.clock(), str(error)))
+                return
 
     def _carry_out(self, command: Command, at_s: float) -> None:
         servo, journal = self._ports.servo, self._ports.journal
@@ -243,20 +252,51 @@ class Runner:
             case Finish(status, reason):
                 journal.finish(status, reason)
 
-    def _give_up(self, error: StudyError) -> None:
-        """Call for the operator: the servo refused, which the journal can still say, or the journal itself failed."""
-        self._ports.servo.stop_force()
-        if not isinstance(error, StoreError):
-            self._waiting.append(Broke(self._ports.clock(), str(error)))
-            return
+    def _hold(self, commands: Sequence[Command], at_s: float, error: StoreError) -> None:
+        """Stop the force and keep what is still to be done; the participant sees a calm page until it is."""
+        servo = self._ports.servo
+        servo.stop_force()
         self._stop_trial()
-        self._ports.servo.rest()
-        if self._state.phase not in FINAL:
-            self._state, _ = advance(self._state, Broke(self._ports.clock(), str(error)))
-        self._ports.present(compose.page(self._state))
-        for listener in self._listeners:
-            listener(self._state)
-        raise error
+        servo.rest()
+        self._stall = _Stall(str(error), tuple(commands), at_s, self._ports.clock() + RETRY_S)
+        over = self._state.phase in FINAL
+        self._ports.present(compose.page(self._state if over else replace(self._state, phase=Phase.TROUBLE)))
+        self._tell()
+
+    def _try_again(self, stall: _Stall) -> bool:
+        """Do what was left to do; if the disk takes it, pause. Return whether it did."""
+        waiting, busy = tuple(self._waiting), self._busy
+        self._stall, self._busy = None, True
+        self._carry_out_all(stall.commands, stall.at_s)
+        self._busy = busy
+        if self._stalls:  # again, by what was just carried out
+            return False
+        self._waiting = deque(waiting)  # what a page said that is covered again at once is said again later
+        if self._state.phase in {Phase.READING, Phase.TASK, Phase.ANSWERING, Phase.PAUSED}:
+            self._waiting.appendleft(ForceStopped(self._ports.clock(), "program"))
+        if self._waiting and not busy:
+            self.post(self._waiting.popleft())
+        elif not busy:
+            self._tell()
+        return True
+
+    def _take_while_stalled(self, event: Event, stall: _Stall) -> bool:
+        """Return whether the event can be taken after all: an end is, if need be without being written."""
+        if isinstance(event, ForceStopped):
+            return False
+        if not isinstance(event, EndAsked):
+            raise SessionError(f"{stall.reason}; until then the session waits")
+        if not self._try_again(stall):
+            self._state, _ = advance(self._state, event)
+            self._ports.present(compose.page(self._state))
+            self._tell()
+            raise StoreError(
+                f"{stall.reason}; the session's end is not written either: resume it later, or end it then"
+            )
+        if self._waiting:
+            self._waiting.append(event)
+            return False
+        return True
 
     def _start_trial(self, command: StartTrial) -> None:
         servo = self._ports.servo
@@ -273,8 +313,10 @@ class Runner:
             statistics=statistics,
             dropped_before=self._reader.dropped,
         )
+        self._recording.start(command.trial, command.attempt)
 
     def _stop_trial(self) -> None:
+        self._recording.stop()
         if self._running is not None:
             self._measured = self._summary(self._running)
             self._running = None
@@ -288,10 +330,16 @@ class Runner:
         if running is None or running.tracker.done:
             return
         mine = samples[samples["scene"] == running.serial]
-        for reached in running.tracker.feed(mine):
-            self._keep("target_reached", trial=running.trial, target=reached.target, t_task_s=reached.t_task_s)
+        reached = running.tracker.feed(mine)
         end_ns = running.tracker.end_ns
         running.statistics.feed(mine if end_ns is None else mine[mine["time_ns"] <= end_ns])
+        self._carry_out_all(
+            [
+                Write("target_reached", {"trial": running.trial, "target": one.target, "t_task_s": one.t_task_s})
+                for one in reached
+            ],
+            self._ports.clock(),
+        )
 
     def _end_when_seen(self, running: _Running, end_ns: int) -> None:
         """Leave the tank when what ended the task has been drawn, as late as it may be in this block."""
@@ -313,11 +361,5 @@ class Runner:
         if (pressed & BUTTON_STOP).any():
             self.post(ForceStopped(self._ports.clock(), "device"))
         pressed_since = pressed[samples["time_ns"] >= self._page_since_ns]
-        if (pressed_since & BUTTON_CONTINUE).any() and self._state.phase is Phase.READING:
+        if (pressed_since & BUTTON_CONTINUE).any() and self._state.phase is Phase.READING and not self._stalls:
             self.post(Continue(self._ports.clock()))
-
-    def _keep(self, event: str, **fields: Any) -> None:
-        try:
-            self._ports.journal.append(event, t_s=self._ports.clock(), **fields)
-        except StoreError as error:
-            self._give_up(error)

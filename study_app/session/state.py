@@ -9,6 +9,7 @@ from enum import Enum
 from study_app.errors import SessionError
 from study_app.protocol.model import Protocol, Questionnaire
 from study_app.protocol.schedule import PageStep, Schedule, Step, Trial
+from study_app.session.resume import FIRST, Start
 
 
 class Phase(Enum):
@@ -29,12 +30,16 @@ FINAL = frozenset({Phase.COMPLETE, Phase.ENDED})
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """What stays the same through a session; ``key`` (block → code → condition) is blinded and never printed."""
+    """What stays the same through a session; ``key`` (block → code → condition) is blinded and never printed.
+
+    ``start`` is where it begins: not at the first step where it was interrupted before.
+    """
 
     protocol: Protocol = field(repr=False)
     schedule: Schedule
     key: Mapping[str, Mapping[str, str]] = field(repr=False)
     language: str
+    start: Start = FIRST
 
     def condition(self, trial: Trial) -> str:
         """Return the condition behind a trial's code."""

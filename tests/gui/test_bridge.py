@@ -174,7 +174,28 @@ def test_stop_force_works_with_a_full_disk(bridge, world, caplog):
     assert not world.force_is_on
     assert isinstance(bridge.participant.page, TroublePage)
     assert "No space left" in bridge.operator.banner.what.text()
+    assert bridge.operator.header.state.word == "Waiting for the disk"
     assert "no space left" in caplog.text
+    caplog.clear()
+
+
+def test_when_there_is_space_again_the_session_goes_on_paused_with_nothing_lost(bridge, world, caplog):
+    begin_trial(bridge, world)
+    world.full = True
+    bridge.operator.mark_set.emit()
+    bridge.operator.note_written.emit("dropped while the disk is full")
+    assert "Make room" in bridge.operator.banner.then.text()
+    assert bridge.operator.device.chip.word == "Ready"
+    world.full = False
+    world.now_s += 2.0
+    bridge._frame()
+    assert isinstance(bridge.participant.page, PausePage)
+    assert not bridge.operator.banner.isVisible()
+    assert ("note", {"kind": "mark", "text": ""}) in world.done
+    bridge.operator.fade_in_asked.emit()
+    assert isinstance(bridge.participant.page, TaskPage)
+    assert world.force_is_on
+    assert "takes data again" in caplog.text
     caplog.clear()
 
 
@@ -316,6 +337,7 @@ def test_an_end_that_cannot_be_written_still_lets_the_windows_go(bridge, world, 
     bridge.operator.end_asked.emit("aborted", "")
     assert not world.force_is_on
     assert "No space left" in bridge.operator.banner.what.text()
+    assert bridge.runner.stalled
     with qtbot.waitSignal(bridge.done):
         bridge.operator.close()
     assert "no space left" in caplog.text

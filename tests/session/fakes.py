@@ -9,7 +9,8 @@ import numpy as np
 
 from study_app.errors import StoreError
 from study_app.haptics.scene import Scene
-from study_app.session.runner import Ports, Runner
+from study_app.session.ports import Ports
+from study_app.session.runner import Runner
 from study_app.session.state import SessionState
 from tests.session import small
 
@@ -98,7 +99,8 @@ class FakeJournal:
         self.lines.append({"event": event, "t_s": t_s, **fields})
 
     def write_tables(self) -> None:
-        self.tables_written += 1
+        if self.fails_after is None:
+            self.tables_written += 1
 
     def finish(self, status: str, reason: str = "") -> None:
         self._log.append("finish")
@@ -113,14 +115,14 @@ class FakeJournal:
 class World:
     """A runner of the small study with everything around it; ``log`` is what happened, in order."""
 
-    def __init__(self, seed: int = 1) -> None:
+    def __init__(self, seed: int = 1, recorder: Any = None) -> None:
         self.log: list[Any] = []
         self.servo = FakeServo(self.log)
         self.journal = FakeJournal(self.log)
         self.pages: list[Any] = []
         self.on_page: Callable[[Any], None] = lambda _page: None
         plan = small.opened(seed).plan
-        ports = Ports(self.servo, self.journal, self._present, self.clock)
+        ports = Ports(self.servo, self.journal, self._present, self.clock, recorder)
         self.runner = Runner(plan.protocol, plan.schedule, plan.key, ports, plan.language)
 
     def clock(self) -> float:

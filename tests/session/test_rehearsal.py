@@ -159,7 +159,7 @@ def test_a_device_that_is_lost_ends_the_rehearsal_with_a_word_why(
     look = rehearsal._Rehearsal._see
 
     def pull_the_cable(self: Any, senses: Any, hand: Any) -> bool:
-        self._parts.device.unplug()
+        self._machine.device.unplug()
         return look(self, senses, hand)
 
     monkeypatch.setattr(rehearsal._Rehearsal, "_see", pull_the_cable)

@@ -22,7 +22,7 @@ from study_app.session.events import (
 )
 from study_app.session.moves import END_SHOWN_S
 from study_app.session.pages import EndPage, PausePage, QuestionnairePage, TaskPage, TroublePage
-from study_app.session.runner import BUTTON_CONTINUE, BUTTON_STOP
+from study_app.session.runner import BUTTON_CONTINUE, BUTTON_STOP, RETRY_S
 from study_app.session.state import Phase
 from tests.session.fakes import World
 
@@ -349,35 +349,210 @@ def test_a_servo_that_refuses_a_scene_calls_the_operator(world: World) -> None:
     assert not world.servo.force_is_on
 
 
-def test_a_full_disk_stops_the_force_calls_the_operator_and_says_so(practising: World) -> None:
-    practising.journal.fails_after = len(practising.journal.lines)
-    seen: list[Phase] = []
-    practising.runner.on_change(lambda state: seen.append(state.phase))
-    with pytest.raises(StoreError, match="disk full"):
-        practising.run(3.2)
-    assert practising.state.phase is Phase.TROUBLE
+def stall(world: World) -> None:
+    """Let the disk take nothing from now on."""
+    world.journal.fails_after = len(world.journal.lines)
+
+
+def wait_for_the_disk(world: World) -> None:
+    world.journal.fails_after = None
+    world.run(RETRY_S + 0.01)
+
+
+def test_a_full_disk_stops_the_force_shows_a_calm_page_and_tells_the_operator(practising: World) -> None:
+    stall(practising)
+    told: list[str | None] = []
+    practising.runner.on_change(lambda _state: told.append(practising.runner.stalled))
+    practising.run(3.2)
+    assert practising.runner.stalled == "disk full"
+    assert told == ["disk full"]
     assert not practising.servo.force_is_on
     assert practising.servo.scene == 0
     assert isinstance(practising.pages[-1], TroublePage)
+    assert "disk" not in practising.pages[-1].paragraph
     assert not any(isinstance(page, TaskPage) and page.trial == 2 for page in practising.pages)
-    assert seen == [Phase.TROUBLE]
 
 
-def test_a_full_disk_at_a_target_stops_the_force_too() -> None:
+def test_when_the_disk_takes_data_again_all_is_kept_in_order_and_once_and_the_session_is_paused() -> None:
+    undisturbed, world = at_block("feeling"), at_block("feeling")
+    for each in (undisturbed, world):
+        each.run(3.2)
+        for item in each.state.trial.items:
+            each.runner.post(Chosen(9.0, item, 2))
+    stall(world)
+    for each in (undisturbed, world):
+        each.runner.post(Submitted(9.5))
+    world.run(RETRY_S + 0.01)
+    assert world.runner.stalled == "disk full"
+    wait_for_the_disk(world)
+    assert world.runner.stalled is None
+    assert world.state.phase is Phase.PAUSED
+    assert world.pages[-1] == PausePage(force_off=True)
+    before = len(undisturbed.journal.lines)
+    assert world.journal.lines[:before] == undisturbed.journal.lines
+    after = [(line["event"], line.get("by", line.get("outcome"))) for line in world.journal.lines[before:]]
+    assert after == [("trial_ended", "interrupted"), ("force_stopped", "program"), ("paused", "program")]
+    world.runner.post(ResumeAsked(20.0))
+    assert world.servo.force_is_on
+    assert world.state.phase is Phase.TASK
+    assert world.state.attempt == 2
+
+
+def test_a_choice_that_met_a_full_disk_is_there_after_the_pause() -> None:
+    world = at_block("feeling")
+    world.run(3.2)
+    stall(world)
+    item = world.state.trial.items[0]
+    world.runner.post(Chosen(9.0, item, 6))
+    with pytest.raises(SessionError, match="disk full"):
+        world.runner.post(Submitted(9.1))
+    wait_for_the_disk(world)
+    world.runner.post(ResumeAsked(20.0))
+    assert world.pages[-1].chosen == ((item, 6),)
+    assert [line["value"] for line in world.journal.of("choice")] == [6]
+
+
+def test_every_target_of_a_look_is_kept_however_long_the_disk_was_full() -> None:
     world = at_block("seeing")
-    world.journal.fails_after = len(world.journal.lines)
-    with pytest.raises(StoreError):
-        world.run(0.3, LEFT)
-    assert world.state.phase is Phase.TROUBLE
-    assert not world.servo.force_is_on
+    before = len(world.journal.of("target_reached"))
+    stall(world)
+    world.servo.run(0.3, LEFT)
+    world.run(0.3, RIGHT)
+    assert isinstance(world.pages[-1], TroublePage)
+    wait_for_the_disk(world)
+    assert [line["target"] for line in world.journal.of("target_reached")[before:]] == [0, 1]
+    assert world.journal.of("trial_ended")[-1]["targets_reached"] == 2
 
 
-def test_an_end_whose_receipt_fails_is_an_end_and_says_so(practising: World) -> None:
-    practising.journal.finish_fails = True
-    with pytest.raises(StoreError, match="receipt"):
-        practising.runner.post(EndAsked(1.0, "withdrawn", ""))
+def test_the_force_can_be_stopped_while_the_disk_is_full(practising: World) -> None:
+    stall(practising)
+    practising.runner.post(Note(1.0, "mark", ""))
+    practising.servo.force_is_on = True
+    practising.runner.post(ForceStopped(1.1, "participant"))
+    assert not practising.servo.force_is_on
+
+
+def test_buttons_answer_nothing_while_the_disk_is_full(world: World) -> None:
+    world.runner.post(Begin(0.0))
+    stall(world)
+    world.runner.post(Note(1.0, "mark", ""))
+    world.run(0.1)
+    world.run(0.1, buttons=BUTTON_CONTINUE)
+    assert world.state.phase is Phase.READING
+
+
+def test_a_session_that_is_ended_with_a_full_disk_ends_and_stays_unfinished(practising: World) -> None:
+    stall(practising)
+    practising.runner.post(Note(1.0, "mark", ""))
+    with pytest.raises(StoreError, match="resume it later"):
+        practising.runner.post(EndAsked(2.0, "aborted", ""))
     assert practising.runner.finished
     assert isinstance(practising.pages[-1], EndPage)
+    assert practising.journal.status is None
+
+
+def test_a_session_that_is_ended_when_there_is_space_again_is_finished(practising: World) -> None:
+    stall(practising)
+    practising.runner.post(Note(1.0, "mark", ""))
+    practising.journal.fails_after = None
+    practising.runner.post(EndAsked(2.0, "withdrawn", ""))
+    assert practising.journal.status == "withdrawn"
+    assert [line["event"] for line in practising.journal.lines[-4:]] == [
+        "note",
+        "trial_ended",
+        "force_stopped",
+        "paused",
+    ]
+
+
+def test_an_end_whose_receipt_fails_is_an_end_and_is_tried_again(practising: World) -> None:
+    practising.journal.finish_fails = True
+    practising.runner.post(EndAsked(1.0, "withdrawn", ""))
+    assert practising.runner.finished
+    assert practising.runner.stalled == "no room for the receipt"
+    assert isinstance(practising.pages[-1], EndPage)
+    practising.journal.finish_fails = False
+    practising.run(RETRY_S + 0.01)
+    assert practising.runner.stalled is None
+    assert isinstance(practising.pages[-1], EndPage)
+
+
+class Tape:
+    """A recorder that is all memory: what came in which order."""
+
+    def __init__(self) -> None:
+        self.told: list[Any] = []
+
+    def start(self, trial: int, attempt: int, rate_hz: float) -> None:
+        self.told.append(("start", trial, attempt, rate_hz))
+
+    def append(self, samples: Any) -> None:
+        self.told.append(samples)
+
+    def frame(self, painted_ns: int, sample_ns: int) -> None:
+        self.told.append(("frame", painted_ns, sample_ns))
+
+    def stop(self) -> None:
+        self.told.append(("stop",))
+
+
+def recorded(tape: Tape) -> list[list[int]]:
+    """Return the ticks of each recording."""
+    found: list[list[int]] = []
+    for told in tape.told:
+        if isinstance(told, tuple) and told[0] == "start":
+            found.append([])
+        elif not isinstance(told, tuple):
+            found[-1] += told["tick"].tolist()
+    return found
+
+
+def test_every_turn_of_a_trial_is_recorded_and_those_shortly_before_it() -> None:
+    tape = Tape()
+    world = World(recorder=tape)
+    world.runner.post(Begin(0.0))
+    for _ in range(10):
+        world.run(0.5)
+    world.runner.post(Continue(world.clock()))
+    for _ in range(8):
+        world.run(0.4)
+    world.run(0.05)
+    first, second = recorded(tape)
+    assert first == list(range(5000 - 600 + 1, 5000 + 3200 + 1))  # until it was left, 100 ms after its end
+    assert second == list(range(8200 - 600 + 1, 8250 + 1))
+    assert [told for told in tape.told if isinstance(told, tuple)] == [
+        ("start", 1, 1, 1000.0),
+        ("stop",),
+        ("start", 2, 1, 1000.0),
+    ]
+
+
+def test_frames_are_recorded_with_their_trial_and_attempts_have_recordings_of_their_own() -> None:
+    tape = Tape()
+    world = World(recorder=tape)
+    world.runner.post(Begin(0.0))
+    world.runner.frame_shown(1, 0)
+    world.runner.post(Continue(0.0))
+    world.run(0.5)
+    world.runner.frame_shown(500, 400)
+    world.runner.post(PauseAsked(0.5, "operator"))
+    world.run(0.5)
+    world.runner.post(ResumeAsked(1.0))
+    told = [told for told in tape.told if isinstance(told, tuple)]
+    assert told == [("start", 1, 1, 1000.0), ("frame", 500, 400), ("stop",), ("start", 1, 2, 1000.0)]
+
+
+def test_a_trial_with_a_late_screen_or_a_late_servo_says_so(practising: World) -> None:
+    for _ in range(20):
+        now = practising.servo.now_ns()
+        practising.runner.frame_shown(now + 90_000_000, now)
+    practising.run(1.0)
+    practising.servo.ticks += 150  # the servo stood still
+    practising.run(2.2, lateness_ns=5_000_000)
+    (row,) = practising.journal.of("trial_ended")
+    assert row["delay_error_p95_ms"] == pytest.approx(90)
+    assert row["frames_late"] == 20
+    assert row["lateness_p99_ms"] == pytest.approx(5)
 
 
 def test_listeners_hear_every_event_that_was_taken(world: World) -> None:

@@ -13,7 +13,8 @@ from study_app.haptics.clock import VirtualClock
 from study_app.haptics.servo import Servo
 from study_app.session.events import Begin, Continue, EndAsked, ForceStopped, PauseAsked, ResumeAsked
 from study_app.session.pages import PausePage, TroublePage
-from study_app.session.runner import BUTTON_STOP, Ports, Runner
+from study_app.session.ports import Ports
+from study_app.session.runner import BUTTON_STOP, Runner
 from study_app.session.state import Phase
 from tests.session import small
 from tests.session.fakes import FakeJournal

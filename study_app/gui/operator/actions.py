@@ -66,6 +66,8 @@ def _hint(view: OperatorView) -> str:
         return ""
     if view.over:
         return "The journal is closed and the tables are written."
+    if view.waits:
+        return "The force is off. What was answered is kept until the disk takes it."
     if view.state == "trouble":
         return "The force is off. Everything answered before is on disk."
     if view.state == "force off":

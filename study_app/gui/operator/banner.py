@@ -12,6 +12,7 @@ from study_app.gui.theme import RADIUS_CARD
 from study_app.gui.themed import Themed
 
 WHAT_TO_DO = "The force is off and every answer so far is on disk. End the session, mend the cause, then begin anew."
+WAITS = "The force is off and nothing is lost. Make room or bring the drive back: the session then goes on, paused."
 AFTERWARDS = "The session is closed and the force is off. What the journal holds is safe."
 
 
@@ -33,11 +34,11 @@ class Banner(Themed, QWidget):
         row.addLayout(words, 1)
         self.hide()
 
-    def show_trouble(self, what: str, *, over: bool) -> None:
+    def show_trouble(self, what: str, *, over: bool, waits: bool = False) -> None:
         """Say ``what`` happened, or nothing where nothing did."""
         if what != self.what.text():
             self.what.setText(what[:1].upper() + what[1:])
-        self.then.setText(AFTERWARDS if over else WHAT_TO_DO)
+        self.then.setText(WAITS if waits and not over else AFTERWARDS if over else WHAT_TO_DO)
         self.setVisible(bool(what))
 
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name

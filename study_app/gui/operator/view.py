@@ -68,7 +68,10 @@ class DeviceView:
 
 @dataclass(frozen=True, slots=True)
 class OperatorView:
-    """Everything on the operator's window except the two plots' points."""
+    """Everything on the operator's window except the two plots' points.
+
+    ``waits`` says that the trouble is a disk that takes nothing: the session goes on when it does again.
+    """
 
     study: str
     who: str
@@ -92,6 +95,7 @@ class OperatorView:
     may_resume: bool
     may_repeat: bool
     over: bool
+    waits: bool = False
 
     @property
     def share(self) -> float:
@@ -129,18 +133,20 @@ def operator_view(
     now_s: float,
     force_on: bool,
     trouble: str = "",
+    waits: bool = False,
     rate_hz: float = 1000.0,
 ) -> OperatorView:
     """Return what the operator sees at ``now_s`` on the session's clock; ``trouble`` is what no journal could say."""
     trouble = progress.broke or trouble
     state = _state(progress, force_on=force_on, trouble=trouble)
+    waits = waits and not progress.broke
     trial = progress.trial
     answering = trial is not None and progress.trial_lasted_s is not None
     return OperatorView(
         study=session.protocol.study.name,
         who=session.who,
         state=state,
-        state_word=_state_word(state, progress),
+        state_word="Waiting for the disk" if waits and state == "trouble" else _state_word(state, progress),
         trouble=trouble,
         saved_ago_s=None if progress.saved_s is None else max(0.0, now_s - progress.saved_s),
         elapsed_s=progress.ended_s if progress.ended else now_s,
@@ -155,8 +161,8 @@ def operator_view(
         device=DeviceView(
             session.device_name,
             session.device_kind,
-            not trouble,
-            (*session.device_rows, ("Safety faults", "1" if trouble else "0")),
+            waits or not trouble,
+            (*session.device_rows, ("Safety faults", "1" if trouble and not waits else "0")),
         ),
         notes=progress.notes[-NOTES_SHOWN:][::-1],
         force_on=force_on,
@@ -164,6 +170,7 @@ def operator_view(
         may_resume=state in {"paused", "force off"},
         may_repeat=trial is not None and state == "running",
         over=state == "ended",
+        waits=waits,
     )
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from study_app.gui.operator.progress import SessionProgress
-from study_app.session.runner import JournalPort
+from study_app.session.ports import JournalPort
 
 
 class WatchedJournal:

@@ -165,7 +165,7 @@ class OperatorWindow(QMainWindow):
         for part in (self.header, self.rail, self.tiles, self.notes, self.stop, self.buttons):
             part.show_view(view)
         self.device.show_device(view.device)
-        self.banner.show_trouble(view.trouble, over=view.over)
+        self.banner.show_trouble(view.trouble, over=view.over, waits=view.waits)
         self.may_close = view.over
 
     def show_traces(self, health: ServoHealth, now_s: float) -> None:

@@ -1,0 +1,56 @@
+"""What the runner asks of the world, as small protocols: a servo, a journal, a recorder, a screen and a clock."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from study_app.haptics.scene import Scene
+from study_app.session.pages import Page
+
+
+class ServoPort(Protocol):
+    """What is asked of the servo (``haptics.servo.Servo``)."""
+
+    rate_hz: float
+    telemetry: Any
+
+    @property
+    def fault(self) -> str | None: ...  # noqa: D102
+    def load(self, scene: Scene) -> int: ...  # noqa: D102
+    def rest(self) -> None: ...  # noqa: D102
+    def stop_force(self) -> None: ...  # noqa: D102
+    def fade_in(self) -> None: ...  # noqa: D102
+    def now_ns(self) -> int: ...  # noqa: D102
+
+
+class JournalPort(Protocol):
+    """What is asked of the store (``store.open_session.SessionStore``)."""
+
+    def append(self, event: str, *, t_s: float | None = None, **fields: Any) -> None: ...  # noqa: D102
+    def write_tables(self) -> None: ...  # noqa: D102
+    def finish(self, status: str, reason: str = "") -> None: ...  # noqa: D102
+
+
+class RecorderPort(Protocol):
+    """What is asked of the recorder (``store.recorder.Recorder``); nothing of it waits for the disk."""
+
+    def start(self, trial: int, attempt: int, rate_hz: float) -> None: ...  # noqa: D102
+    def append(self, samples: Any) -> None: ...  # noqa: D102
+    def frame(self, painted_ns: int, sample_ns: int) -> None: ...  # noqa: D102
+    def stop(self) -> None: ...  # noqa: D102
+
+
+@dataclass(frozen=True, slots=True)
+class Ports:
+    """The world: ``present`` shows a page, ``clock`` gives seconds since the session's origin.
+
+    ``recorder`` is None where no recordings are kept.
+    """
+
+    servo: ServoPort
+    journal: JournalPort
+    present: Callable[[Page], None]
+    clock: Callable[[], float]
+    recorder: RecorderPort | None = None

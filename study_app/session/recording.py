@@ -1,0 +1,64 @@
+"""What goes into a trial's recording: every turn of the servo from shortly before it until its tank is left.
+
+The turns before it make the recording complete in itself: they hold whatever the force was still fading from, so that
+every force of the trial can be computed again from the recording alone.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Any
+
+from study_app.session.ports import RecorderPort
+
+LEAD_S = 0.6  # longer than the slowest fade
+
+
+class Recording:
+    """Hands the samples of trials, and the frames shown in them, to the recorder; without one it does nothing.
+
+    Parameters
+    ----------
+    recorder : where they go
+    rate_hz : the servo's nominal rate
+    """
+
+    def __init__(self, recorder: RecorderPort | None, rate_hz: float) -> None:
+        self._recorder = recorder
+        self._rate_hz = rate_hz
+        self._lead = round(LEAD_S * rate_hz)
+        self._before: deque[Any] = deque()
+        self._held = 0
+        self._running = False
+
+    def take(self, samples: Any) -> None:
+        """Take the newest samples, in order (array of ``layout.SAMPLE``), which nobody changes afterwards."""
+        if self._recorder is None or len(samples) == 0:
+            return
+        if self._running:
+            self._recorder.append(samples)
+        self._before.append(samples)
+        self._held += len(samples)
+        while self._held - len(self._before[0]) >= self._lead:
+            self._held -= len(self._before.popleft())
+
+    def start(self, trial: int, attempt: int) -> None:
+        """Begin the recording of a trial, with what came just before it."""
+        if self._recorder is None:
+            return
+        self._recorder.start(trial, attempt, self._rate_hz)
+        self._running = True
+        spare = max(self._held - self._lead, 0)
+        for index, samples in enumerate(self._before):
+            self._recorder.append(samples[spare:] if index == 0 else samples)
+
+    def frame(self, painted_ns: int, sample_ns: int) -> None:
+        """Take a frame that was painted at one moment and showed another [ns]."""
+        if self._recorder is not None and self._running:
+            self._recorder.frame(painted_ns, sample_ns)
+
+    def stop(self) -> None:
+        """End the recording."""
+        if self._recorder is not None and self._running:
+            self._recorder.stop()
+        self._running = False

@@ -1,0 +1,113 @@
+"""Where a session that was interrupted goes on: at the trial that was under way, or at the beginning of its block."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from study_app.errors import ProtocolError, SessionError
+from study_app.protocol.load import parse, protocol_hash, shipped, source_bytes
+from study_app.protocol.model import Protocol
+from study_app.protocol.schedule import PageStep, Schedule, Step, Trial
+from study_app.store.journal import Line
+from study_app.store.progress import Progress, attempts, progress_of
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """Where a session starts: the index of its first step, and how often trials were presented before (by number)."""
+
+    step: int = 0
+    presented: Mapping[int, int] = field(default_factory=dict)
+
+
+FIRST = Start()
+
+
+def resume_at(protocol: Protocol, schedule: Schedule, lines: Iterable[Line]) -> Start:
+    """Return where the session with these journal lines goes on.
+
+    A trial whose answers are not all confirmed is presented again as its next attempt, so that nobody answers what they
+    felt before the gap; one that asks nothing and was done is over. With ``resume = "block"`` the whole block is
+    presented again.
+
+    Raises
+    ------
+    SessionError
+        The journal is not of this schedule.
+    """
+    told = list(lines)
+    progress = progress_of(told)
+    step = _next_step(protocol, schedule, progress)
+    if protocol.study.resume == "block":
+        step = _block_start(schedule, step)
+    presented: dict[int, int] = {}
+    for trial, attempt in attempts(told):
+        presented[trial] = max(attempt, presented.get(trial, 0))
+    return Start(step, presented)
+
+
+def find_protocol(start: Line, candidates: Iterable[str] | None = None) -> str:
+    """Return the file or name of the protocol that a session began with, from its journal's first line.
+
+    Parameters
+    ----------
+    candidates : where to look: files or names; by default those in ``./protocols`` and those that ship
+
+    Raises
+    ------
+    SessionError
+        There is none of that study.
+    """
+    own = sorted(path.stem for path in Path("protocols").glob("*.toml"))
+    names = dict.fromkeys((*own, *shipped()) if candidates is None else candidates)
+    sources = {name: source_bytes(name) for name in names}
+    for name, source in sources.items():
+        if protocol_hash(source) == start["protocol_hash"]:
+            return name
+    for name, source in sources.items():
+        if _study_name(name, source) == start["study"]:
+            return name
+    raise SessionError(f"no protocol at hand is of the study {start['study']!r}: name its file with --protocol FILE")
+
+
+def _study_name(name: str, source: bytes) -> str | None:
+    try:
+        return parse(source, name).study.name
+    except ProtocolError:
+        return None
+
+
+def _next_step(protocol: Protocol, schedule: Schedule, progress: Progress) -> int:
+    """Return the index of the step that was not left behind, checked against what the journal calls it."""
+    steps = schedule.steps
+    here = steps[progress.step] if progress.step < len(steps) else None
+    named = here.page_id if isinstance(here, PageStep) else None
+    number = here.number if isinstance(here, Trial) else None
+    if (progress.page, progress.trial) not in {(None, None), (named, number)}:
+        raise SessionError("the journal does not follow the order that seed and participant give: it cannot go on")
+    asks = isinstance(here, Trial) and protocol.blocks[here.block].questionnaire is not None
+    return progress.step + 1 if number is not None and progress.task_done and not asks else progress.step
+
+
+def _block_start(schedule: Schedule, step: int) -> int:
+    """Return the step of the first trial of the block that ``step`` is within."""
+    trial = _within(schedule.steps, step)
+    if trial is None:
+        return step
+    return next(index for index, other in enumerate(schedule.steps) if _of_block(other, trial.block))
+
+
+def _within(steps: tuple[Step, ...], step: int) -> Trial | None:
+    """Return a trial of the block that ``step`` is within: a trial of it, or a break between two; None elsewhere."""
+    here, before, after = (steps[at] if 0 <= at < len(steps) else None for at in (step, step - 1, step + 1))
+    if isinstance(here, Trial):
+        return here
+    if isinstance(before, Trial) and isinstance(after, Trial) and before.block == after.block:
+        return after
+    return None
+
+
+def _of_block(step: Step, block: str) -> bool:
+    return isinstance(step, Trial) and step.block == block
