@@ -9,7 +9,7 @@ from study_app.haptics.layout import SAMPLE, records
 from study_app.haptics.motion import Motion
 from study_app.haptics.pack import pack
 from study_app.haptics.safety import new_safety
-from study_app.haptics.scene import Knee, Liquid, Scene, Wake
+from study_app.haptics.scene import Box, Cylinder, Drag, Knee, Liquid, LocalWake, Scene, Vortex, Wake
 from study_app.haptics.tick import tick
 
 COMPILED = not numba.config.DISABLE_JIT
@@ -48,6 +48,37 @@ HONEY = scene(liquid(1400, id="honey"))
 LIGHT_OIL = scene(liquid(4500, id="light_oil", wake={"length": 125, "scaling": 250, "exponent": 0.25}))
 THESIS = {"water": WATER, "honey": HONEY, "light_oil": LIGHT_OIL}
 UNBENT = Knee(law="none")
+
+# Every effect at once, in a pool that a hand leaves through its wall and its surface, over a bed that fades in.
+ALL_EFFECTS = ("drag", "wake", "current", "buoyancy", "surface", "added_mass", "history")
+POOL = Liquid(
+    id="pool",
+    density_kg_m3=1400,
+    viscosity_pa_s=2.0,
+    region=Cylinder(centre_m=(0.0, -0.45, 0.0), radius_m=0.35, height_m=1.0),
+    effects=ALL_EFFECTS,
+    drag=Drag(law="brown-lawler"),
+    wake=Wake(length=300, scaling=400, exponent=0.75),
+    local_wake=LocalWake(length=300, scaling=400, exponent=0.75),
+    current=Vortex(core_m=0.2, peak_mps=0.5),
+)
+PLACES = POOL.model_copy(update={"effects": tuple("local_wake" if e == "wake" else e for e in ALL_EFFECTS)})
+BED = POOL.model_copy(
+    update={
+        "id": "bed",
+        "density_kg_m3": 1200.0,
+        "region": Box(centre_m=(0.0, -0.3, 0.0), size_m=(0.5, 0.5, 0.5)),
+        "effects": ("drag", "wake", "buoyancy", "added_mass", "history"),
+    }
+)
+EVERYTHING = {"tail": scene(POOL), "places": scene(PLACES), "two liquids": scene(POOL, BED)}
+
+
+def stroke(ticks: int) -> Any:
+    """Return hand positions (n, 3) of a wandering hand that rests now and then."""
+    t_s = np.arange(ticks) / 1000
+    bent = 0.7 * np.floor(t_s) + np.minimum(t_s % 1, 0.7)
+    return 0.04 * np.column_stack([np.sin(4 * bent), 0.3 * np.sin(7 * bent), np.cos(5 * bent)])
 
 
 def moving(velocity_mps: Any, interval_s: Any = 1e-3) -> Motion:

@@ -88,6 +88,7 @@ def test_steady_motion_meets_liquid_at_rest_but_for_what_is_right_behind():
     assert tail.fx_n[-1] > -0.01 * WATER_FACTOR
 
 
+@pytest.mark.skipif(not COMPILED, reason="seconds of motion are for compiled code")
 def test_circling_in_one_place_builds_a_whirl_that_is_felt_in_all_of_it():
     motion = path("circle", radius_m=0.1, revolutions=8.0, rest_s=0.5)
     felt = simulate(tank(length=5000, scaling=5000), motion)

@@ -21,6 +21,7 @@ from study_app.haptics.pack import pack, pack_into
 from study_app.haptics.safety import begin_scene, new_safety
 from study_app.haptics.scene import Box
 from tests.haptics.scenes import (
+    EVERYTHING,
     HONEY,
     LIGHT_OIL,
     THESIS,
@@ -200,11 +201,11 @@ def test_a_force_that_is_no_number_becomes_zero_and_a_status():
     assert not hand.turn((0.0051, 0, 0)).device_force_n.any()
 
 
-@pytest.mark.parametrize("name", THESIS)
+@pytest.mark.parametrize("name", [*THESIS, *EVERYTHING])
 @settings(max_examples=examples(60), deadline=None)
 @given(data=st.data())
 def test_whatever_the_device_says_the_force_is_finite_within_its_limit_and_never_jumps(name, data):
-    hand = Hand(THESIS[name], faded_in=data.draw(st.booleans()))
+    hand = Hand({**THESIS, **EVERYTHING}[name], faded_in=data.draw(st.booleans()))
     near = st.floats(-0.06, 0.06)
     places = st.one_of(st.none(), st.tuples(near, near, near), st.tuples(anything, anything, anything))
     before = np.zeros(3)

@@ -12,41 +12,29 @@ from study_app.haptics.pack import elements_needed, pack, pack_into
 from study_app.haptics.safety import new_safety
 from study_app.haptics.scene import Box, Scene
 from study_app.haptics.tick import tick
-from tests.haptics.scenes import COMPILED, HONEY, LIGHT_OIL, THESIS, WATER, Hand, liquid, scene, vectors
+from tests.haptics.scenes import (
+    COMPILED,
+    EVERYTHING,
+    HONEY,
+    LIGHT_OIL,
+    THESIS,
+    WATER,
+    Hand,
+    liquid,
+    scene,
+    stroke,
+    vectors,
+)
 
 MANY = scene(
     *WATER.liquids,
     liquid(900, id="pool", region=Box(size_m=(0.3, 0.3, 0.3)), wake={"length": 50, "scaling": 60, "axes": "xyz"}),
     liquid(1400, id="core", region=Box(size_m=(0.1, 0.1, 0.1))),
 )
+SCENES = {**THESIS, "many": MANY, **EVERYTHING}
 
 
-def stroke(ticks):
-    """Return hand positions (n, 3) of a wandering hand that rests now and then."""
-    t_s = np.arange(ticks) / 1000
-    bent = 0.7 * np.floor(t_s) + np.minimum(t_s % 1, 0.7)
-    return 0.04 * np.column_stack([np.sin(4 * bent), 0.3 * np.sin(7 * bent), np.cos(5 * bent)])
-
-
-def floats_of(record):
-    """Yield every float field of a record, nested ones too, as arrays that share its memory."""
-    for name in record.dtype.names:
-        if record.dtype[name].names:
-            yield from floats_of(record[name])
-        elif record.dtype[name].base == np.float64:
-            yield record[name]
-
-
-def poison(record):
-    """Fill every float of a record with NaN, integers with -1."""
-    for name in record.dtype.names:
-        if record.dtype[name].names:
-            poison(record[name])
-        else:
-            record[name][...] = np.nan if record.dtype[name].base == np.float64 else -1
-
-
-@pytest.mark.parametrize("felt", [*THESIS.values(), MANY], ids=[*THESIS, "many"])
+@pytest.mark.parametrize("felt", SCENES.values(), ids=SCENES)
 def test_the_servos_tick_and_simulate_are_the_same(felt):
     positions_m = stroke(1500)
     hand = Hand(felt)
@@ -72,17 +60,6 @@ def test_an_effect_left_out_owns_no_memory():
     assert (len(model.elements), len(model.segments), elements_needed(HONEY)) == (0, 0, 0)
     assert len(pack(LIGHT_OIL).elements) == elements_needed(LIGHT_OIL) == 125
     assert len(pack(Scene()).liquids) == 0
-
-
-def test_an_effect_left_out_is_neither_read_nor_written():
-    hand, clean = Hand(HONEY), Hand(HONEY)
-    poison(hand.model.liquids.wake)
-    poison(hand.model.liquid_states.wake)
-    for place in stroke(300):
-        felt, expected = hand.turn(place), clean.turn(place)
-        assert felt.tobytes() == expected.tobytes()
-    assert all(np.isnan(values).all() for values in floats_of(hand.model.liquids.wake))
-    assert all(np.isnan(values).all() for values in floats_of(hand.model.liquid_states.wake))
 
 
 def test_a_model_is_refilled_in_place_with_a_fresh_state():
@@ -115,7 +92,7 @@ def test_two_models_do_not_share_memory():
 
 
 @pytest.mark.skipif(not COMPILED, reason="the interpreter allocates all the time")
-@pytest.mark.parametrize("felt", [Scene(), *THESIS.values(), MANY], ids=["rest", *THESIS, "many"])
+@pytest.mark.parametrize("felt", [Scene(), *SCENES.values()], ids=["rest", *SCENES])
 def test_no_tick_allocates(felt):
     @njit
     def run(model, safety, sample, positions_m, ticks):

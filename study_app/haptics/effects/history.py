@@ -34,6 +34,7 @@ WEIGHTS = (
     0.63661146557001,
 )  # a_i
 NOTHING = 1e-30
+ROUNDING_S = 1e-9  # so that a window of whole ticks holds as many of them, however their sum is rounded
 
 
 @part
@@ -117,7 +118,7 @@ def _hand_on(history: Record, tracks: Record, intervals: Any, exponentials: Any,
     while tracks.held > 0:
         interval = intervals[history.row + tracks.first]
         ended_s = oldest_s - interval.duration_s
-        if ended_s < history.window_s and tracks.held < history.rows:
+        if ended_s < history.window_s - ROUNDING_S and tracks.held < history.rows:
             return
         for i in range(EXPONENTIALS):
             time_s = TIMES[i] * history.window_s
