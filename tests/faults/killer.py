@@ -1,0 +1,72 @@
+"""Kills rehearsed sessions at random moments and lets them be resumed: run as a program, once for all of them.
+
+Everything is loaded and compiled once, then each session is a fork that is killed with SIGKILL, and each going on
+another one (or a rebuilding, where all but the files after the last line was there). For every session it prints a line of JSON: the folder, after how long it was killed, what its journal held
+then, and how the going on ended.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import signal
+import sys
+import time
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+
+from study_app.session import rehearsal
+from study_app.store.rebuild import rebuild
+
+SEED = 7
+
+
+def forked(task: Callable[[], object], kill_after_s: float | None = None) -> int:
+    """Do ``task`` in a fork, killed after a while; return its exit code, negative where a signal ended it."""
+    child = os.fork()
+    if child == 0:
+        code = 1
+        try:
+            task()
+            code = 0
+        except BaseException:  # noqa: BLE001 - a fork must never return into the loop
+            traceback.print_exc()
+        finally:
+            os._exit(code)
+    if kill_after_s is not None:
+        time.sleep(kill_after_s)
+        os.kill(child, signal.SIGKILL)
+    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+
+
+def session(protocol: str, folder: Path) -> None:
+    rehearsal.rehearse(protocol, participants=1, seed=SEED, results=folder)
+
+
+def main(protocol: str, folder: str, count: str, seed: str) -> None:
+    whole, scratch = Path(folder) / "whole", Path(folder) / "scratch"
+    session(protocol, whole)
+    began = time.perf_counter()
+    assert forked(lambda: session(protocol, scratch)) == 0
+    lasts_s = time.perf_counter() - began
+    draw = random.Random(int(seed))
+    for number in range(int(count)):
+        killed = Path(folder) / f"killed-{number:02d}"
+        place = killed / "data" / "sub-P001" / "ses-01"
+        after_s = draw.uniform(0, lasts_s)
+        code = forked(lambda killed=killed: session(protocol, killed), after_s)
+        journal = place / "journal.jsonl"
+        held = journal.read_text(encoding="utf-8") if journal.exists() else ""
+        resumed = None
+        if code == -signal.SIGKILL and '"session_ended"' in held:
+            resumed = forked(lambda place=place: rebuild(place))
+        elif code == -signal.SIGKILL and "\n" in held:
+            resumed = forked(lambda place=place: rehearsal.resume(place, protocol=protocol))
+        print(json.dumps({"folder": str(killed), "after_s": after_s, "code": code, "held": held, "resumed": resumed}))
+        sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

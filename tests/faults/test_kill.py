@@ -1,0 +1,106 @@
+"""A session killed at any moment: every answer that was acknowledged is there, and the session can be completed."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from study_app.protocol.load import load
+from study_app.store import journal, tables
+from study_app.store.layout import SessionFolder, StudyFolder
+from study_app.store.verify import verify
+from tests.faults import short
+
+TIMES = {"answered_at", "onset_s", "first_choice_s", "last_change_s", "attempt"}
+WHAT_RAN = ("trial", "block", "phase", "part", "index", "of", "code", "outcome")
+
+pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="needs processes that fork")
+
+
+def kill(folder: Path, resume: str, count: int) -> list[dict[str, Any]]:
+    """Kill ``count`` sessions; return what became of each."""
+    protocol = short.write(folder, resume=resume)
+    done = subprocess.run(
+        [sys.executable, "-m", "tests.faults.killer", str(protocol), str(folder), str(count), "1"],
+        cwd=Path(__file__).parents[2],
+        capture_output=True,
+        text=True,
+        timeout=150,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return [json.loads(line) for line in done.stdout.splitlines()]
+
+
+def session(study: Path) -> SessionFolder:
+    (found,) = StudyFolder(study).sessions()
+    return found
+
+
+def rows(study: Path, name: str) -> list[dict[str, str]]:
+    with session(study).table("demo", name).open(newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def answers(study: Path) -> list[dict[str, str]]:
+    """Return the responses of each trial's last attempt without times and attempts."""
+    found = rows(study, "responses")
+    last = {(row["trial"], row["attempt"]) for row in tables.latest(typed(found))}
+    return [
+        {name: cell for name, cell in row.items() if name not in TIMES}
+        for row in found
+        if (int(row["trial"]), int(row["attempt"])) in last
+    ]
+
+
+def typed(found: list[dict[str, str]]) -> list[dict[str, Any]]:
+    return [{**row, "trial": int(row["trial"]), "attempt": int(row["attempt"])} for row in found]
+
+
+def last_attempts(study: Path) -> list[tuple[str, ...]]:
+    return [tuple(str(row[name]) for name in WHAT_RAN) for row in tables.latest(typed(rows(study, "trials")))]
+
+
+@pytest.mark.parametrize(("resume", "count"), [("trial", 35), ("block", 15)])
+def test_killed_at_random_moments_a_session_is_completed_as_if_nothing_had_been(
+    tmp_path: Path, resume: str, count: int
+) -> None:
+    outcomes = kill(tmp_path, resume, count)
+    assert len(outcomes) == count
+    whole = tmp_path / "whole"
+    interrupted = 0
+    for outcome in outcomes:
+        study = Path(outcome["folder"])
+        if outcome["resumed"] is None:
+            assert outcome["code"] == 0 or "\n" not in outcome["held"]
+            continue
+        assert outcome["resumed"] == 0, outcome["after_s"]
+        interrupted += 1
+        lines = journal.read(session(study).journal)
+        *before, _torn = outcome["held"].split("\n")
+        assert lines[: len(before)] == [json.loads(line) for line in before]
+        resumed = [line["event"] for line in lines].count("session_resumed")
+        assert resumed == ("session_ended" not in outcome["held"])
+        assert lines[-1]["status"] == "completed"
+        assert answers(study) == answers(whole)
+        assert last_attempts(study) == last_attempts(whole)
+        assert len(answers(study)) == short.ANSWERS == load(str(tmp_path / "short.toml")).responses_per_participant()
+        told_answers(before, rows(study, "responses"))
+    assert interrupted >= count / 3
+    study = next(Path(outcome["folder"]) for outcome in outcomes if outcome["resumed"] == 0)
+    assert verify(study).errors == ()
+
+
+def told_answers(held: list[str], found: list[dict[str, str]]) -> None:
+    """Assert that every answer that was confirmed before the kill stands in the table, with the value it had."""
+    table = {(row["trial"], row["attempt"], row["item"]): row["response"] for row in found}
+    for line in map(json.loads, held):
+        for given in line["items"] if line["event"] == "responses" else ():
+            assert table[str(line["trial"]), str(line["attempt"]), given["item"]] == str(given["value"])
