@@ -208,7 +208,7 @@ def _breaks(
 @workings
 def _gain(fill: float, exponent: float) -> float:
     """Return what the response to a fill makes of the tail."""
-    return fill ** (exponent - 1.0) if exponent >= 1.0 else (fill**2 + 0.05**2) ** ((exponent - 1.0) / 2.0)
+    return float(fill ** (exponent - 1.0) if exponent >= 1.0 else (fill**2 + 0.05**2) ** ((exponent - 1.0) / 2.0))
 
 
 @workings

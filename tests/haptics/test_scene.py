@@ -1,10 +1,12 @@
 import pytest
 from pydantic import ValidationError
 
-from study_app.errors import StudyError
-from study_app.haptics.override import override, override_all
-from study_app.haptics.scene import Body, Box, Everywhere, Given, Liquid, Scene, Wake
-from tests.haptics.scenes import HONEY, LIGHT_OIL, WATER, liquid, scene
+from study_app.haptics.layout import EFFECT_DRAG
+from study_app.haptics.pack import pack
+from study_app.haptics.scene import Body, Box, Everywhere, Given, Liquid, MotionBox, Scene, Wake
+from tests.haptics.scenes import PLACES, POOL, WATER, liquid, scene
+
+SHORT = {"length": 1, "scaling": 1}
 
 
 def test_defaults_are_those_of_the_thesis():
@@ -34,6 +36,15 @@ def test_a_scene_never_changes():
         ({"density_kg_m3": float("nan")}, "finite"),
         ({"density_kg_m3": 0}, "greater than 0"),
         ({"viscosity": 1}, "Extra inputs are not permitted"),
+        ({"effects": ("drag", "local_wake")}, "its table"),
+        ({"effects": ("drag", "current")}, 'kind = "uniform", "channel" or "vortex"'),
+        ({"effects": ("current",), "current": {"kind": "vortex", "core_m": 1, "peak_mps": 1}}, "name both"),
+        ({"effects": ("drag", "wake", "local_wake"), "wake": SHORT, "local_wake": SHORT}, "two models of the same"),
+        ({"local_wake": {"length": 11, "scaling": 10}}, "the wake would outrun the body"),
+        ({"drag": {"law": "brown-lawler"}}, "needs the liquid's viscosity_pa_s"),
+        ({"effects": ("history",)}, "needs the liquid's viscosity_pa_s"),
+        ({"effects": ("surface",)}, "needs a region with a top"),
+        ({"effects": "automatic"}, "'auto'"),
         ({"id": "a-b"}, "should match pattern"),
         ({"region": {"kind": "sphere"}}, "'everywhere', 'box', 'cylinder'"),
         ({"region": {"kind": "box", "size_m": (1, 0, 1)}}, "greater than 0"),
@@ -42,6 +53,42 @@ def test_a_scene_never_changes():
 def test_a_liquid_that_makes_no_sense_is_refused_with_a_reason(fields, message):
     with pytest.raises(ValidationError, match=message):
         Liquid(**{"id": "x", "density_kg_m3": 1000, **fields})
+
+
+def test_any_effect_may_be_called_for_where_its_table_stands():
+    assert Liquid(**dict(POOL)).effects == POOL.effects
+    assert Liquid(**dict(PLACES)).effects == PLACES.effects
+    floating = Liquid(id="x", density_kg_m3=1000, effects=("buoyancy",), drag={"law": "brown-lawler"})
+    assert floating.drag.law == "brown-lawler"  # a table that is not called for means nothing
+
+
+def test_a_liquid_may_leave_the_choice_to_the_gate():
+    left = Liquid(id="x", density_kg_m3=1000, viscosity_pa_s=1e-3, effects="auto")
+    assert left.effects == "auto"
+    assert pack(Scene(liquids=(left,))).liquids[0].effects & EFFECT_DRAG
+
+
+@pytest.mark.parametrize(
+    ("region", "depth_m"),
+    [
+        ({"kind": "everywhere"}, None),
+        ({"kind": "box", "centre_m": (0, 0.1, 0), "size_m": (1, 1, 1)}, (0.6 - 0.12 - 0.3, 0.6 + 0.12 - 0.3)),
+        ({"kind": "cylinder", "radius_m": 1, "height_m": 1}, (0.5 - 0.12 - 0.3, 0.5 + 0.12 - 0.3)),
+    ],
+)
+def test_what_is_known_of_the_motion_follows_from_the_hand_unless_said(region, depth_m):
+    one = liquid(region=region)
+    felt = scene(one, scale=3, origin_m=(0, 0.3, 0))
+    motion = felt.motion_in(one)
+    assert (motion.speed_mps, motion.acceleration_mps2) == pytest.approx((0.9, 9.0))
+    assert motion.depth_m == (None if depth_m is None else pytest.approx(depth_m))
+    said = MotionBox(speed_mps=1, acceleration_mps2=2, depth_m=(-1, 3))
+    assert felt.model_copy(update={"motion": said}).motion_in(one) == said
+
+
+def test_the_least_depth_comes_first():
+    with pytest.raises(ValidationError, match="least depth"):
+        MotionBox(depth_m=(1, 0))
 
 
 def test_a_wake_as_long_as_its_scaling_is_allowed():
@@ -68,60 +115,3 @@ def test_tables_as_read_from_a_file_become_a_scene():
     assert read.velocity == Given()
     assert read.liquids[0].region == Box(size_m=(1, 2, 3))
     assert read.liquids[1].region == Everywhere()
-
-
-@pytest.mark.parametrize(
-    ("name", "text", "where", "value"),
-    [
-        ("density_kg_m3", "1200", lambda s: s.liquids[0].density_kg_m3, 1200.0),
-        ("length", "500", lambda s: s.liquids[0].wake.length, 500),
-        ("exponent", "2", lambda s: s.liquids[0].wake.exponent, 2.0),
-        ("axes", "xyz", lambda s: s.liquids[0].wake.axes, "xyz"),
-        ("effects", "drag", lambda s: s.liquids[0].effects, ("drag",)),
-        ("drag_coefficient", "0.5", lambda s: s.body.drag_coefficient, 0.5),
-        ("body.density_kg_m3", "700", lambda s: s.body.density_kg_m3, 700.0),
-        ("alpha", "0.2", lambda s: s.velocity.alpha, 0.2),
-        ("law", "none", lambda s: s.knee.law, "none"),
-        ("threshold_mps", "3", lambda s: s.knee.threshold_mps, 3.0),
-        ("scale", "3", lambda s: s.scale, 3.0),
-        ("origin_m", "0,0.5,0", lambda s: s.origin_m, (0.0, 0.5, 0.0)),
-    ],
-)
-def test_override_sets_one_parameter_wherever_it_sits(name, text, where, value):
-    changed = override(WATER, name, text)
-    assert where(changed) == value
-    assert where(WATER) != value
-    assert override(WATER, name, where(WATER)) == WATER
-
-
-def test_override_reaches_every_liquid_that_has_the_parameter():
-    mixed = scene(*WATER.liquids, *HONEY.liquids, *LIGHT_OIL.liquids)
-    changed = override(mixed, "decay", 0.9)
-    assert [one.wake and one.wake.decay for one in changed.liquids] == [0.9, None, 0.9]
-
-
-def test_parameters_that_belong_together_are_judged_together():
-    with pytest.raises(StudyError, match="outrun"):
-        override(WATER, "length", 5000)
-    wake = override_all(WATER, {"length": "5000", "scaling": "5000"}).liquids[0].wake
-    assert (wake.length, wake.scaling) == (5000, 5000)
-
-
-@pytest.mark.parametrize(
-    ("name", "value", "message"),
-    [
-        ("densty_kg_m3", 1, "no parameter 'densty_kg_m3': did you mean 'density_kg_m3'"),
-        ("wake.alpha", 1, "no parameter 'wake.alpha': did you mean 'alpha'"),
-        ("kind", "given", "no parameter 'kind'"),
-        ("decay", 1.5, "cannot set decay = 1.5.*less than or equal to 1"),
-        ("decay", "fast", "cannot set decay = fast.*valid number"),
-    ],
-)
-def test_an_override_that_fails_says_why(name, value, message):
-    with pytest.raises(StudyError, match=message):
-        override(WATER, name, value)
-
-
-def test_a_parameter_of_an_effect_left_out_is_unknown():
-    with pytest.raises(StudyError, match=r"no parameter .length.*it has absolute_n, acceleration_mps2, alpha, "):
-        override(HONEY, "length", 5)

@@ -89,13 +89,26 @@ def test_the_wake_equals_its_definition(wake, legs, pace, rate_hz):
 
 
 @pytest.mark.skipif(not COMPILED, reason="a million ticks are for compiled code")
-@pytest.mark.parametrize(("decay", "ticks"), [(0.999975, 1_000_000), (1.0, 200_000), (0.95, 200_000)])
-def test_it_still_does_after_a_million_ticks(decay, ticks):
+@pytest.mark.parametrize(
+    ("decay", "ticks", "interval_s"),
+    [
+        (0.999975, 1_000_000, 1e-3),
+        (1.0, 200_000, 1e-3),
+        (0.95, 200_000, 1e-3),
+        (0.999975, 1_500_000, 0.02),  # the decay of 3·10⁷ ticks of 1 ms: past where an endless scale would be 0
+    ],
+)
+def test_it_still_does_after_a_million_ticks_and_after_hours(decay, ticks, interval_s):
     random = np.random.default_rng(7)
     speed = np.repeat(random.choice([0.0, 1e-3, 0.1, 1.0, 5.0, 50.0], ticks // 50), 50)
     heading = np.cumsum(np.where(random.random(ticks) < 0.02, random.uniform(-np.pi, np.pi, ticks), 0.01))
-    motion = moving(np.column_stack([speed * np.cos(heading), np.zeros(ticks), speed * np.sin(heading)]))
+    motion = moving(np.column_stack([speed * np.cos(heading), np.zeros(ticks), speed * np.sin(heading)]), interval_s)
     assert difference(tank(length=40, scaling=50, decay=decay, breaking_span_m=0.01), motion) <= 1e-9
+
+
+def test_after_5000_ticks_88_percent_of_an_element_is_left():
+    felt = simulate(tank(length=6000, scaling=6000, decay=0.999975), moving([(1.0, 0, 0)] + [(0.0, 0, 0)] * 5001))
+    assert felt.wake_x_mps[5001] / felt.wake_x_mps[1] == pytest.approx(0.8824955, abs=5e-8)
 
 
 @pytest.mark.parametrize("turn", [0.0, 1.0, np.pi])
