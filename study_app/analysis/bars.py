@@ -113,13 +113,18 @@ def _widths(panels: Sequence[Panel], room: float) -> _Widths:
     left = max(int(table[[f"count_{level}" for level in DISAGREEMENT]].sum(axis=1).max()) for table in tables)
     right = max(int(table[[f"count_{level}" for level in AGREEMENT]].sum(axis=1).max()) for table in tables)
     neutral = max(int(table[f"count_{NEUTRAL}"].max()) for table in tables)
-    n = 17.0 if any((table["n"] < table["presented"]).any() for table in tables) else 0.0
+    n = 17.0 if any(_lacks_answers(table).any() for table in tables) else 0.0
     least = (32.0, 26.0, 27.0)
     room -= NEUTRAL_GAP_PT + n
     answer = WIDEST_ANSWER_PT
     while sum(_sides(answer, (left, right, neutral), least)) > room:
         answer *= 0.99
     return _Widths(answer, *_sides(answer, (left, right, neutral), least), n)
+
+
+def _lacks_answers(counts: pd.DataFrame) -> pd.Series[bool]:
+    """Return for each row whether an answer is missing, the trial's having been left out included."""
+    return counts["n"] < counts["presented"] + counts["presented_excluded"]
 
 
 def _sides(answer: float, most: Sequence[int], least: Sequence[float]) -> tuple[float, float, float]:
@@ -180,6 +185,7 @@ def _panel(sheet: Sheet, panel: Panel, widths: _Widths, x: float, top: float, pl
     axes.set_xlim(-widths.left / widths.answer, (widths.total - widths.left) / widths.answer)
     axes.set_ylim(len(panel.counts) - 0.5, -0.5)
     apart = (base - zero) / widths.answer
+    lacking = _lacks_answers(panel.counts)
     for y, (_, row) in enumerate(panel.counts.iterrows()):
         edge = 0.0
         for level in DISAGREEMENT:
@@ -190,7 +196,7 @@ def _panel(sheet: Sheet, panel: Panel, widths: _Widths, x: float, top: float, pl
             _segment(sheet, axes, edge, y, level, int(row[COUNT_COLUMNS[level - 1]]), widths.answer)
             edge += row[COUNT_COLUMNS[level - 1]]
         _segment(sheet, axes, apart, y, NEUTRAL, int(row[COUNT_COLUMNS[NEUTRAL - 1]]), widths.answer)
-        if row["n"] < row["presented"]:
+        if lacking.iloc[y]:
             sheet.text(
                 x + widths.total,
                 top + (y + 0.5) * ROW_PT + 2,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import Final
 
 import pandas as pd
@@ -9,6 +10,10 @@ import pandas as pd
 from study_app.analysis.measures import QUARTILES
 from study_app.analysis.questions import Block
 from study_app.analysis.tables import Study
+
+REASONS: Final = 5
+REASON_SIGNS: Final = 80
+"""Of so many reasons for exclusions so much is told; the codebook of an export holds all."""
 
 _NUMBERS: Final = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
 
@@ -61,8 +66,16 @@ def _sentences(study: Study, block: Block) -> list[str]:
     start = f"{'Pilot. ' if study.pilot else ''}Agreement with {statements} on {settings}"
     head = f"{start} ({simulated}{counts(study, block)[0]})."
     drawn = _bars(block) if block.kind == "liquids" else _plots(block)
-    notes = [_achieved(study, block), _unanswered(study, block), _left_out(study), _invalid(study, block)]
-    return [head, *drawn, _blinded(study), *notes]
+    gone = [_left_out(study), _excluded_sessions(study), _excluded_trials(study, block)]
+    return [
+        head,
+        *drawn,
+        _blinded(study),
+        _achieved(study, block),
+        _unanswered(study, block),
+        *gone,
+        _invalid(study, block),
+    ]
 
 
 def _bars(block: Block) -> list[str]:
@@ -114,6 +127,36 @@ def _left_out(study: Study) -> str:
         return ""
     sessions = "session is" if study.left_out == 1 else "sessions are"
     return f"{study.left_out} {sessions} left out, not having been completed."
+
+
+def _excluded_sessions(study: Study) -> str:
+    rows = study.excluded_sessions
+    if rows.empty:
+        return ""
+    sessions = "session is" if len(rows) == 1 else "sessions are"
+    return f"{len(rows)} {sessions} excluded ({_reasons(rows)})."
+
+
+def _excluded_trials(study: Study, block: Block) -> str:
+    """Say which cells of the figure are empty, the session of each being in it."""
+    rows = study.excluded_trials(block)
+    if rows.empty:
+        return ""
+    answers = "trial is excluded, its answers" if len(rows) == 1 else "trials are excluded, their answers"
+    return f"{len(rows)} {answers} missing here ({_reasons(rows)})."
+
+
+def _reasons(rows: pd.DataFrame) -> str:
+    """List why rows are excluded: each reason once, with its number where it is not the only one."""
+    counted = Counter(_shortened(str(reason)) for reason in rows["exclusion_reason"].fillna("no reason given"))
+    told = [f"{count} × {reason}" if len(counted) > 1 else reason for reason, count in counted.most_common(REASONS)]
+    more = sum(counted.values()) - sum(count for _, count in counted.most_common(REASONS))
+    return "; ".join([*told, *([f"{more} × other"] if more else [])])
+
+
+def _shortened(reason: str) -> str:
+    words = " ".join(reason.split())
+    return words if len(words) <= REASON_SIGNS else f"{words[: REASON_SIGNS - 1].rstrip()}…"
 
 
 def _invalid(study: Study, block: Block) -> str:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
@@ -25,10 +26,13 @@ _BY_NAME: Final = {column.name: column for column in (*TRIALS, *RESPONSES)}
 
 JUDGED: Final = (
     Column("session_status", "text", "How the row's session ended.", levels=_STATUS.levels),
+    Column("excluded", "flag", "true where exclusions.csv leaves out the row's session or trial."),
+    Column("exclusion_reason", "text", "Why it is left out.", may_miss=True),
     Column(
         "counted",
         "flag",
-        "true where the row is in the aggregate and the figures: main trial, completed session, last attempt.",
+        "true where the row is in the aggregate and the figures: main trial, completed session, last attempt, not "
+        "excluded.",
     ),
 )
 OPENED: Final = (
@@ -49,6 +53,12 @@ MEASURED: Final = (
     Column("short", "text", "A few words for the statement."),
     Column("participants", "integer", "Participants who gave a valid answer.", minimum=0),
     Column("presented", "integer", "Presentations after which the statement was to be answered.", minimum=0),
+    Column(
+        "presented_excluded",
+        "integer",
+        "Presentations beside these that exclusions.csv leaves out one by one, with their answers.",
+        minimum=0,
+    ),
     Column("n", "integer", "Valid answers.", minimum=0),
     Column("cannot_judge", "integer", "Answers off the scale.", minimum=0),
     Column("missing", "integer", "Presentations without any answer.", minimum=0),
@@ -76,7 +86,7 @@ def export(folder: Path, to: Path) -> tuple[Path, ...]:
     AnalysisError
         The results cannot be evaluated, or ``to`` cannot be written; nothing was.
     StoreError
-        The key was opened, and is now missing or changed.
+        The key was opened, and is now missing or changed; or ``exclusions.csv`` cannot be read.
     """
     study = load_study(folder)
     opened = OPENED if study.revealed else ()
@@ -150,6 +160,7 @@ def _codebook(study: Study, files: Mapping[str, Any]) -> dict[str, Any]:
             "participants": study.n,
             "sessions": len(study.participants),
             "sessions_left_out": study.left_out,
+            "sessions_excluded": len(study.excluded_sessions),
             "simulated": study.simulated,
             "pilot": study.pilot,
         },
@@ -158,6 +169,7 @@ def _codebook(study: Study, files: Mapping[str, Any]) -> dict[str, Any]:
         "missing": MISSING,
         "blinded": not study.revealed,
         "key_opened": list(blinding.reveals(study.folder)),
+        "exclusions": [asdict(one) for one in study.exclusions],
         "blocks": [
             {
                 "id": block.id,
@@ -182,7 +194,7 @@ def _codebook(study: Study, files: Mapping[str, Any]) -> dict[str, Any]:
         "measures": {
             "quartiles": QUARTILES,
             "agree_percent": f"levels {AGREEMENT[0]} to {AGREEMENT[-1]}, of the valid answers",
-            "counted": "main trials of completed sessions; of a repeated trial the last attempt",
+            "counted": "main trials of completed sessions; of a repeated trial the last attempt; nothing excluded",
         },
         "files": files,
     }

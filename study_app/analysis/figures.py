@@ -98,7 +98,7 @@ def plot(folder: Path, to: Path) -> tuple[Path, ...]:
     AnalysisError
         The results cannot be evaluated, or ``to`` cannot be written; nothing was.
     StoreError
-        The key was opened, and is now missing or changed.
+        The key was opened, and is now missing or changed; or ``exclusions.csv`` cannot be read.
     """
     study = load_study(folder)
     if not study.blocks:
@@ -123,11 +123,10 @@ def _only(study: Study, kind: Kind) -> Block:
 
 def _require_answers(study: Study, block: Block) -> None:
     if not len(study.answers(block)):
+        columns = ["participant", "session", "status", "excluded"]
         states = ", ".join(
-            f"{participant} session {session} {status}"
-            for participant, session, status in study.participants[["participant", "session", "status"]]
-            .head(5)
-            .itertuples(index=False)
+            f"{participant} session {session} {'excluded' if excluded else status}"
+            for participant, session, status, excluded in study.participants[columns].head(5).itertuples(index=False)
         )
         raise AnalysisError(
             f"{study.folder}: no completed session with answers in {block.id!r} yet ({states}): figures are drawn from "

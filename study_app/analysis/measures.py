@@ -7,6 +7,7 @@ All seven levels are always there, chosen or not.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Final, TypeAlias
 
 import numpy as np
@@ -25,6 +26,7 @@ COLUMNS: Final = (
     "item",
     "participants",
     "presented",
+    "presented_excluded",
     "n",
     "cannot_judge",
     "missing",
@@ -37,7 +39,11 @@ COLUMNS: Final = (
 
 
 def aggregate(
-    answers: pd.DataFrame, presented: Mapping[str, int], codes: Sequence[str], items: Sequence[str]
+    answers: pd.DataFrame,
+    presented: Mapping[str, int],
+    codes: Sequence[str],
+    items: Sequence[str],
+    excluded: Mapping[str, int] = MappingProxyType({}),
 ) -> pd.DataFrame:
     """Summarise answers by setting and statement, in the order of ``codes`` and within it of ``items``.
 
@@ -49,6 +55,8 @@ def aggregate(
     presented : mapping of str to int
         How often each setting was presented and its questionnaire due: what was neither answered nor judged
         impossible is ``missing``.
+    excluded : mapping of str to int
+        How often each setting was presented beside that, in trials that are left out.
 
     Returns
     -------
@@ -59,7 +67,12 @@ def aggregate(
     groups = dict(iter(answers.groupby(["code", "item"], sort=False)))
     empty = answers.iloc[:0]
     rows = [
-        {"code": code, "item": item, **_measures(groups.get((code, item), empty), presented.get(code, 0))}
+        {
+            "code": code,
+            "item": item,
+            "presented_excluded": excluded.get(code, 0),
+            **_measures(groups.get((code, item), empty), presented.get(code, 0)),
+        }
         for code in codes
         for item in items
     ]

@@ -1,11 +1,13 @@
 """A study as tables: every session of a results folder, read from its tables and receipts.
 
 Everything recorded is kept; the column ``counted`` says what enters measures and figures: main trials of completed
-sessions, of a repeated trial the last attempt. Practice and baseline stay apart by their ``phase``.
+sessions, of a repeated trial the last attempt, without what ``exclusions.csv`` leaves out. Practice and baseline stay
+apart by their ``phase``.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,10 +16,12 @@ from typing import Final
 import pandas as pd
 
 from study_app.analysis import measures
+from study_app.analysis.excluding import check_there, with_excluded
 from study_app.analysis.questions import Block, Kind, Setting, settings_of
 from study_app.analysis.sessions import Session, read_session
 from study_app.errors import AnalysisError
 from study_app.store import blinding
+from study_app.store.exclusions import Exclusion, exclusions
 from study_app.store.layout import StudyFolder
 
 COMPLETED: Final = "completed"
@@ -28,9 +32,10 @@ _TRIAL: Final = ["participant", "session", "trial"]
 class Study:
     """All sessions of one study.
 
-    ``responses``, ``trials``, ``participants`` have the columns of ``store.columns``, the first two with
-    ``session_status`` and ``counted`` added. ``blocks`` are the main blocks that ask something; ``settings`` says what
-    every (block, code) stands for, and is empty while the key is sealed.
+    ``responses`` and ``trials`` have the columns of ``store.columns``, with ``session_status``, ``excluded``,
+    ``exclusion_reason`` and ``counted`` added; ``participants`` has a row a session, with the last three. ``blocks``
+    are the main blocks that ask something; ``settings`` says what every (block, code) stands for, and is empty while
+    the key is sealed; ``exclusions`` is what was decided to leave out.
     """
 
     folder: Path
@@ -42,12 +47,12 @@ class Study:
     responses: pd.DataFrame
     trials: pd.DataFrame
     participants: pd.DataFrame
+    exclusions: tuple[Exclusion, ...]
 
     @property
     def people(self) -> tuple[str, ...]:
-        """The participants of completed sessions, in the order of their ids."""
-        completed = self.participants["status"] == COMPLETED
-        return tuple(sorted(self.participants.loc[completed, "participant"].unique()))
+        """The participants of sessions that count, in the order of their ids."""
+        return tuple(sorted(self.participants.loc[self.participants["counted"], "participant"].unique()))
 
     @property
     def n(self) -> int:
@@ -56,8 +61,13 @@ class Study:
 
     @property
     def left_out(self) -> int:
-        """How many sessions are not: they were not completed."""
-        return int((self.participants["status"] != COMPLETED).sum())
+        """How many sessions are not, since they were not completed."""
+        return int((~self.participants["counted"] & ~self.participants["excluded"]).sum())
+
+    @property
+    def excluded_sessions(self) -> pd.DataFrame:
+        """The rows of ``participants`` that were decided to be left out, completed or not."""
+        return self.participants[self.participants["excluded"]]
 
     @property
     def simulated(self) -> bool:
@@ -87,10 +97,19 @@ class Study:
         rows = self.trials[self.trials["counted"] & (self.trials["block"] == block.id)]
         return {code: int((rows["code"] == code).sum()) for code in block.codes}
 
+    def excluded_trials(self, block: Block) -> pd.DataFrame:
+        """Return the trials of a block that are left out one by one: last attempts, in sessions that count."""
+        rows = self.trials[self.trials["excluded"] & (self.trials["block"] == block.id)]
+        here = self.participants.loc[self.participants["counted"], ["participant", "session"]]
+        return (
+            rows.sort_values("attempt").drop_duplicates(_TRIAL, keep="last").merge(here, on=["participant", "session"])
+        )
+
     def aggregate(self, block: Block) -> pd.DataFrame:
         """Return the measures of a block: see ``measures.aggregate``."""
         items = [item.id for item in block.items]
-        return measures.aggregate(self.answers(block), self.presented(block), block.codes, items)
+        excluded = Counter(map(str, self.excluded_trials(block)["code"]))
+        return measures.aggregate(self.answers(block), self.presented(block), block.codes, items, excluded)
 
 
 def load_study(folder: Path) -> Study:
@@ -99,21 +118,23 @@ def load_study(folder: Path) -> Study:
     Raises
     ------
     AnalysisError
-        The folder holds no sessions, or a file in it is missing, damaged or of another study: says which, where in it,
-        and what to do.
+        The folder holds no sessions, a file in it is missing, damaged or of another study, or what is excluded is not
+        there: says which, where in it, and what to do.
     StoreError
-        The key was opened, and is now missing or changed.
+        The key was opened, and is now missing or changed; or ``exclusions.csv`` cannot be read.
     """
     place = StudyFolder(Path(folder))
     sessions = place.sessions()
     if not sessions:
         raise AnalysisError(_no_sessions(place.path))
     key = blinding.revealed_key(place.path)
+    listed = exclusions(place.path)
     records = [read_session(session, key) for session in sessions]
     for session in records[1:]:
         _check_alike(records[0], session)
     responses = pd.concat([_with_status(session, session.responses) for session in records], ignore_index=True)
     trials = pd.concat([_with_status(session, session.trials) for session in records], ignore_index=True)
+    check_there(place, trials, listed)
     last = pd.concat([responses, trials])[[*_TRIAL, "attempt"]].groupby(_TRIAL)["attempt"].max().rename("last_attempt")
     return Study(
         folder=place.path,
@@ -122,9 +143,10 @@ def load_study(folder: Path) -> Study:
         version=records[0].version,
         blocks=records[0].blocks,
         settings={} if key is None else settings_of(key),
-        responses=_with_counted(responses, last),
-        trials=_with_counted(trials, last),
-        participants=pd.DataFrame([session.facts for session in records]),
+        responses=_with_counted(with_excluded(responses, listed), last),
+        trials=_with_counted(with_excluded(trials, listed), last),
+        participants=_sessions(with_excluded(pd.DataFrame([session.facts for session in records]), listed)),
+        exclusions=listed,
     )
 
 
@@ -164,11 +186,17 @@ def _with_status(session: Session, table: pd.DataFrame) -> pd.DataFrame:
 
 
 def _with_counted(table: pd.DataFrame, last: pd.Series[int]) -> pd.DataFrame:
-    """Add what counts: main trials of completed sessions, of each trial the last attempt."""
+    """Add what counts: main trials of completed sessions, of each trial the last attempt, unless it is excluded."""
     joined = table.join(last, on=_TRIAL)
     counted = (
         (joined["phase"] == "main")
         & (joined["session_status"] == COMPLETED)
         & (joined["attempt"] == joined["last_attempt"])
+        & ~joined["excluded"]
     )
     return table.assign(counted=counted.astype(bool))
+
+
+def _sessions(table: pd.DataFrame) -> pd.DataFrame:
+    """Add which sessions count: the completed ones that are not excluded."""
+    return table.assign(counted=(table["status"] == COMPLETED) & ~table["excluded"])

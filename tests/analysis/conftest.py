@@ -16,6 +16,7 @@ from study_app.protocol.schedule import Trial, build_schedule
 from study_app.store import blinding, receipt
 from study_app.store.blinding import Key
 from study_app.store.columns import RESPONSES, TRIALS, Column
+from study_app.store.exclusions import Exclusion, exclusion_bytes, exclusions
 from study_app.store.layout import SessionFolder, StudyFolder
 from study_app.store.tables import csv_bytes
 
@@ -143,6 +144,17 @@ class Results:
     def trials(self, participant: str, session: int = 1) -> Path:
         """Return the trials of a session."""
         return StudyFolder(self.folder).session(participant, session).table(self.protocol.study.name, "trials")
+
+    def exclude(self, participant: str, *, session: int = 1, trial: int | None = None, reason: str = "tired") -> None:
+        """Leave a session, or one trial of it, out of the analysis."""
+        new = Exclusion(participant, session, trial, "AB", reason, "2026-01-06T10:00:00.000+01:00")
+        listed = (*exclusions(self.folder), new)
+        StudyFolder(self.folder).exclusions.write_bytes(exclusion_bytes(listed))
+
+    def trial(self, participant: str, condition: str, *, session: int = 1) -> int:
+        """Return the number of the first trial in which a condition was presented."""
+        trials = build_schedule(self.protocol, participant, seed=session).trials
+        return next(one.number for one in trials if self.key.condition(one.block, one.code) == condition)
 
     def open(self) -> None:
         """Open the key."""

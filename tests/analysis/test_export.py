@@ -18,6 +18,9 @@ NAMES = {
 }
 
 
+JUDGED = ("session_status", "excluded", "exclusion_reason", "counted")
+
+
 def rows(to: Path, name: str, study: str = "rek2024") -> list[dict[str, str]]:
     with (to / f"study-{study}_description-{name}_data.csv").open(encoding="utf-8", newline="") as file:
         return list(csv.DictReader(file, strict=True))
@@ -34,7 +37,7 @@ def test_every_row_of_every_participant_is_there_with_its_values(rek: Results, t
     assert {path.name for path in export(rek.folder, to)} == NAMES == {path.name for path in to.iterdir()}
     found = rows(to, "responses")
     assert len(found) == 62 + 27
-    assert list(found[0]) == [*header(RESPONSES), "session_status", "counted"]
+    assert list(found[0]) == [*header(RESPONSES), *JUDGED]
     honey = rek.code("honey", "liquids")
     for row in found:
         expected = "7" if row["participant"] == "P002" else "2" if row["code"] == honey else "6"
@@ -42,7 +45,7 @@ def test_every_row_of_every_participant_is_there_with_its_values(rek: Results, t
         assert row["counted"] == ("true" if row["participant"] == "P001" else "false")
     assert [row["session_status"] for row in found[-2:]] == ["withdrawn", "withdrawn"]
     assert len(rows(to, "trials")) == 12 + 4
-    assert list(rows(to, "trials")[0]) == [*header(TRIALS), "session_status", "counted"]
+    assert list(rows(to, "trials")[0]) == [*header(TRIALS), *JUDGED]
 
 
 def test_cells_are_those_of_the_sessions_own_tables(rek: Results, to: Path) -> None:
@@ -89,6 +92,39 @@ def test_of_a_repeated_trial_both_attempts_are_exported_and_one_counted(rek: Res
         ("1", "1", "false"),
         ("2", "6", "true"),
     ]
+
+
+def test_what_is_excluded_is_exported_with_its_reason_and_not_counted(rek: Results, to: Path) -> None:
+    for participant in ("P001", "P002", "P003"):
+        rek.add(participant, lambda *_: 6)
+    trial = rek.trial("P002", "honey")
+    rek.exclude("P001", reason='the phone rang, "twice"\nand 🌊')
+    rek.exclude("P002", trial=trial, reason="spilled tea")
+    export(rek.folder, to)
+    for name in ("responses", "trials"):
+        found = rows(to, name)
+        assert {row["participant"] for row in found} == {"P001", "P002", "P003"}
+        for row in found:
+            excluded = row["participant"] == "P001" or (row["participant"], row["trial"]) == ("P002", str(trial))
+            reason = {"P001": 'the phone rang, "twice"\nand 🌊', "P002": "spilled tea"}.get(row["participant"], "")
+            assert (row["excluded"], row["exclusion_reason"]) == (("true", reason) if excluded else ("false", "n/a"))
+            assert row["counted"] == ("true" if row["phase"] == "main" and not excluded else "false")
+    honey = rek.code("honey", "liquids")
+    for row in rows(to, "aggregate"):
+        expected = ("1", "1", "1") if row["code"] == honey else ("2", "0", "2")
+        assert (row["n"], row["presented_excluded"], row["presented"]) == expected
+        assert row["missing"] == "0"
+    codebook = json.loads((to / "codebook.json").read_text())
+    assert (codebook["study"]["participants"], codebook["study"]["sessions"]) == (2, 3)
+    assert (codebook["study"]["sessions_excluded"], codebook["study"]["sessions_left_out"]) == (1, 0)
+    assert codebook["exclusions"][1] == {
+        "participant": "P002",
+        "session": 1,
+        "trial": trial,
+        "rule_or_person": "AB",
+        "reason": "spilled tea",
+        "excluded_at": "2026-01-06T10:00:00.000+01:00",
+    }
 
 
 def test_nothing_hidden_is_in_any_blinded_file(small: Results, to: Path) -> None:

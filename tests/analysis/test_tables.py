@@ -127,6 +127,99 @@ def test_two_sessions_of_one_participant_are_one_participant(rek: Results) -> No
     assert (study.n, row["n"], row["participants"], row["presented"]) == (1, 2, 1, 2)
 
 
+def test_an_excluded_session_is_kept_and_does_not_count(rek: Results) -> None:
+    for participant, level in (("P001", 6), ("P002", 1), ("P003", 6)):
+        rek.add(participant, lambda *_, level=level: level)
+    rek.exclude("P002")
+    study = load_study(rek.folder)
+    assert (study.n, study.people, study.left_out) == (2, ("P001", "P003"), 0)
+    assert list(study.excluded_sessions["participant"]) == ["P002"]
+    assert len(study.responses) == 3 * 62
+    row = cell(study, "L1", "immersive")
+    assert (row["n"], row["count_1"], row["presented"], row["presented_excluded"], row["missing"]) == (2, 0, 2, 0, 0)
+
+
+def test_of_two_sessions_only_the_excluded_one_is_left_out(rek: Results) -> None:
+    rek.add("P001", lambda *_: 6)
+    rek.add("P001", lambda *_: 2, session=2)
+    rek.exclude("P001", session=2)
+    study = load_study(rek.folder)
+    assert (study.people, len(study.excluded_sessions)) == (("P001",), 1)
+    row = cell(study, "L1", "immersive")
+    assert (row["n"], row["median"], row["presented"]) == (1, 6, 1)
+
+
+def test_an_excluded_trial_takes_its_setting_from_that_participant_alone(rek: Results) -> None:
+    rek.add("P001", by_condition)
+    rek.add("P002", by_condition)
+    rek.exclude("P002", trial=rek.trial("P002", "honey"))
+    study = load_study(rek.folder)
+    assert study.n == 2
+    for condition, expected in (("honey", (1, 1, 1)), ("water", (2, 2, 0))):
+        row = cell(study, rek.code(condition, "liquids"), "immersive")
+        assert (row["n"], row["presented"], row["presented_excluded"]) == expected
+        assert row["missing"] == 0
+
+
+def test_an_excluded_trial_takes_all_its_attempts_and_is_one_presentation(rek: Results) -> None:
+    rek.add("P001", lambda *_: 6, repeated={"L2": lambda *_: 1})
+    (trial,) = {int(one) for one in load_study(rek.folder).trials.query("code == 'L2'")["trial"]}
+    rek.exclude("P001", trial=trial)
+    study = load_study(rek.folder)
+    row = cell(study, "L2", "immersive")
+    assert (row["n"], row["presented"], row["presented_excluded"], row["missing"]) == (0, 0, 1, 0)
+    assert list(study.trials.query("code == 'L2'")["excluded"]) == [True, True]
+
+
+def test_of_repetitions_only_the_excluded_one_is_left_out(small: Results) -> None:
+    small.add("A", lambda *_: 3)
+    small.exclude("A", trial=small.trial("A", "heavyzembla"))
+    row = cell(load_study(small.folder), small.code("heavyzembla", "feel"), "smooth")
+    assert (row["n"], row["presented"], row["presented_excluded"]) == (1, 1, 1)
+
+
+def test_an_unfinished_session_that_is_excluded_is_told_once(rek: Results) -> None:
+    rek.add("P001", lambda *_: 6)
+    rek.add("P002", lambda *_: 1, status="withdrawn", trials=4)
+    rek.exclude("P002")
+    study = load_study(rek.folder)
+    assert (study.left_out, len(study.excluded_sessions)) == (0, 1)
+
+
+def test_reasons_of_session_and_trial_stand_beside_each_other_and_none_excludes_too(rek: Results) -> None:
+    rek.add("P001", lambda *_: 6)
+    rek.exclude("P001", trial=3, reason="spilled tea")
+    rek.exclude("P001", reason="tired")
+    reasons = dict(load_study(rek.folder).trials[["trial", "exclusion_reason"]].itertuples(index=False))
+    assert (reasons[2], reasons[3]) == ("tired", "tired; spilled tea")
+    rek.add("P002", lambda *_: 6)
+    rek.exclude("P002", reason="")
+    assert load_study(rek.folder).n == 0
+
+
+@pytest.mark.parametrize(
+    ("excluded", "says"),
+    [
+        ({"participant": "P010"}, "participant P010, session 1, which is not there"),
+        ({"participant": "P001", "session": 2}, "participant P001, session 2, which is not there"),
+        ({"participant": "P001", "trial": 99}, "participant P001, session 1, trial 99, which is not there"),
+    ],
+)
+def test_excluding_what_is_not_there_is_refused(rek: Results, excluded: dict, says: str) -> None:
+    rek.add("P001", lambda *_: 6)
+    rek.exclude(**excluded)
+    message = refusal(rek.folder)
+    assert says in message
+    assert "exclusions.csv" in message
+
+
+def test_a_list_of_exclusions_that_makes_no_sense_is_refused(rek: Results) -> None:
+    rek.add("P001", lambda *_: 6)
+    (rek.folder / "exclusions.csv").write_text("who,why\n")
+    with pytest.raises(StoreError, match=r"exclusions\.csv"):
+        load_study(rek.folder)
+
+
 def test_texts_are_english_where_the_study_has_it(small: Results) -> None:
     small.add("A", lambda *_: 3)
     block = load_study(small.folder).blocks[0]
