@@ -12,9 +12,9 @@ from study_app.store.recorded_columns import FRAMES, SAMPLES
 
 def test_every_column_of_every_file_has_its_line() -> None:
     text = dictionary_markdown()
-    sections = {title: columns for title, _, columns in SECTIONS}
+    sections = {title: columns for title, _, _, columns in SECTIONS}
     assert list(sections.values()) == [*TABLES.values(), EXCLUSIONS, SAMPLES, FRAMES]
-    parts = re.split(r"^\*\*(\w+)\*\* ", text, flags=re.MULTILINE)
+    parts = re.split(r"^<summary><b>(\w+)</b>: ", text, flags=re.MULTILINE)
     assert parts[1::2] == [*sections, "Journal"]
     for title, part in zip(parts[1::2], parts[2::2], strict=True):
         names = re.findall(r"^\| `(\w+)` \|", part, flags=re.MULTILINE)
@@ -23,14 +23,18 @@ def test_every_column_of_every_file_has_its_line() -> None:
 
 
 def test_every_table_is_one_that_renders() -> None:
-    """A header, its rule and rows of as many cells, with a line free before and after."""
-    for block in dictionary_markdown().split("\n\n"):
-        if block.startswith("| "):
-            header, rule, *rows = block.rstrip("\n").split("\n")
-            assert set(rule) <= set("| -")
-            assert rows
-            assert {row.count(" | ") for row in (header, *rows)} == {2}
-            assert "\n" not in header
+    """A header, its rule and rows of as many cells, with a line free before and after; folded, and told by its file."""
+    text = dictionary_markdown()
+    tables = [block for block in text.split("\n\n") if block.startswith("| ")]
+    assert len(tables) == len(SECTIONS) + 1
+    for table in tables:
+        header, rule, *rows = table.rstrip("\n").split("\n")
+        assert set(rule) <= set("| -")
+        assert rows
+        assert {row.count(" | ") for row in (header, *rows)} == {2}
+    folded = r"<details>\n<summary>.*<code>.*</code>.*</summary>\n\n[^<]*\n\n</details>\n"
+    assert re.fullmatch(rf"({folded}\n?)+", text)
+    assert len(re.findall(folded, text)) == len(tables)
 
 
 @pytest.mark.parametrize(
