@@ -1,0 +1,106 @@
+"""The sample that comes with the program: sound, small, simulated, and what the program makes today."""
+
+from __future__ import annotations
+
+import csv
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from study_app.analysis.export import export
+from study_app.analysis.figures import plot
+from study_app.analysis.tables import load_study
+from study_app.session.rehearsal import rehearse
+from study_app.store import receipt
+from study_app.store.blinding import reveal
+from study_app.store.exclusions import exclude
+from study_app.store.layout import SessionFolder, StudyFolder
+from study_app.store.reproduced import reproduced
+from study_app.store.verify import verify
+
+ROOT = Path(__file__).resolve().parents[2]
+SAMPLE = StudyFolder(ROOT / "results" / "sample-rek2024")
+MAKE_AGAIN = "make the sample again, by the command in results/README.md"
+PEOPLE = tuple(f"P{number:03d}" for number in range(1, 13))
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def responses(session: SessionFolder) -> list[dict[str, str]]:
+    with session.table("rek2024", "responses").open(newline="", encoding="utf-8") as file:
+        return [{name: cell for name, cell in row.items() if name != "answered_at"} for row in csv.DictReader(file)]
+
+
+def captions(folder: Path, to: Path) -> str:
+    return "".join(path.read_text(encoding="utf-8") for path in plot(folder, to) if path.suffix == ".txt")
+
+
+@pytest.fixture
+def copy(tmp_path: Path) -> Path:
+    return Path(shutil.copytree(SAMPLE.path, tmp_path / "copy"))
+
+
+def test_it_is_sound_and_its_orders_are_made_again() -> None:
+    found = verify(SAMPLE.path)
+    assert (found.errors, found.warnings, found.psychds.errors) == ((), (), ()), MAKE_AGAIN
+    assert found.sessions == 12
+    assert [reproduced(session.path) for session in SAMPLE.sessions()] == [()] * 12, MAKE_AGAIN
+
+
+def test_it_is_small_sealed_simulated_and_without_recordings() -> None:
+    there = files(SAMPLE.path)
+    assert sum(map(len, there.values())) < 2_000_000
+    assert "blinding/key.sealed" in there
+    assert not [name for name in there if name.endswith((".parquet", "reveals.jsonl", ".tmp"))]
+    for session in SAMPLE.sessions():
+        told = receipt.read(session.receipt)
+        assert (told["simulated"], told["recordings"], told["status"]) == (True, False, "completed")
+        assert {row["simulated"] for row in responses(session)} == {"true"}
+
+
+def test_its_responses_are_those_of_a_rehearsal_today(tmp_path: Path) -> None:
+    folder = rehearse("rek2024", participants=1, seed=1, results=tmp_path / "again", recordings=False)
+    (again,) = StudyFolder(folder).sessions()
+    assert responses(SAMPLE.sessions()[0]) == responses(again), MAKE_AGAIN
+
+
+def test_it_is_exported_and_drawn_by_code_and_not_touched(tmp_path: Path) -> None:
+    before = files(SAMPLE.path)
+    tables = export(SAMPLE.path, tmp_path / "tables")
+    assert all(path.stat().st_size > 0 for path in tables)
+    told = captions(SAMPLE.path, tmp_path / "figures")
+    assert told.count("SIMULATED participants, no people; n = 12 participants, every setting rated by all") == 2
+    assert "(simulated" not in told
+    assert files(SAMPLE.path) == before
+    study = load_study(SAMPLE.path)
+    assert (study.people, study.simulated, study.revealed) == (PEOPLE, True, False)
+    assert len(study.responses) == 12 * 62
+    assert all((study.aggregate(block)["n"] == 12).all() for block in study.blocks)
+
+
+def test_a_copy_can_be_excluded_from_and_unblinded(copy: Path, tmp_path: Path) -> None:
+    exclude(copy, "P003", 1, by="AB", reason="fell asleep")
+    exclude(copy, "P004", 1, trial=2, by="AB", reason="the phone rang")
+    reveal(copy, by="AB", reason="trying the analysis")
+    assert verify(copy).errors == ()
+    told = captions(copy, tmp_path / "figures")
+    assert told.count("1 session is excluded (fell asleep).") == 2
+    assert told.count("1 trial is excluded, its answers missing here (the phone rang).") == 1
+    study = load_study(copy)
+    assert study.people == tuple(one for one in PEOPLE if one != "P003")
+    assert [setting.condition for setting in study.blocks[0].settings] == ["water", "honey", "light_oil"]
+    assert len(export(copy, tmp_path / "tables")) == 4
+
+
+def test_git_keeps_the_sample_and_ignores_other_results() -> None:
+    if not (ROOT / ".git").exists() or shutil.which("git") is None:
+        pytest.skip("no git here")
+    places = ["results/sample-rek2024/data/x", "results/README.md", "results/rek2024/data/x", "results/x.csv"]
+    asked = subprocess.run(
+        ["git", "-C", str(ROOT), "check-ignore", "--no-index", *places], capture_output=True, text=True, check=False
+    )
+    assert asked.stdout.split() == places[2:]
