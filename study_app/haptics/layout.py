@@ -164,6 +164,8 @@ STATE = np.dtype(
         ("previous_m", np.float64, (3,)),  # the one before
         ("window_newest", np.int64),  # row of the newest sample in the model's window
         ("window_held", np.int64),  # how many samples are in it
+        ("weight", np.float64),  # of the newest difference, for an interval of ``weighted_s``
+        ("weighted_s", np.float64),
         ("estimate_mps", np.float64, (3,)),  # the estimator's own velocity, before the knee
         ("velocity_mps", np.float64, (3,)),  # after the knee
         ("wake_mps", np.float64, (3,)),  # of the last listed liquid that acts, as used by drag

@@ -49,9 +49,12 @@ def estimate(parameters: Record, state: Record, window: Any, interval_s: float) 
 def _ewma(parameters: Record, state: Record, interval_s: float) -> None:
     """Move the estimate to the newest difference u = Δp/Δt: v ← v + α(Δt)(u − v) (Rek 2024, §4.2).
 
-    α(Δt) = 1 − (1 − α)^(Δt/1 ms) makes it the same filter at any rate.
+    α(Δt) = 1 − (1 − α)^(Δt/1 ms) makes it the same filter at any rate; while Δt stays as it is, so does α.
     """
-    weight, per_s = -math.expm1(parameters.log_keep_per_s * interval_s), 1.0 / interval_s
+    if interval_s != state.weighted_s:
+        state.weighted_s = interval_s
+        state.weight = -math.expm1(parameters.log_keep_per_s * interval_s)
+    weight, per_s = state.weight, 1.0 / interval_s
     for axis in range(3):
         difference_mps = (state.position_m[axis] - state.previous_m[axis]) * per_s
         state.estimate_mps[axis] += weight * (difference_mps - state.estimate_mps[axis])
