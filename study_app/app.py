@@ -1,4 +1,4 @@
-"""Where device, servo, store, session and windows meet: the two ways to open the program.
+"""Where device, servo, store, session and windows meet: the ways to open the program.
 
 However a session's windows go away (its end, Ctrl+C, a signal, a failure in here), the servo is stopped with zero force
 and the journal is closed with a status. Nothing is created on the disk before device and servo are ready.
@@ -9,11 +9,9 @@ from __future__ import annotations
 import signal
 import threading
 import traceback
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from study_app.errors import SessionError, StudyError
 from study_app.gui.display import check_display, missing_library
@@ -23,30 +21,29 @@ try:
     from PySide6.QtGui import QGuiApplication
     from PySide6.QtWidgets import QApplication
 
+    from study_app.gui.beginning import Ready, check, measured, open_store
+    from study_app.gui.choices import NewSession, draw_seed, resumed, study_results
+    from study_app.gui.ending import ended_from_outside
     from study_app.gui.home import HomeWindow
     from study_app.gui.icons import logo
-    from study_app.gui.new_session import SIMULATED_DEVICE, NewSession, draw_seed, study_results
+    from study_app.gui.machine import Machine, open_machine
     from study_app.gui.opening import OpeningWindow
     from study_app.gui.screens import choose_screens, describe_screen, place
     from study_app.gui.theme import LIGHT, Theme
 except ImportError as missing:
     raise missing_library(missing) from missing
 
-from study_app.devices import list_devices, open_device
 from study_app.protocol.load import load, parse, source_bytes
-from study_app.protocol.model import Protocol
-from study_app.protocol.schedule import build_schedule, stream
-from study_app.store.description import check_study
-from study_app.store.journal import SessionClock
-from study_app.store.layout import StudyFolder, check_participant, check_unused
-from study_app.store.session import SessionStore, begin
+from study_app.protocol.schedule import build_schedule
+from study_app.session.preflight import Check, checks, refused
+from study_app.session.resume import FIRST, is_rehearsal, resume_at
+from study_app.store import receipt
+from study_app.store.layout import locate
 
 if TYPE_CHECKING:
-    from study_app.devices.base import Device
     from study_app.gui.bridge import SessionBridge
-    from study_app.haptics.servo import Servo
+    from study_app.store.open_session import SessionStore
 
-HEARTBEAT_MS = 100  # how long a signal may wait to be heard
 CANCELLED = 130
 BUG = 1
 
@@ -61,7 +58,7 @@ def home(results: Path | None = None) -> int:
     """
     application = _application()
     visit = _Visit(HomeWindow(results if results is not None else Path("results")))
-    with _signals(visit.end_by_signal):
+    with ended_from_outside(visit.end_by_signal):
         visit.window.show()
         visit.loop.exec()
     application.processEvents()
@@ -80,6 +77,9 @@ def run(
     windowed: bool = False,
     screen: int | None = None,
     results: Path | None = None,
+    pilot: bool = False,
+    recordings: bool = True,
+    tell: Callable[[str], object] | None = None,
 ) -> int:
     """Run a session without dialogs; return the exit code when its windows are closed.
 
@@ -90,7 +90,10 @@ def run(
     seed : default: drawn, shown and recorded
     device, language : default: the mouse, the protocol's first language
     windowed, screen : where the participant's window opens; screens count from 1
-    results : the study's folder; default ``results/<study>``
+    results : the study's folder; default ``results/<study>``, of a pilot ``results/<study>-pilot``
+    pilot : to try it out: in a window with a frame, apart from the data and marked
+    recordings : whether every turn of the servo and every frame of a trial is kept
+    tell : is given the lines of the pre-flight, before the first page
 
     Raises
     ------
@@ -106,36 +109,66 @@ def run(
         operator=operator,
         language=study.study.languages[0] if language is None else language,
         device=device,
-        windowed=windowed,
+        windowed=windowed or pilot,
         screen=screen,
-        results=study_results(Path("results"), study.study.name, device) if results is None else Path(results),
+        results=(
+            study_results(Path("results"), study.study.name, device, pilot=pilot) if results is None else Path(results)
+        ),
+        pilot=pilot,
+        recordings=recordings,
     )
-    _check(chosen, study)
+    check(chosen, study)
+    return _hold(chosen, tell)
+
+
+def resume(
+    session_folder: Path,
+    *,
+    protocol: str | None = None,
+    device: str | None = None,
+    operator: str = "",
+    windowed: bool = False,
+    screen: int | None = None,
+    tell: Callable[[str], object] | None = None,
+) -> int:
+    """Go on with a session whose program was ended; return the exit code when its windows are closed.
+
+    A rehearsed session goes on as one, without windows.
+
+    Parameters
+    ----------
+    protocol : file or name of its protocol; default: looked for among those at hand
+    device : default: the one it began with
+    operator, windowed, screen, tell : as for ``run``
+
+    Raises
+    ------
+    StudyError
+        It cannot go on (finished, of a changed protocol, open elsewhere); or device or servo failed while it ran.
+    """
+    folder = Path(session_folder)
+    if is_rehearsal(receipt.read(locate(folder)[1].receipt)):
+        from study_app.session import rehearsal  # noqa: PLC0415 - the compiler: only once it is needed
+
+        rehearsal.resume(folder, protocol=protocol)
+        return 0
+    chosen = resumed(folder, protocol=protocol, operator=operator, device=device, windowed=windowed, screen=screen)
+    check(chosen, load(chosen.source))
+    return _hold(chosen, tell)
+
+
+def _hold(chosen: NewSession, tell: Callable[[str], object] | None) -> int:
+    """Open a session's windows and return when they are closed."""
     _application()
-    live = LiveSession(chosen, LIGHT)
+    live = LiveSession(chosen, LIGHT, tell)
     loop = QEventLoop()
     live.over.connect(loop.quit)
-    with _signals(live.end_by_signal):
+    with ended_from_outside(live.end_by_signal):
         QTimer.singleShot(0, live.open)
         loop.exec()
     if live.error is not None:
         raise live.error
     return live.code
-
-
-@dataclass(frozen=True, slots=True)
-class _Machine:
-    """Device and servo, running at rest."""
-
-    device: Device
-    servo: Servo
-
-    def stop(self) -> None:
-        """Zero force, then let go of the device."""
-        try:
-            self.servo.stop()
-        finally:
-            self.device.close()
 
 
 class LiveSession(QObject):
@@ -147,15 +180,16 @@ class LiveSession(QObject):
     over = Signal()
     _ready = Signal(object)
 
-    def __init__(self, chosen: NewSession, theme: Theme) -> None:
+    def __init__(self, chosen: NewSession, theme: Theme, tell: Callable[[str], object] | None = None) -> None:
         super().__init__()
         self.chosen = chosen
+        self._tell = tell
         self.theme = theme
         self.code = 0
         self.error: StudyError | None = None
         self.bridge: SessionBridge | None = None
         self.note: OpeningWindow | None = None
-        self._machine: _Machine | None = None
+        self._machine: Machine | None = None
         self._store: SessionStore | None = None
         self._closed = False
         self._working = False
@@ -163,8 +197,9 @@ class LiveSession(QObject):
 
     def open(self) -> None:
         """Show the note, and make device and servo ready beside it."""
-        who = f"Participant {self.chosen.participant}  ·  session {self.chosen.session}  ·  seed {self.chosen.seed}"
-        self.note = OpeningWindow(f"Preparing {Path(self.chosen.source).stem}", who, theme=self.theme)
+        from study_app.gui.session_windows import who  # noqa: PLC0415 - pyqtgraph: only once it is needed
+
+        self.note = OpeningWindow(f"Preparing {Path(self.chosen.source).stem}", who(self.chosen), theme=self.theme)
         self.note.cancelled.connect(self._cancel)
         place(self.note, self.note.screen(), corner=False)
         self.note.show()
@@ -180,18 +215,22 @@ class LiveSession(QObject):
             self._close()
 
     def _make_ready(self) -> None:
-        """Compile, open and start, in a thread of its own; whatever comes of it goes to ``_begin``."""
+        """Compile, open, start and measure, in a thread of its own; whatever comes of it goes to ``_begin``."""
+        machine: Machine | None = None
         try:
-            made: object = _open_machine(self.chosen, load(self.chosen.source))
+            machine = open_machine(self.chosen, load(self.chosen.source))
+            made: object = Ready(machine, measured(machine, self.chosen))
         except Exception as error:  # noqa: BLE001 - handed over, not swallowed: a thread has nobody to raise it to
+            if machine is not None:
+                machine.stop()
             made = error
         self._ready.emit(made)
 
     def _begin(self, made: object) -> None:
         """Claim the session on the disk and open the two windows."""
         self._working = False
-        if isinstance(made, _Machine):
-            self._machine = made
+        if isinstance(made, Ready):
+            self._machine = made.machine
         if self._closed:
             self._let_go()
             self.deleteLater()
@@ -208,39 +247,37 @@ class LiveSession(QObject):
 
     def _open_windows(self, made: object) -> None:
         """Go on with what the thread made ready, or raise what it met."""
-        if not isinstance(made, _Machine):
+        if not isinstance(made, Ready):
             raise made if isinstance(made, Exception) else TypeError(made)
         from study_app.gui.session_windows import open_windows  # noqa: PLC0415 - pyqtgraph: only once it is needed
 
-        device, servo = made.device, made.servo
-        source = source_bytes(self.chosen.source)
-        protocol = parse(source, self.chosen.source)
-        schedule = build_schedule(protocol, self.chosen.participant, self.chosen.seed)
-        shown_on, operated_on = choose_screens(self.chosen.screen)
-        self._store = begin(
-            self.chosen.results,
-            protocol,
-            source,
-            self.chosen.participant,
-            session=self.chosen.session,
-            seed=self.chosen.seed,
-            operator=self.chosen.operator,
-            language=self.chosen.language,
-            device=device.describe() | servo.describe(),
-            screens={"participant": describe_screen(shown_on), "operator": describe_screen(operated_on)},
-            simulated=self.chosen.device == SIMULATED_DEVICE,
-            clock=SessionClock(servo.now_ns),
-        )
-        self.bridge = open_windows(self.chosen, protocol, schedule, self._store, device, servo, self.theme)
+        chosen, machine = self.chosen, made.machine
+        source = source_bytes(chosen.source)
+        protocol = parse(source, chosen.source)
+        schedule = build_schedule(protocol, chosen.participant, chosen.seed)
+        shown_on, operated_on = choose_screens(chosen.screen)
+        self._pass_checks(checks(made.facts_with(shown_on), protocol))
+        screens = {"participant": describe_screen(shown_on), "operator": describe_screen(operated_on)}
+        self._store = open_store(chosen, protocol, source, machine, screens)
+        start = FIRST if chosen.resumes is None else resume_at(protocol, schedule, self._store.lines)
+        self.bridge = open_windows(chosen, protocol, schedule, self._store, machine, self.theme, start)
         self.bridge.done.connect(self._finished)
         self._close_note()
         self.bridge.start()
+
+    def _pass_checks(self, found: tuple[Check, ...]) -> None:
+        """Tell what the pre-flight found; refuse the session if it must not begin."""
+        for check in found:
+            if self._tell is not None:
+                self._tell(str(check))
+        if reason := refused(found):
+            raise SessionError(f"the session was not begun: {reason}")
 
     def _finished(self) -> None:
         """Hear that the windows are gone; keep what broke, for whoever asked for the session."""
         assert self.bridge is not None  # noqa: S101 - it has just spoken
         self.theme = self.bridge.operator.theme
-        trouble = self.bridge.trouble or self.bridge.parts.journal.progress.broke
+        trouble = self.bridge.trouble or self.bridge.runner.stalled or self.bridge.parts.journal.progress.broke
         if trouble and isinstance(self.bridge.failure, StudyError | None):
             self.error = StudyError(f"the session was stopped: {trouble}; what was answered before is on the disk")
         elif trouble:
@@ -321,41 +358,6 @@ class _Visit(QObject):
             self.loop.quit()
 
 
-def _check(chosen: NewSession, study: Protocol) -> None:
-    """Refuse what cannot begin before any window opens; nothing is touched."""
-    if chosen.device not in list_devices():
-        open_device(chosen.device)
-    if chosen.language not in study.study.languages:
-        known = ", ".join(study.study.languages)
-        raise SessionError(
-            f"language {chosen.language!r}: {study.study.name} is written in {known}; choose one of these"
-        )
-    folder = StudyFolder(chosen.results)
-    check_participant(chosen.participant)
-    check_study(folder, study.study.name)
-    check_unused(folder, chosen.participant, chosen.session)
-
-
-def _open_machine(chosen: NewSession, study: Protocol) -> _Machine:
-    """Open the device and start the servo at rest; compiling takes a minute the first time."""
-    from study_app.haptics.pack import elements_needed  # noqa: PLC0415 - the compiler: only once it is needed
-    from study_app.haptics.servo import Servo  # noqa: PLC0415
-
-    x, y, z = study.device.workspace_m
-    options: dict[str, Any] = {"workspace_m": (x / 2, y / 2, z / 2), "force_limit_n": study.device.force_limit_n}
-    if chosen.device == SIMULATED_DEVICE:
-        options["random"] = stream(chosen.seed, f"run/{chosen.participant}/tremor")
-    device = open_device(chosen.device, **options)
-    try:
-        elements = max(elements_needed(study.scene_for(condition)) for condition in study.conditions)
-        servo = Servo(device, rate_hz=study.device.rate_hz, elements=elements)
-        servo.start()
-    except BaseException:
-        device.close()
-        raise
-    return _Machine(device, servo)
-
-
 def _application() -> QApplication:
     """Return the application, made on first use."""
     there = QApplication.instance()
@@ -370,30 +372,3 @@ def _application() -> QApplication:
     application.setWindowIcon(logo(32, LIGHT.accent, LIGHT.on_accent))
     application.setQuitOnLastWindowClosed(False)
     return application
-
-
-@contextmanager
-def _signals(end: Callable[[int], None]) -> Iterator[None]:
-    """Let Ctrl+C and requests to terminate call ``end`` from the event loop, once."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    heard: list[int] = []
-
-    def hear(number: int, _frame: object) -> None:
-        if not heard:
-            heard.append(number)
-            QTimer.singleShot(0, lambda: end(number))
-
-    names = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
-    numbers = [getattr(signal, name) for name in names if hasattr(signal, name)]
-    before = {number: signal.signal(number, hear) for number in numbers}
-    heart = QTimer()
-    heart.timeout.connect(lambda: None)  # Python hears signals only while it runs; Qt waits outside it
-    heart.start(HEARTBEAT_MS)
-    try:
-        yield
-    finally:
-        heart.stop()
-        for number, handler in before.items():
-            signal.signal(number, handler)

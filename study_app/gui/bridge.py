@@ -36,7 +36,8 @@ from study_app.session.events import (
     ResumeAsked,
 )
 from study_app.session.pages import Page, TaskPage
-from study_app.session.ports import Ports, ServoPort
+from study_app.session.ports import Ports, RecorderPort, ServoPort
+from study_app.session.resume import FIRST, Start
 from study_app.session.runner import Runner, TankView
 
 TRACE_MS = 33
@@ -65,9 +66,10 @@ class Hand(Protocol):
 class Parts:
     """What a session is made of, but for its windows.
 
-    ``session`` is what the operator sees of it throughout; ``key`` is block → code → condition, never shown.
-    ``aim_m`` gives where hand or pointer mean to be [m, hand frame]; ``point_to`` and ``press`` pass the mouse on, None
-    where the device is not the mouse; ``hand_for`` makes the simulated hand for a page, None with a real hand.
+    ``session`` is what the operator sees of it throughout; ``key`` is block → code → condition, never shown; ``start``
+    is where a resumed session goes on. ``exclude`` leaves a trial, or with None the session, out of the analysis for a
+    reason. ``aim_m`` gives where hand or pointer mean to be [m, hand frame]; ``point_to`` and ``press`` pass the mouse
+    on, None where the device is not the mouse; ``hand_for`` makes the simulated hand for a page, None with a real hand.
     """
 
     session: Session
@@ -78,6 +80,9 @@ class Parts:
     journal: WatchedJournal
     clock: Callable[[], float]
     aim_m: Callable[[], tuple[float, float, float]]
+    recorder: RecorderPort | None = None
+    start: Start = FIRST
+    exclude: Callable[[int | None, str], None] | None = None
     point_to: Callable[[float, float, float], None] | None = None
     press: Callable[[int], None] | None = None
     hand_for: Callable[[Page], Hand | None] | None = None
@@ -127,8 +132,8 @@ class SessionBridge(QObject):
         self.health = ServoHealth(parts.servo.rate_hz, refresh_hz)
         self.trouble = ""
         self.failure: BaseException | None = None
-        ports = Ports(parts.servo, parts.journal, self.present, parts.clock)
-        self.runner = Runner(parts.session.protocol, parts.schedule, parts.key, ports, parts.language)
+        ports = Ports(parts.servo, parts.journal, self.present, parts.clock, parts.recorder)
+        self.runner = Runner(parts.session.protocol, parts.schedule, parts.key, ports, parts.language, parts.start)
         self._reader = parts.servo.telemetry.reader()
         self._hand: Hand | None = None
         self._gone = False
@@ -160,6 +165,7 @@ class SessionBridge(QObject):
         operator.end_asked.connect(self._end)
         operator.note_written.connect(self._note)
         operator.mark_set.connect(self._mark)
+        operator.exclude_asked.connect(self._exclude)
         operator.close_asked.connect(self._close)
         participant.event.connect(self._event)
         participant.painted.connect(self._painted)
@@ -308,6 +314,24 @@ class SessionBridge(QObject):
     @_guarded
     def _mark(self) -> None:
         self._post(Note(self._now(), "mark", ""))
+
+    @_guarded
+    def _exclude(self, trial: object, reason: str) -> None:
+        """Leave a trial or the session out; where that fails the session is none the worse, and the operator knows."""
+        if self.parts.exclude is None:
+            return
+        try:
+            self.parts.exclude(trial if isinstance(trial, int) else None, reason)
+        except StudyError as error:
+            self.operator.tell("It was not left out", f"{error}.")
+        else:
+            what = f"trial {trial}" if isinstance(trial, int) else "the session"
+            self._remember(f"left out of the analysis: {what}: {reason}")
+
+    def _remember(self, text: str) -> None:
+        """Note what was decided, while the journal is open."""
+        if not self.runner.finished:
+            self._post(Note(self._now(), "note", text))
 
     @_guarded
     def _end(self, status: str, reason: str) -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import secrets
-from dataclasses import dataclass
 from pathlib import Path
 
 from PySide6.QtCore import Qt
@@ -22,6 +20,7 @@ from PySide6.QtWidgets import (
 from study_app.devices import list_devices
 from study_app.errors import StoreError
 from study_app.gui.cards import Icon, Rule
+from study_app.gui.choices import NewSession, draw_seed, study_results
 from study_app.gui.controls import ActionButton, Check, Choice, Number
 from study_app.gui.home.facts import LANGUAGES, StudyFacts
 from study_app.gui.labels import label, set_ink
@@ -30,35 +29,7 @@ from study_app.gui.themed import wear
 from study_app.store.description import check_study
 from study_app.store.layout import MAX_SESSION, StudyFolder, check_participant, check_unused, suggest_id
 
-MAX_SEED = 999_999
-SIMULATED_DEVICE = "scripted"
 DEVICE_WORDS = {"mouse": "Mouse (seen, not felt)", "scripted": "Scripted hand (moves by itself)"}
-
-
-@dataclass(frozen=True, slots=True)
-class NewSession:
-    """What the operator chose; ``results`` is the study's folder, ``screen`` counts from 1 (None: the last)."""
-
-    source: str
-    participant: str
-    session: int
-    seed: int
-    operator: str
-    language: str
-    device: str
-    windowed: bool
-    screen: int | None
-    results: Path
-
-
-def draw_seed() -> int:
-    """Return a seed that nobody chose, short enough to be read aloud."""
-    return secrets.randbelow(MAX_SEED) + 1
-
-
-def study_results(results: Path, study: str, device: str) -> Path:
-    """Return a study's folder under ``results``; what a simulated hand did is kept apart from participants' data."""
-    return results / (f"{study}-{device}" if device == SIMULATED_DEVICE else study)
 
 
 class NewSessionDialog(QDialog):
@@ -92,8 +63,11 @@ class NewSessionDialog(QDialog):
         self.device = Choice()
         self.screen_choice = Choice()
         self.windowed = Check("In a window instead of full-screen")
+        self.pilot = Check("Pilot: in a window with a frame, kept apart from the data")
         self.verdict_icon = Icon("check", "ok", 18)
         self.verdict = label("", "label", "ok", wraps=True)
+        self._free = 1, ""
+        self.ways = [ActionButton("", "", height=34) for _ in range(2)]
         self.begin = ActionButton("play", "Begin", role="primary", height=46)
         self.cancel = ActionButton("", "Cancel", height=46)
         self._fill()
@@ -124,14 +98,24 @@ class NewSessionDialog(QDialog):
         self.windowed.setChecked(len(screens) == 1)
         for name, widget in (("Language", self.language), ("Device", self.device), ("Screen", self.screen_choice)):
             widget.setAccessibleName(name)
-        fields: tuple[QWidget, ...] = (self.session, self.language, self.device, self.screen_choice, self.windowed)
+        fields: tuple[QWidget, ...] = (
+            self.session,
+            self.language,
+            self.device,
+            self.screen_choice,
+            self.windowed,
+            self.pilot,
+        )
         for field in fields:
             field.setFont(font("body"))
         self.device.currentIndexChanged.connect(self._suggest_folder)
+        self.pilot.toggled.connect(self._choose_pilot)
         self.participant.textChanged.connect(self._check)
         self.session.valueChanged.connect(self._check)
         self.seed.textChanged.connect(self._check)
         self.results.textChanged.connect(self._check)
+        self.ways[0].clicked.connect(lambda: self.session.setValue(self._free[0]))
+        self.ways[1].clicked.connect(lambda: self.participant.setText(self._free[1]))
         self.begin.clicked.connect(self.accept)
         self.cancel.clicked.connect(self.reject)
         self.begin.setDefault(True)
@@ -162,13 +146,28 @@ class NewSessionDialog(QDialog):
         verdict.addWidget(self.verdict, 1)
         _put(grid, 0, 0, "Participant", self.participant, hint="letters and digits, no name")
         _put(grid, 0, 1, "Session", self.session)
-        grid.addLayout(verdict, 2, 0, 1, 2)
+        self._ways_row = QWidget()
+        ways = QHBoxLayout(self._ways_row)
+        ways.setContentsMargins(26, 0, 0, 0)
+        for way in self.ways:
+            way.setAutoDefault(False)
+            ways.addWidget(way)
+        ways.addStretch()
+        below = QVBoxLayout()
+        below.setSpacing(6)
+        below.addLayout(verdict)
+        below.addWidget(self._ways_row)
+        grid.addLayout(below, 2, 0, 1, 2)
         _put(grid, 4, 0, "Seed", _beside(self.seed, another), hint="decides every order; recorded")
         _put(grid, 4, 1, "Operator", self.operator)
         _put(grid, 6, 0, "Language of the participant's pages", self.language)
         _put(grid, 6, 1, "Device", self.device)
         _put(grid, 8, 0, "Participant's screen", self.screen_choice)
-        grid.addWidget(self.windowed, 9, 1)
+        both = QVBoxLayout()
+        both.setSpacing(2)
+        both.addWidget(self.windowed)
+        both.addWidget(self.pilot)
+        grid.addLayout(both, 8, 1, 2, 1, Qt.AlignmentFlag.AlignBottom)
         _put(grid, 10, 0, "Results folder of this study", _beside(self.results, change), across=2)
         column.addLayout(grid)
         column.addSpacing(10)
@@ -188,15 +187,24 @@ class NewSessionDialog(QDialog):
             self.results.setText(chosen)
 
     def _suggest_folder(self) -> None:
-        """Keep a simulated hand's sessions apart, unless the operator chose a folder."""
+        """Keep pilots and a simulated hand's sessions apart, unless the operator chose a folder."""
         if self.results.text() == self._suggested:
-            study = self.facts.protocol.study.name
-            self._suggested = str(study_results(self._all_results, study, self.device.currentData()))
+            study, pilot = self.facts.protocol.study.name, self.pilot.isChecked()
+            folder = study_results(self._all_results, study, self.device.currentData(), pilot=pilot)
+            self._suggested = str(folder)
             self.results.setText(self._suggested)
+
+    def _choose_pilot(self, pilot: bool) -> None:
+        """Hold a pilot in a window of its own look, under ids that the data never use."""
+        self.windowed.setChecked(pilot or self.windowed.isChecked())
+        self.windowed.setEnabled(not pilot)
+        self._suggest_folder()
+        self._check()
 
     def _check(self) -> None:
         """Say at once whether this can begin, and if not, why and what to do."""
         fault = self._fault()
+        self._offer_ways()
         if fault:
             self._say(fault, good=False)
         else:
@@ -208,12 +216,24 @@ class NewSessionDialog(QDialog):
             return "choose a results folder"
         participant, folder = self.participant.text().strip(), StudyFolder(Path(self.results.text().strip()))
         try:
-            check_participant(participant)
+            check_participant(participant, pilot=self.pilot.isChecked())
             check_study(folder, self.facts.protocol.study.name)
             check_unused(folder, participant, self.session.value())
         except StoreError as error:
             return str(error)
         return "" if self.seed.hasAcceptableInput() else "the seed is a whole number from 0 to 2147483647"
+
+    def _offer_ways(self) -> None:
+        """Where the id is used, offer the ways to go on that need no thought; going on with its session is for home."""
+        participant, folder = self.participant.text().strip(), StudyFolder(Path(self.results.text().strip() or "."))
+        held = [session.number for session in folder.sessions() if session.participant == participant]
+        self._ways_row.setVisible(self.session.value() in held)
+        if self.session.value() not in held:
+            return
+        self._free = min(max(held) + 1, MAX_SESSION), suggest_id(folder)
+        another, new = self.ways
+        another.show_action("", f"Session {self._free[0]} of {participant}")
+        new.show_action("", f"New participant {self._free[1]}")
 
     def _say(self, words: str, *, good: bool) -> None:
         self.verdict.setText(words[:1].upper() + words[1:])
@@ -234,6 +254,7 @@ class NewSessionDialog(QDialog):
             windowed=self.windowed.isChecked(),
             screen=self.screen_choice.currentData(),
             results=Path(self.results.text().strip()),
+            pilot=self.pilot.isChecked(),
         )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QEvent, QSize, Qt, QTimer, Signal
+from PySide6.QtCore import QEvent, QRect, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QCloseEvent, QColor, QKeyEvent, QPainter, QPaintEvent, QPixmap, QResizeEvent, QScreen
 from PySide6.QtWidgets import QWidget
 
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 HOLD_MS = 600
 LEAST_SIZE = QSize(1024, 640)
 WINDOWED_SIZE = QSize(1366, 768)
+PILOT_FRAME = 10
 
 
 class ParticipantWindow(QWidget):
@@ -44,6 +45,7 @@ class ParticipantWindow(QWidget):
     clock : seconds since the session's origin, for the events' times
     windowed : a window of at least 1024 × 640 instead of the whole screen
     captures_pointer : hold and hide the pointer in the tank, because it is the device
+    pilot : a coloured frame and the title say that this is no participant's session
 
     ``event`` carries the session's events; ``pointer`` the hand's place [m] and ``buttons`` the buttons' bits while the
     pointer is captured; ``painted`` (time painted, time of the sample) [ns] of every view that was drawn.
@@ -55,7 +57,13 @@ class ParticipantWindow(QWidget):
     painted = Signal(object, object)
 
     def __init__(
-        self, words: Words, *, clock: Callable[[], float], windowed: bool = False, captures_pointer: bool = False
+        self,
+        words: Words,
+        *,
+        clock: Callable[[], float],
+        windowed: bool = False,
+        captures_pointer: bool = False,
+        pilot: bool = False,
     ) -> None:
         super().__init__()
         load_fonts()
@@ -63,6 +71,7 @@ class ParticipantWindow(QWidget):
         self._clock = clock
         self._windowed = windowed
         self._captures = captures_pointer
+        self.frame_px = PILOT_FRAME if pilot else 0
         self._page: Page | None = None
         self._widget: PageWidget | TankWidget = ReadingPage(
             ("clock", words.preparing, (), PARTICIPANT.accent), words, clock, parent=self
@@ -74,7 +83,7 @@ class ParticipantWindow(QWidget):
         self._hold.setSingleShot(True)
         self._hold.setInterval(HOLD_MS)
         self._hold.timeout.connect(self._stop_force)
-        self.setWindowTitle(words.window_title)
+        self.setWindowTitle(f"{words.window_title} – pilot" if pilot else words.window_title)
         self.setObjectName("participant")
         self.setFont(font("body"))
         self.setStyleSheet(stylesheet(PARTICIPANT))
@@ -117,7 +126,7 @@ class ParticipantWindow(QWidget):
         self._hold.stop()
         old = self._widget
         made = self._make(page, old)
-        made.setGeometry(self.rect())
+        made.setGeometry(self._room())
         if isinstance(made, TankWidget):
             made.prepare()
         self._page, self._widget = page, made
@@ -167,7 +176,7 @@ class ParticipantWindow(QWidget):
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
         """Let the page fill the window."""
         super().resizeEvent(event)
-        self._widget.setGeometry(self.rect())
+        self._widget.setGeometry(self._room())
 
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802
         """Do not let the participant close a session by accident: that is a pause."""
@@ -179,10 +188,15 @@ class ParticipantWindow(QWidget):
         super().closeEvent(event)
 
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802
-        """Fill what no page covers."""
+        """Fill what no page covers: nothing, or the frame of a pilot."""
         painter = QPainter(self)
-        painter.fillRect(self.rect(), QColor(PARTICIPANT.window))
+        painter.fillRect(self.rect(), QColor(PARTICIPANT.warn if self.frame_px else PARTICIPANT.window))
         painter.end()
+
+    def _room(self) -> QRect:
+        """Return where pages are."""
+        frame = self.frame_px
+        return self.rect().adjusted(frame, frame, -frame, -frame)
 
     def _make(self, page: Page, old: QWidget) -> PageWidget | TankWidget:
         words, clock = self._words, self._clock

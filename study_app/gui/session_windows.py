@@ -10,7 +10,7 @@ from study_app.devices.scripted import ScriptedDevice
 from study_app.devices.simulated import SimulatedDevice
 from study_app.gui.bridge import Parts, SessionBridge
 from study_app.gui.operator import OperatorWindow
-from study_app.gui.operator.progress import SessionProgress, stages
+from study_app.gui.operator.progress import SessionProgress, progress_after, stages
 from study_app.gui.operator.view import Session
 from study_app.gui.operator.watch import WatchedJournal
 from study_app.gui.participant import ParticipantWindow
@@ -20,14 +20,17 @@ from study_app.protocol.model import Protocol, Reach
 from study_app.protocol.schedule import Schedule, stream
 from study_app.protocol.words import words
 from study_app.session.pages import Page, TaskPage
+from study_app.session.resume import FIRST, Start
 from study_app.session.simulated import Explorer, Reacher
+from study_app.store.exclusions import exclude
 
 if TYPE_CHECKING:
     from study_app.devices.base import Device
-    from study_app.gui.new_session import NewSession
+    from study_app.gui.choices import NewSession
+    from study_app.gui.machine import Machine
     from study_app.gui.theme import Theme
     from study_app.haptics.servo import Servo
-    from study_app.store.session import SessionStore
+    from study_app.store.open_session import SessionStore
 
 
 def open_windows(
@@ -35,13 +38,16 @@ def open_windows(
     protocol: Protocol,
     schedule: Schedule,
     store: SessionStore,
-    device: Device,
-    servo: Servo,
+    machine: Machine,
     theme: Theme,
+    start: Start = FIRST,
 ) -> SessionBridge:
-    """Open the operator's and the participant's window; the bridge returned is to be started."""
-    clock = store.clock.seconds
-    journal = WatchedJournal(store, SessionProgress(protocol, schedule), clock)
+    """Open the operator's and the participant's window; the bridge returned is to be started.
+
+    ``start`` is where a resumed session goes on.
+    """
+    clock, device, servo = store.clock.seconds, machine.device, machine.servo
+    journal = WatchedJournal(store, progress_after(SessionProgress(protocol, schedule), store.lines), clock)
     by_mouse = device.name == "mouse"
     operator = OperatorWindow(
         protocol.study.name,
@@ -51,7 +57,11 @@ def open_windows(
         theme=theme,
     )
     participant = ParticipantWindow(
-        words(chosen.language), clock=clock, windowed=chosen.windowed, captures_pointer=by_mouse
+        words(chosen.language),
+        clock=clock,
+        windowed=chosen.windowed,
+        captures_pointer=by_mouse,
+        pilot=chosen.pilot,
     )
     parts = Parts(
         session=_facts(chosen, protocol, schedule, servo),
@@ -61,6 +71,9 @@ def open_windows(
         servo=servo,
         journal=journal,
         clock=clock,
+        recorder=store.recorder,
+        start=start,
+        exclude=_excluder(chosen),
         aim_m=_aim(device, servo),
         point_to=device.point_to if isinstance(device, MouseDevice) else None,
         press=device.press if isinstance(device, MouseDevice) else None,
@@ -74,12 +87,28 @@ def open_windows(
     return bridge
 
 
+def who(chosen: NewSession) -> str:
+    """Return whose session it is, in the operator's words."""
+    kind = "  ·  pilot" if chosen.pilot else ""
+    return f"Participant {chosen.participant}  ·  session {chosen.session}  ·  seed {chosen.seed}{kind}"
+
+
+def _excluder(chosen: NewSession) -> Callable[[int | None, str], None]:
+    """Return what leaves the session, or one of its trials, out of the analysis for a reason."""
+
+    def leave_out(trial: int | None, reason: str) -> None:
+        by = chosen.operator or "operator"
+        exclude(chosen.results, chosen.participant, chosen.session, trial=trial, by=by, reason=reason)
+
+    return leave_out
+
+
 def _facts(chosen: NewSession, protocol: Protocol, schedule: Schedule, servo: Servo) -> Session:
     """Return what the operator's window says throughout; the force's share of its limit stays hidden."""
     return Session(
         protocol=protocol,
         stages=stages(protocol, schedule),
-        who=f"Participant {chosen.participant}  ·  session {chosen.session}  ·  seed {chosen.seed}",
+        who=who(chosen),
         expected_s=expected_duration_s(protocol),
         answers_of=protocol.responses_per_participant(),
         lateness_limit_s=protocol.limits.lateness_ms / 1000,

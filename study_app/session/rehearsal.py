@@ -11,7 +11,7 @@ and resumed answers as one that was not.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
 from types import TracebackType
@@ -31,7 +31,7 @@ from study_app.protocol.schedule import Schedule, build_schedule, stream
 from study_app.session.events import Begin, Chosen, Continue, Event, ItemShown, Submitted
 from study_app.session.pages import Page, QuestionnairePage, TaskPage, TextPage
 from study_app.session.ports import Ports
-from study_app.session.resume import FIRST, Start, find_protocol, resume_at
+from study_app.session.resume import FIRST, REHEARSED_SCREENS, Start, find_protocol, resume_at
 from study_app.session.runner import Runner
 from study_app.session.simulated import Draw, Explorer, Reacher, Senses, choices, reading_s
 from study_app.store import journal
@@ -46,7 +46,6 @@ LOOK_S = 0.05  # the session looks at the device so often
 IDLE_S = 0.5  # and while reading and answering
 FRAME_S = 1 / 60
 PAINT_S = (0.002, 0.006)  # from looking at the clock to the frame being on the screen
-SCREENS: dict[str, Any] = {"participant": "simulated", "refresh_hz": 60}
 
 
 def rehearse(
@@ -96,7 +95,7 @@ def rehearse(
                 operator="",
                 language=study.study.languages[0],
                 device=machine.described,
-                screens=SCREENS,
+                screens=REHEARSED_SCREENS,
                 simulated=True,
                 recordings=recordings,
                 clock=SessionClock(machine.servo.now_ns),
@@ -106,11 +105,6 @@ def rehearse(
             took_s = time.perf_counter() - began
             progress(f"{person}: {answers} responses, {lasted_s / 60:.1f} min of session in {took_s:.1f} s (simulated)")
     return folder
-
-
-def is_rehearsal(session_receipt: Mapping[str, Any]) -> bool:
-    """Return whether a session's receipt says that its participant was simulated, and so its screen."""
-    return dict(session_receipt["screens"]) == SCREENS
 
 
 def resume(session_folder: Path, *, protocol: str | Path | None = None) -> None:
@@ -140,7 +134,7 @@ def resume(session_folder: Path, *, protocol: str | Path | None = None) -> None:
             source,
             operator="",
             device=machine.described,
-            screens=SCREENS,
+            screens=REHEARSED_SCREENS,
             now_ns=machine.servo.now_ns,
             now=max(datetime.now().astimezone(), datetime.fromisoformat(lines[-1]["at"])),
         )

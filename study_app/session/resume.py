@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from study_app.errors import ProtocolError, SessionError
 from study_app.protocol.load import parse, protocol_hash, shipped, source_bytes
@@ -12,6 +13,8 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.schedule import PageStep, Schedule, Step, Trial
 from study_app.store.journal import Line
 from study_app.store.progress import Progress, attempts, progress_of
+
+REHEARSED_SCREENS: dict[str, Any] = {"participant": "simulated", "refresh_hz": 60}
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +49,11 @@ def resume_at(protocol: Protocol, schedule: Schedule, lines: Iterable[Line]) -> 
     for trial, attempt in attempts(told):
         presented[trial] = max(attempt, presented.get(trial, 0))
     return Start(step, presented)
+
+
+def is_rehearsal(session_receipt: Mapping[str, Any]) -> bool:
+    """Return whether a session's receipt says that its participant was simulated, and so its screen."""
+    return dict(session_receipt["screens"]) == REHEARSED_SCREENS
 
 
 def find_protocol(start: Line, candidates: Iterable[str] | None = None) -> str:

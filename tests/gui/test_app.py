@@ -10,21 +10,31 @@ import signal
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import QObject, Qt, QTimer
+from PySide6.QtCore import QObject, Qt, QTimer, Signal
+from PySide6.QtGui import QColor
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
 from study_app import app
 from study_app.errors import DeviceNotFound, DisplayError, SessionError, StoreError
+from study_app.gui import beginning, ending
 from study_app.gui.home import HomeWindow
 from study_app.gui.opening import OpeningWindow
 from study_app.gui.operator import OperatorWindow
 from study_app.gui.participant import ParticipantWindow
+from study_app.gui.theme import PARTICIPANT
 from study_app.protocol.load import source_bytes
-from study_app.session.pages import EndPage, QuestionnairePage, TextPage
+from study_app.session.pages import EndPage, QuestionnairePage, TaskPage, TextPage
+from study_app.store.open_session import SessionStore
 
 # The platform without a screen cannot limit or raise windows, and says so.
 pytestmark = pytest.mark.usefixtures("qapp")
+
+
+@pytest.fixture(autouse=True)
+def quick_preflight(monkeypatch):
+    """Measure a tenth of a second: what is judged of it is tested by itself."""
+    monkeypatch.setattr(beginning, "MEASURED_S", 0.1)
 
 
 @pytest.fixture
@@ -134,8 +144,8 @@ def test_a_signal_ends_with_a_status_and_its_exit_code(short_demo, results, numb
 
 def test_a_lost_device_ends_the_session_with_one_line(short_demo, results, monkeypatch):
     machines = []
-    open_machine = app._open_machine
-    monkeypatch.setattr(app, "_open_machine", lambda *chosen: machines.append(open_machine(*chosen)) or machines[-1])
+    open_machine = app.open_machine
+    monkeypatch.setattr(app, "open_machine", lambda *chosen: machines.append(open_machine(*chosen)) or machines[-1])
 
     def unplug(participant):
         QTest.keyClick(participant.widget, Qt.Key.Key_Return)
@@ -169,7 +179,7 @@ def test_what_cannot_begin_leaves_nothing_behind(short_demo, results, wrong, ref
 
 def test_a_results_folder_that_cannot_be_one_is_named(short_demo, tmp_path):
     (tmp_path / "file").write_text("no folder")
-    with pytest.raises(StoreError, match="file"):
+    with pytest.raises(SessionError, match="Not a directory"):
         app.run(short_demo, participant="P001", windowed=True, results=tmp_path / "file" / "demo")
     assert window(OperatorWindow) is None
 
@@ -187,7 +197,7 @@ def test_a_mistake_in_the_program_is_an_exit_code_and_a_trace(short_demo, result
     def fails(*_chosen):
         raise RuntimeError("not thought of")
 
-    monkeypatch.setattr(app, "_open_machine", fails)
+    monkeypatch.setattr(app, "open_machine", fails)
     assert app.run(short_demo, participant="P001", windowed=True, results=results) == app.BUG
     assert "not thought of" in capsys.readouterr().err
     assert not results.exists()
@@ -226,3 +236,163 @@ def test_from_home_into_a_session_and_home_again(tmp_path, monkeypatch):
     timer.stop()
     assert steps == ["asked", "ended", "Withdrawn"]
     assert events(tmp_path / "results" / "demo")[-1]["status"] == "withdrawn"
+
+
+def receipt_of(results: Path):
+    return json.loads((results / "data" / "sub-P001" / "ses-01" / "receipt.json").read_text())
+
+
+class Leaver(Person):
+    """Goes through the session until its second trial, and then the program is gone: nothing more is written."""
+
+    def __init__(self, monkeypatch):
+        super().__init__()
+        self._monkeypatch = monkeypatch
+
+    def look(self):
+        participant = window(ParticipantWindow)
+        if participant is not None and isinstance(participant.page, TaskPage) and participant.page.trial == 2:
+            with self._monkeypatch.context() as patched:
+                patched.setattr(SessionStore, "finish", lambda *_arguments, **_named: None)
+                os.kill(os.getpid(), signal.SIGTERM)
+                QTest.qWait(300)
+        else:
+            super().look()
+
+
+@pytest.fixture
+def stopped(short_demo, results, monkeypatch):
+    """Return a protocol whose session P001 stopped in its second trial."""
+    person = Leaver(monkeypatch)
+    app.run(short_demo, participant="P001", seed=5, device="scripted", windowed=True, results=results)
+    person.deleteLater()
+    told = events(results)
+    assert told[-1]["event"] != "session_ended"
+    return short_demo
+
+
+def test_a_session_that_stopped_goes_on_where_it_was_to_its_end(stopped, results):
+    before = events(results)
+    person = Person()
+    folder = results / "data" / "sub-P001" / "ses-01"
+    assert app.resume(folder, protocol=stopped, windowed=True, operator="BB") == 0
+    person.deleteLater()
+    told = events(results)
+    assert told[: len(before)] == before
+    (resumed,) = [line for line in told if line["event"] == "session_resumed"]
+    assert resumed["operator"] == "BB"
+    assert resumed["gap_s"] >= 0
+    attempts = [(line["trial"], line["attempt"]) for line in told if line["event"] == "trial_started"]
+    assert attempts == [(1, 1), (2, 1), (2, 2), (3, 1), (4, 1)]
+    assert len(rows(results, "responses")) == 8
+    assert [row["outcome"] for row in rows(results, "trials")] == ["complete", "interrupted", *["complete"] * 3]
+    assert told[-1]["status"] == "completed"
+    assert len(receipt_of(results)["resumed"]) == 1
+    with pytest.raises(StoreError, match="finished"):
+        app.resume(folder, protocol=stopped, windowed=True)
+
+
+def test_a_changed_protocol_is_refused_with_the_difference_and_nothing_changes(stopped, results, tmp_path):
+    changed = tmp_path / "changed.toml"
+    changed.write_text(Path(stopped).read_text().replace('title = "Now reach"', 'title = "Reach now"'))
+    before = events(results)
+    with pytest.raises(StoreError, match="Reach now"):
+        app.resume(results / "data" / "sub-P001" / "ses-01", protocol=str(changed), windowed=True)
+    assert events(results) == before
+
+
+def test_home_offers_first_to_go_on_with_a_session_that_stopped(stopped, results, monkeypatch):
+    monkeypatch.chdir(Path(stopped).parent)
+    Path("protocols").mkdir()
+    Path("protocols/demo.toml").write_text(Path(stopped).read_text())
+    steps = []
+
+    def step():
+        home, operator = window(HomeWindow), window(OperatorWindow)
+        if not steps and home is not None and home.banner.isVisible():
+            steps.append(home.banner.heading.text())
+            steps.append(home.banner.line.text())
+            home.banner.resume.click()
+        elif len(steps) == 2 and operator is not None and operator.buttons.end.isEnabled():
+            steps.append(operator.rail.heading.text())
+            operator.end_asked.emit("withdrawn", "")
+            operator.close()
+        elif len(steps) == 3 and home is not None and home.sessions.lines:
+            steps.append(home.banner.isVisible())
+            home.close()
+
+    timer = QTimer()
+    timer.timeout.connect(step)
+    timer.start(20)
+    assert app.home(results.parent) == 0
+    timer.stop()
+    assert steps[0] == "P001, session 1 stopped in part 1, liquid setting 2 of 2"
+    assert "2 of 8 answers are on disk" in steps[1]
+    assert steps[2:] == ["Trial 2 of 4", False]
+
+
+def test_a_pilot_is_marked_framed_and_kept_apart(short_demo, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    seen = []
+
+    def look(participant):
+        seen.append((participant.isFullScreen(), participant.frame_px, participant.windowTitle()))
+        corner = participant.grab().toImage().pixelColor(2, 2)
+        seen.append(corner.name())
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    person = Person(once=look)
+    app.run(short_demo, participant="test", pilot=True)
+    person.deleteLater()
+    assert seen[0][0] is False
+    assert seen[0][1] > 0
+    assert "pilot" in seen[0][2]
+    assert seen[1] == QColor(PARTICIPANT.warn).name()
+    folder = tmp_path / "results" / "demo-pilot"
+    assert not (tmp_path / "results" / "demo").exists()
+    assert json.loads((folder / "data" / "sub-test" / "ses-01" / "receipt.json").read_text())["pilot"] is True
+
+
+def test_the_preflight_is_told_before_anything_is_created(short_demo, results):
+    told = []
+
+    def tell(line):
+        told.append((line, results.exists()))
+
+    person = Person(once=lambda _participant: os.kill(os.getpid(), signal.SIGTERM))
+    app.run(short_demo, participant="P001", windowed=True, results=results, tell=tell)
+    person.deleteLater()
+    names = [line[9:25].strip() for line, _ in told]
+    assert names == [
+        "Device", "Servo rate", "Servo lateness", "Visual delay", "Screen", "Results folder", "Free space"
+    ]  # fmt: skip
+    assert not any(there for _, there in told)
+
+
+def test_a_failing_preflight_refuses_the_session(short_demo, results, monkeypatch):
+    monkeypatch.setattr("study_app.session.measuring.probe", lambda _folder: 1_000)
+    with pytest.raises(SessionError, match="free space: 0 MB free"):
+        app.run(short_demo, participant="P001", windowed=True, results=results)
+    assert not results.exists()
+
+
+def test_a_log_off_keeps_everything_and_says_how_it_ended(short_demo, results, monkeypatch):
+    heard = []
+
+    class Application(QObject):
+        asked = Signal(object)
+
+    source = Application()
+    monkeypatch.setattr(ending, "log_off_signal", lambda: source.asked)
+
+    class Manager:
+        def setRestartHint(self, hint):  # noqa: N802 - Qt's name
+            heard.append(hint)
+
+    person = Person(once=lambda _participant: source.asked.emit(Manager()))
+    code = app.run(short_demo, participant="P001", windowed=True, results=results)
+    person.deleteLater()
+    assert heard
+    assert code == 128 + 1
+    last = events(results)[-1]
+    assert (last["event"], last["status"]) == ("session_ended", "aborted")

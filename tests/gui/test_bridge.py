@@ -286,6 +286,29 @@ def test_the_operators_buttons_become_events(bridge, world):
     assert world.events().count("trial_started") == 3
 
 
+def test_leaving_out_is_kept_and_noted_and_a_refusal_is_told(make, world):
+    left_out = []
+
+    def exclude(trial, reason):
+        if reason == "again":
+            raise StoreError("trial 1 is left out already")
+        left_out.append((trial, reason))
+
+    bridge = make(exclude=exclude)
+    begin_trial(bridge, world)
+    bridge.operator.exclude_asked.emit(1, "phone rang")
+    bridge.operator.exclude_asked.emit(None, "no consent")
+    bridge.operator.exclude_asked.emit(1, "again")
+    assert left_out == [(1, "phone rang"), (None, "no consent")]
+    notes = [done[1]["text"] for done in world.done if done[0] == "note"]
+    assert notes == [
+        "left out of the analysis: trial 1: phone rang",
+        "left out of the analysis: the session: no consent",
+    ]
+    assert bridge.trouble == ""
+    assert isinstance(bridge.participant.page, TaskPage)
+
+
 def test_ending_closes_the_journal_with_status_and_reason_and_waits_to_be_closed(bridge, world, qtbot):
     begin_trial(bridge, world)
     bridge.operator.end_asked.emit("withdrawn", "felt unwell")

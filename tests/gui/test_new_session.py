@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 from PySide6.QtCore import Qt
 
+from study_app.gui.choices import MAX_SEED, draw_seed
 from study_app.gui.home.facts import study_facts
-from study_app.gui.new_session import MAX_SEED, NewSessionDialog, draw_seed
+from study_app.gui.new_session import NewSessionDialog
 
 # The platform without a screen cannot limit or raise windows, and says so.
 
@@ -66,6 +67,29 @@ def test_a_used_id_is_refused_with_the_ways_to_go_on_until_one_is_taken(dialog, 
         assert way in dialog.verdict.text()
     dialog.session.setValue(2)
     assert dialog.begin.isEnabled()
+    dialog.session.setValue(1)
+    before = {path: path.read_bytes() for path in results.rglob("*") if path.is_file()}
+    another, new = dialog.ways
+    another.click()
+    assert (dialog.participant.text(), dialog.session.value()) == ("P007", 2)
+    assert dialog.begin.isEnabled()
+    dialog.session.setValue(1)
+    new.click()
+    assert (dialog.participant.text(), dialog.session.value()) == ("P008", 1)
+    assert dialog.begin.isEnabled()
+    assert not dialog.ways[0].isVisibleTo(dialog)
+    assert before == {path: path.read_bytes() for path in results.rglob("*") if path.is_file()}
+
+
+def test_a_pilot_is_in_a_window_apart_and_may_have_an_id_kept_for_it(dialog, results):
+    dialog.participant.setText("test")
+    dialog.pilot.setChecked(True)
+    assert dialog.begin.isEnabled()
+    chosen = dialog.chosen()
+    assert (chosen.pilot, chosen.windowed) == (True, True)
+    assert chosen.results.name == f"{dialog.facts.protocol.study.name}-pilot"
+    dialog.pilot.setChecked(False)
+    assert not dialog.begin.isEnabled()
 
 
 def test_a_folder_of_another_study_is_refused(dialog, tmp_path):

@@ -7,12 +7,17 @@ from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
-from study_app.errors import ProtocolError, StoreError
+from study_app.errors import ProtocolError, StoreError, StudyError
 from study_app.protocol.describe import expected_duration_s
 from study_app.protocol.load import load, shipped
 from study_app.protocol.model import Protocol
-from study_app.store.layout import StudyFolder
+from study_app.protocol.schedule import PageStep, Schedule, build_schedule
+from study_app.session.resume import find_protocol, is_rehearsal, resume_at
+from study_app.store import journal, receipt
+from study_app.store.layout import StudyFolder, locate
+from study_app.store.opening import is_open
 from study_app.store.participants import participants
+from study_app.store.progress import progress_of
 
 LANGUAGES = {"en": "English", "nl": "Dutch", "de": "German", "fr": "French", "es": "Spanish", "it": "Italian"}
 
@@ -53,6 +58,7 @@ class SessionFacts:
     answers_of: int | None
     simulated: bool
     pilot: bool
+    folder: Path
 
     @property
     def needs_care(self) -> bool:
@@ -117,10 +123,68 @@ def sessions(results: Path, answers_of: dict[str, int]) -> tuple[SessionFacts, .
                 answers_of=answers_of.get(row["study"]),
                 simulated=bool(row["simulated"]),
                 pilot=bool(row["pilot"]),
+                folder=StudyFolder(data.parent).session(row["participant"], int(row["session"])).path,
             )
             for row in rows
         ]
     return tuple(sorted(found, key=lambda session: (not session.needs_care, -session.started.timestamp())))
+
+
+@dataclass(frozen=True, slots=True)
+class Interrupted:
+    """A session that can go on: who, where it stopped and what is on disk, in words; ``folder`` is the session's."""
+
+    folder: Path
+    source: str
+    participant: str
+    heading: str
+    line: str
+
+
+def interrupted(found: Iterable[SessionFacts], studies: Iterable[StudyFacts], now: datetime) -> Interrupted | None:
+    """Return the newest session that can go on here, if any: unfinished, open in no program, of a protocol at hand."""
+    studies = tuple(studies)
+    by_name = {facts.protocol.study.name: facts for facts in studies}
+    for session in found:
+        study = by_name.get(session.study)
+        if session.status != "unfinished" or study is None or is_open(session.folder):
+            continue
+        try:
+            folder = locate(session.folder)[1]
+            if is_rehearsal(receipt.read(folder.receipt)):
+                continue
+            lines = journal.read(folder.journal)
+            begun = progress_of(lines)
+            schedule = build_schedule(study.protocol, session.participant, begun.start["seed"])
+            source = find_protocol(begun.start, [facts.source for facts in studies])
+            step = resume_at(study.protocol, schedule, lines).step
+        except StudyError:
+            continue  # what is wrong with it is said when it is asked for by its folder
+        where = place_words(study.protocol, schedule, step)
+        stopped = started_words(datetime.fromisoformat(lines[-1]["at"]).astimezone(now.tzinfo), now)
+        whole = f" of {session.answers_of}" if session.answers_of is not None else ""
+        kind = "Pilot " if session.pilot else ""
+        return Interrupted(
+            folder=session.folder,
+            source=source,
+            participant=session.participant,
+            heading=f"{kind}{session.participant}, session {session.session} stopped {where}",
+            line=f"{stopped}. {session.answers}{whole} answers are on disk; nothing is missing before that point.",
+        )
+    return None
+
+
+def place_words(protocol: Protocol, schedule: Schedule, step: int) -> str:
+    """Return where a session goes on, in the operator's words and without a condition: "in part 2, delay setting 3"."""
+    language = "en" if "en" in protocol.study.languages else protocol.study.languages[0]
+    if step >= len(schedule.steps):
+        return "after its last page"
+    here = schedule.steps[step]
+    if isinstance(here, PageStep):
+        return f"before “{protocol.text(protocol.pages[here.page_id].title, language)}”"
+    name = here.label(protocol, language)
+    label = f"{name[:1].lower()}{name[1:]}" + (f" of {here.of}" if here.of > 1 else "")
+    return f"in part {here.part}, {label}" if here.part else f"in {label}"
 
 
 def held(found: Iterable[SessionFacts], study: str) -> str:

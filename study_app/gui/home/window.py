@@ -18,11 +18,23 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from study_app.errors import StudyError
 from study_app.gui.cards import SHADOW, Card, Chip, Icon, Logo
+from study_app.gui.choices import resumed
 from study_app.gui.controls import ActionButton
 from study_app.gui.dialogs import Notice
+from study_app.gui.home.banner import ResumeBanner
 from study_app.gui.home.cards import BrokenCard, CardGrid, StudyCard
-from study_app.gui.home.facts import BrokenFacts, StudyFacts, held, sessions, sources, study_facts
+from study_app.gui.home.facts import (
+    BrokenFacts,
+    Interrupted,
+    StudyFacts,
+    held,
+    interrupted,
+    sessions,
+    sources,
+    study_facts,
+)
 from study_app.gui.home.rehearsal import RehearsalDialog
 from study_app.gui.home.table import SessionsCard
 from study_app.gui.icons import draw_icon
@@ -175,6 +187,7 @@ class HomeWindow(QMainWindow):
         self._sources = list(sources())
         self._facts: list[StudyFacts | BrokenFacts] = []
         self.rail = Rail()
+        self.banner = ResumeBanner()
         self.grid = CardGrid()
         self.sessions = SessionsCard()
         self.device = DeviceCard(_screens(self))
@@ -182,6 +195,7 @@ class HomeWindow(QMainWindow):
         self._lay_out()
         self.rail.theme_asked.connect(self._change_theme)
         self.open_protocol.clicked.connect(self._open_protocol)
+        self.banner.resume_asked.connect(self._resume)
         self.resize(FULL)
         wear(self, theme)
         self.show_studies()
@@ -191,7 +205,7 @@ class HomeWindow(QMainWindow):
         titles = QVBoxLayout()
         titles.setSpacing(4)
         titles.addWidget(label("Studies", "title"))
-        titles.addWidget(label("Choose a protocol to start a session, or rehearse it first.", "body", "text2"))
+        titles.addWidget(label("Choose a protocol to start a session, or go on where one stopped.", "body", "text2"))
         head = QHBoxLayout()
         head.setContentsMargins(SHADOW, 0, SHADOW, 0)
         head.addLayout(titles)
@@ -206,6 +220,7 @@ class HomeWindow(QMainWindow):
         page.setContentsMargins(30, 30, 30, 22)
         page.setSpacing(20)
         page.addLayout(head)
+        page.addWidget(self.banner)
         page.addWidget(self.grid)
         page.addLayout(self._below, 1)
         self._area = QScrollArea()
@@ -246,7 +261,9 @@ class HomeWindow(QMainWindow):
         studies = [facts for facts in self._facts if isinstance(facts, StudyFacts)]
         answers = {facts.protocol.study.name: facts.protocol.responses_per_participant() for facts in studies}
         found = sessions(self.results, answers)
-        self.sessions.show_sessions(found, str(self.results), datetime.now().astimezone())
+        now = datetime.now().astimezone()
+        self.sessions.show_sessions(found, str(self.results), now)
+        self.banner.show_interrupted(interrupted(found, studies, now))
         for card in self.grid.cards:
             if isinstance(card, StudyCard):
                 card.held.setText(held(found, card.facts.protocol.study.name))
@@ -256,6 +273,14 @@ class HomeWindow(QMainWindow):
         dialog = NewSessionDialog(facts, self.results, theme=self.theme, parent=self)
         self._open(dialog)
         dialog.accepted.connect(lambda: self.session_asked.emit(dialog.chosen()))
+
+    def _resume(self, session: Interrupted) -> None:
+        """Ask to go on with a session as it was begun, on the screens there are now."""
+        try:
+            alone = len(self.screen().virtualSiblings()) == 1
+            self.session_asked.emit(resumed(session.folder, protocol=session.source, windowed=alone))
+        except StudyError as error:
+            self.tell("The session cannot go on", f"{error}.")
 
     def ask_for_rehearsal(self, facts: StudyFacts) -> None:
         """Open the questions before a rehearsal; the table shows what it left."""

@@ -19,6 +19,7 @@ class Actions(Card):
     pause_asked = Signal()
     resume_asked = Signal()
     repeat_asked = Signal()
+    exclude_asked = Signal()
     end_asked = Signal()
     close_asked = Signal()
 
@@ -28,6 +29,7 @@ class Actions(Card):
         self.repeat = ActionButton("repeat", "Repeat trial …", key="R")
         self.hint = label("", "label", "text2", wraps=True)
         self.hint.setFont(font("label", weight=400))
+        self.exclude = ActionButton("flag", "Leave out …", key="X")
         self.end = ActionButton("cross", "End session …", role="danger")
         self.close_session = ActionButton("check", "Close session", role="primary")
         self._resumes = False
@@ -35,6 +37,7 @@ class Actions(Card):
         row.setSpacing(14)
         row.addWidget(self.pause)
         row.addWidget(self.repeat)
+        row.addWidget(self.exclude)
         row.addSpacing(6)
         row.addWidget(self.hint, 1)
         row.addWidget(self.end)
@@ -43,6 +46,7 @@ class Actions(Card):
         self.column.addLayout(row)
         self.pause.clicked.connect(self._pause_or_resume)
         self.repeat.clicked.connect(self.repeat_asked)
+        self.exclude.clicked.connect(self.exclude_asked)
         self.end.clicked.connect(self.end_asked)
         self.close_session.clicked.connect(self.close_asked)
 
@@ -96,6 +100,40 @@ class RepeatQuestion(Question):
         self.add_buttons("Go on as it is", ActionButton("repeat", "Repeat trial", role="primary"))
         self.go_on.setEnabled(False)
         self.reason.textChanged.connect(lambda text: self.go_on.setEnabled(bool(text.strip())))
+
+
+class ExcludeQuestion(Question):
+    """What is left out of the analysis, and why; ``trial`` is the one under way or the last, None before the first."""
+
+    def __init__(self, parent: QWidget, theme: Theme, trial: int | None, setting: str) -> None:
+        super().__init__(
+            parent,
+            theme,
+            "Leave this out of the analysis?",
+            "Nothing is deleted: the list of exclusions says what does not count, by whom and why.",
+        )
+        self._choices = QButtonGroup(self)
+        self._trial = trial
+        for index, words in enumerate((setting, "The whole session")):
+            choice = Radio(words)
+            choice.setFont(font("body"))
+            choice.setVisible(index == 1 or trial is not None)
+            self._choices.addButton(choice, index)
+            self.column.addWidget(choice)
+        self._choices.button(1 if trial is None else 0).setChecked(True)
+        self.reason = QLineEdit()
+        self.reason.setFont(font("body"))
+        self.reason.setPlaceholderText("Reason, such as: talked during the trial")
+        self.reason.setAccessibleName("Reason")
+        self.column.addWidget(self.reason)
+        self.add_buttons("Let it count", ActionButton("flag", "Leave out", role="primary"))
+        self.go_on.setEnabled(False)
+        self.reason.textChanged.connect(lambda text: self.go_on.setEnabled(bool(text.strip())))
+
+    @property
+    def trial(self) -> int | None:
+        """Return the trial to leave out, None for the whole session."""
+        return self._trial if self._choices.checkedId() == 0 else None
 
 
 class EndQuestion(Question):

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -96,8 +96,20 @@ def _page_shown(progress: SessionProgress, at_s: float, fields: Mapping[str, Any
 
 def _trial_started(progress: SessionProgress, at_s: float, fields: Mapping[str, Any]) -> SessionProgress:
     steps = progress.schedule.steps
-    index = next(i for i, step in enumerate(steps) if isinstance(step, Trial) and step.number == fields["trial"])
-    return replace(_enter(progress, at_s, index), trial_since_s=at_s, trial_lasted_s=None, paused=False)
+    number = fields["trial"]
+    index = next(i for i, step in enumerate(steps) if isinstance(step, Trial) and step.number == number)
+    return replace(
+        _enter(_without(progress, number), at_s, index), trial_since_s=at_s, trial_lasted_s=None, paused=False
+    )
+
+
+def _without(progress: SessionProgress, number: int) -> SessionProgress:
+    """Forget what an earlier attempt of a trial left."""
+    return replace(
+        progress,
+        answers={trial: count for trial, count in progress.answers.items() if trial != number},
+        trials_done={trial: within for trial, within in progress.trials_done.items() if trial != number},
+    )
 
 
 def _trial_ended(progress: SessionProgress, at_s: float, fields: Mapping[str, Any]) -> SessionProgress:
@@ -126,12 +138,11 @@ def _note(progress: SessionProgress, at_s: float, fields: Mapping[str, Any]) -> 
 
 
 def _repeat(progress: SessionProgress, _at_s: float, fields: Mapping[str, Any]) -> SessionProgress:
-    return replace(
-        progress,
-        repeats=progress.repeats + 1,
-        answers={trial: count for trial, count in progress.answers.items() if trial != fields["trial"]},
-        trials_done={trial: within for trial, within in progress.trials_done.items() if trial != fields["trial"]},
-    )
+    return replace(_without(progress, fields["trial"]), repeats=progress.repeats + 1)
+
+
+def _resumed(progress: SessionProgress, _at_s: float, _fields: Mapping[str, Any]) -> SessionProgress:
+    return replace(progress, paused=False, force_off=False, broke="", trial_since_s=None, trial_lasted_s=None)
 
 
 def _ended(progress: SessionProgress, at_s: float, fields: Mapping[str, Any]) -> SessionProgress:
@@ -153,8 +164,16 @@ _TELLERS = {
     "note": _note,
     "repeat": _repeat,
     "broke": lambda progress, _at_s, fields: replace(progress, broke=str(fields["what"])),
+    "session_resumed": _resumed,
     "session_ended": _ended,
 }
+
+
+def progress_after(progress: SessionProgress, lines: Iterable[Mapping[str, Any]]) -> SessionProgress:
+    """Return the progress once the lines of a journal are on disk."""
+    for line in lines:
+        progress = progress.after(line["event"], line["t_s"], line)
+    return progress
 
 
 @dataclass(frozen=True, slots=True)

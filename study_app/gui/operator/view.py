@@ -70,7 +70,8 @@ class DeviceView:
 class OperatorView:
     """Everything on the operator's window except the two plots' points.
 
-    ``waits`` says that the trouble is a disk that takes nothing: the session goes on when it does again.
+    ``trial`` is the number of the trial under way or answered. ``waits`` says that the trouble is a disk that takes
+    nothing: the session goes on when it does again.
     """
 
     study: str
@@ -95,6 +96,7 @@ class OperatorView:
     may_resume: bool
     may_repeat: bool
     over: bool
+    trial: int | None = None
     waits: bool = False
 
     @property
@@ -170,6 +172,7 @@ def operator_view(
         may_resume=state in {"paused", "force off"},
         may_repeat=trial is not None and state == "running",
         over=state == "ended",
+        trial=None if trial is None else trial.number,
         waits=waits,
     )
 

@@ -9,7 +9,8 @@ from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QCloseEvent, QResizeEvent, QShowEvent
 from PySide6.QtWidgets import QGridLayout, QLayout, QMainWindow, QScrollArea, QVBoxLayout, QWidget
 
-from study_app.gui.operator.actions import Actions, EndQuestion, RepeatQuestion
+from study_app.gui.dialogs import Notice
+from study_app.gui.operator.actions import Actions, EndQuestion, ExcludeQuestion, RepeatQuestion
 from study_app.gui.operator.banner import Banner
 from study_app.gui.operator.header import Header
 from study_app.gui.operator.health import ServoHealth
@@ -48,6 +49,7 @@ class OperatorWindow(QMainWindow):
     pause_asked = Signal()
     resume_asked = Signal()
     repeat_asked = Signal(str)
+    exclude_asked = Signal(object, str)
     end_asked = Signal(str, str)
     note_written = Signal(str)
     mark_set = Signal()
@@ -75,7 +77,7 @@ class OperatorWindow(QMainWindow):
         self.notes = NotesCard()
         self.stop = StopPanel()
         self.buttons = Actions()
-        self.question: RepeatQuestion | EndQuestion | None = None
+        self.question: RepeatQuestion | ExcludeQuestion | EndQuestion | None = None
         self._escape = EscapeHold(self)
         self._lay_out()
         self._arrange(narrow=False)
@@ -150,6 +152,7 @@ class OperatorWindow(QMainWindow):
         self.buttons.pause_asked.connect(self.pause_asked)
         self.buttons.resume_asked.connect(self.resume_asked)
         self.buttons.repeat_asked.connect(self.ask_to_repeat)
+        self.buttons.exclude_asked.connect(self.ask_to_exclude)
         self.buttons.end_asked.connect(self.ask_to_end)
         self.buttons.close_asked.connect(self.close)
         self.notes.note_written.connect(self.note_written)
@@ -184,6 +187,20 @@ class OperatorWindow(QMainWindow):
         question.accepted.connect(lambda: self.repeat_asked.emit(question.reason.text().strip()))
         self._open(question)
 
+    def ask_to_exclude(self) -> None:
+        """Ask what does not count, and why."""
+        if self._already_asked() or self._view is None:
+            return
+        question = ExcludeQuestion(self, self.theme, self._view.trial, _setting(self._view))
+        question.accepted.connect(lambda: self.exclude_asked.emit(question.trial, question.reason.text().strip()))
+        self._open(question)
+
+    def tell(self, title: str, sentence: str) -> None:
+        """Say something in one sentence, with one button."""
+        notice = Notice(self, self.theme, title, sentence)
+        notice.finished.connect(notice.deleteLater)
+        notice.show()
+
     def ask_to_end(self) -> None:
         """Ask whether and why the session is to end now."""
         if self._already_asked() or self._view is None or self._view.over:
@@ -196,7 +213,7 @@ class OperatorWindow(QMainWindow):
     def _asks_about(view: OperatorView, question: RepeatQuestion) -> bool:
         return view.may_repeat and question.setting == _setting(view)
 
-    def _open(self, question: RepeatQuestion | EndQuestion) -> None:
+    def _open(self, question: RepeatQuestion | ExcludeQuestion | EndQuestion) -> None:
         self.question = question
         question.finished.connect(self._question_answered)
         question.installEventFilter(self._escape)

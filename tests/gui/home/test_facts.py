@@ -4,8 +4,22 @@ from __future__ import annotations
 
 from datetime import datetime, timedelta
 
-from study_app.gui.home.facts import BrokenFacts, StudyFacts, held, sessions, sources, started_words, study_facts
+import pytest
+
+from study_app.gui.home.facts import (
+    BrokenFacts,
+    StudyFacts,
+    held,
+    interrupted,
+    sessions,
+    sources,
+    started_words,
+    study_facts,
+)
 from study_app.protocol.load import load, source_bytes
+from study_app.protocol.schedule import PageStep, build_schedule
+from study_app.session.resume import REHEARSED_SCREENS
+from study_app.store.opening import open_alone
 from study_app.store.session import begin
 
 
@@ -27,6 +41,72 @@ def start(results, participant, status=None, *, simulated=False):
         store.close()
     else:
         store.finish(status)
+
+
+def stop_at(results, participant, steps, *, screens=None):
+    """Leave a session unfinished after so many steps of its schedule, or in the middle of the next one."""
+    protocol = load("demo")
+    store = begin(
+        results / "demo",
+        protocol,
+        source_bytes("demo"),
+        participant,
+        seed=1,
+        operator="AK",
+        language="en",
+        device={"name": "mouse"},
+        screens=screens or {"participant": {}},
+        simulated=False,
+    )
+    schedule = build_schedule(protocol, participant, 1)
+    for step in schedule.steps[:steps]:
+        if isinstance(step, PageStep):
+            store.append("page_shown", page=step.page_id)
+            store.append("page_left", page=step.page_id)
+            continue
+        told = {name: getattr(step, name) for name in ("block", "phase", "part", "index", "of", "code")}
+        store.append("trial_started", trial=step.number, attempt=1, **told)
+        store.append("trial_ended", trial=step.number, attempt=1, outcome="complete")
+        rows = [
+            {"item": item, "number": n, "value": 4, "onset_s": 1, "first_s": 1, "last_s": 1, "changes": 0}
+            for n, item in enumerate(step.items, 1)
+        ]
+        store.append("responses", trial=step.number, attempt=1, items=rows)
+    store.close()
+
+
+@pytest.mark.parametrize(
+    ("steps", "where", "answers"),
+    [
+        (0, "before “A first look”", 0),
+        (1, "in part 1, liquid setting 1 of 2", 0),
+        (2, "in part 1, liquid setting 2 of 2", 2),
+        (4, "in part 2, delay setting 1 of 2", 4),
+        (7, "after its last page", 8),
+    ],
+)
+def test_an_interrupted_session_is_told_by_where_it_stopped_and_what_is_on_disk(tmp_path, steps, where, answers):
+    stop_at(tmp_path, "P006", steps)
+    now = datetime.now().astimezone()
+    told = interrupted(sessions(tmp_path, {"demo": 8}), [study_facts("rek2024"), study_facts("demo")], now)
+    assert told.heading == f"P006, session 1 stopped {where}"
+    assert f"{answers} of 8 answers are on disk" in told.line
+    assert told.source == "demo"
+    assert told.folder == tmp_path / "demo" / "data" / "sub-P006" / "ses-01"
+
+
+def test_only_what_can_go_on_here_is_offered(tmp_path):
+    now = datetime.now().astimezone()
+    studies = [study_facts("demo")]
+    start(tmp_path, "P001", "completed")
+    stop_at(tmp_path, "P002", 2, screens=dict(REHEARSED_SCREENS))
+    assert interrupted(sessions(tmp_path, {}), studies, now) is None
+    stop_at(tmp_path, "P003", 2)
+    assert interrupted(sessions(tmp_path, {}), [], now) is None
+    assert interrupted(sessions(tmp_path, {}), studies, now).participant == "P003"
+    opening = open_alone(tmp_path / "demo" / "data" / "sub-P003" / "ses-01")
+    assert interrupted(sessions(tmp_path, {}), studies, now) is None
+    opening.release()
 
 
 def test_the_shipped_protocols_are_at_hand_the_demo_last():

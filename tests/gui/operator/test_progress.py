@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from study_app.gui.operator.progress import stages
+from study_app.gui.operator.progress import SessionProgress, progress_after, stages
 from study_app.protocol.load import load
 from study_app.protocol.schedule import build_schedule
 
@@ -59,6 +59,23 @@ def test_a_repeat_takes_back_the_trials_answers(told):
     assert told.progress.answers == {}
     assert told.progress.trials_done == {}
     assert told.progress.repeats == 1
+
+
+def test_a_resumed_session_is_where_its_journal_says_and_an_attempt_takes_back_the_one_before(told):
+    told.welcome()
+    told.start(1)
+    told.end(1)
+    told.answer(1)
+    told.tell("broke", what="cable")
+    told.tell("session_resumed", 60.0)
+    assert told.progress.broke == ""
+    told.start(1, attempt=2)
+    assert (told.progress.answers, told.progress.trials_done) == ({}, {})
+    assert told.progress.trial.number == 1
+    lines = [{"event": "page_shown", "t_s": 1.0, "page": "welcome"}, {"event": "note", "t_s": 2.0, "kind": "mark"}]
+    lines[1]["text"] = ""
+    again = progress_after(SessionProgress(told.protocol, told.schedule), lines)
+    assert (again.step, again.marks, again.saved_s) == (0, 1, 2.0)
 
 
 def test_a_page_that_comes_twice_is_found_after_the_present_step(told):

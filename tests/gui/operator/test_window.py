@@ -150,6 +150,22 @@ def test_ending_asks_first_and_says_status_and_reason(running, qtbot):
     assert asked.args == ["withdrawn", "felt unwell"]
 
 
+def test_leaving_out_asks_what_and_why(running, qtbot):
+    running.buttons.exclude.click()
+    question = running.question
+    assert not question.go_on.isEnabled()
+    question.reason.setText("talked during the trial")
+    with qtbot.waitSignal(running.exclude_asked) as asked:
+        question.go_on.click()
+    assert asked.args == [1, "talked during the trial"]
+    running.buttons.exclude.click()
+    running.question._choices.button(1).setChecked(True)
+    running.question.reason.setText("no consent")
+    with qtbot.waitSignal(running.exclude_asked) as asked:
+        running.question.go_on.click()
+    assert asked.args == [None, "no consent"]
+
+
 def test_going_on_with_the_session_ends_nothing(running, qtbot):
     qtbot.mouseClick(running.buttons.end, Qt.MouseButton.LeftButton)
     with qtbot.assertNotEmitted(running.end_asked):

@@ -1,0 +1,99 @@
+"""How a session begins: refused early, measured, and then claimed on the disk or opened again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+from PySide6.QtGui import QScreen
+
+from study_app.devices import list_devices, open_device
+from study_app.errors import SessionError
+from study_app.gui.choices import SIMULATED_DEVICE, NewSession
+from study_app.gui.machine import Machine
+from study_app.protocol.model import Protocol
+from study_app.session.preflight import Facts, Screen
+from study_app.store.description import check_study
+from study_app.store.journal import SessionClock
+from study_app.store.layout import StudyFolder, check_participant, check_unused
+from study_app.store.open_session import SessionStore
+from study_app.store.resume import reopen
+from study_app.store.session import begin
+
+MEASURED_S = 2.0  # so long the servo is looked at before a session
+
+
+@dataclass(frozen=True, slots=True)
+class Ready:
+    """Device and servo at rest, and what was measured of them."""
+
+    machine: Machine
+    facts: Facts
+
+    def facts_with(self, screen: QScreen) -> Facts:
+        """Return the facts with the participant's screen."""
+        return replace(self.facts, screen=Screen(refresh_hz=screen.refreshRate(), scaling=screen.devicePixelRatio()))
+
+
+def check(chosen: NewSession, study: Protocol) -> None:
+    """Refuse what cannot begin before any window opens; nothing is touched."""
+    if chosen.device not in list_devices():
+        open_device(chosen.device)
+    if chosen.language not in study.study.languages:
+        known = ", ".join(study.study.languages)
+        raise SessionError(
+            f"language {chosen.language!r}: {study.study.name} is written in {known}; choose one of these"
+        )
+    if chosen.resumes is not None:
+        return
+    folder = StudyFolder(chosen.results)
+    check_participant(chosen.participant, pilot=chosen.pilot)
+    check_study(folder, study.study.name)
+    check_unused(folder, chosen.participant, chosen.session)
+
+
+def measured(machine: Machine, chosen: NewSession) -> Facts:
+    """Return what the pre-flight judges, but for the screen."""
+    from study_app.session.measuring import measure  # noqa: PLC0415 - the compiler: only once it is needed
+
+    return measure(
+        machine.servo,
+        chosen.results,
+        device=machine.device.name,
+        screen=Screen(refresh_hz=0.0, scaling=1.0),
+        participant=chosen.participant,
+        recordings=chosen.recordings,
+        lasts_s=MEASURED_S,
+    )
+
+
+def open_store(
+    chosen: NewSession, protocol: Protocol, source: bytes, machine: Machine, screens: dict[str, Any]
+) -> SessionStore:
+    """Claim a new session on the disk, or open the one that goes on."""
+    if chosen.resumes is not None:
+        return reopen(
+            chosen.resumes,
+            protocol,
+            source,
+            operator=chosen.operator,
+            device=machine.described,
+            screens=screens,
+            now_ns=machine.servo.now_ns,
+        )
+    return begin(
+        chosen.results,
+        protocol,
+        source,
+        chosen.participant,
+        session=chosen.session,
+        seed=chosen.seed,
+        operator=chosen.operator,
+        language=chosen.language,
+        device=machine.described,
+        screens=screens,
+        simulated=chosen.device == SIMULATED_DEVICE,
+        pilot=chosen.pilot,
+        recordings=chosen.recordings,
+        clock=SessionClock(machine.servo.now_ns),
+    )

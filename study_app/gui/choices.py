@@ -1,0 +1,92 @@
+"""What an operator chose before a session, as a value. No Qt here."""
+
+from __future__ import annotations
+
+import secrets
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from study_app.errors import StoreError
+from study_app.session.resume import find_protocol
+from study_app.store.layout import locate, study_folder
+from study_app.store.progress import progress
+
+MAX_SEED = 999_999
+SIMULATED_DEVICE = "scripted"
+
+
+@dataclass(frozen=True, slots=True)
+class NewSession:
+    """What the operator chose; ``results`` is the study's folder, ``screen`` counts from 1 (None: the last).
+
+    ``resumes`` is the folder of the session that goes on, None for a new one.
+    """
+
+    source: str
+    participant: str
+    session: int
+    seed: int
+    operator: str
+    language: str
+    device: str
+    windowed: bool
+    screen: int | None
+    results: Path
+    pilot: bool = False
+    recordings: bool = True
+    resumes: Path | None = None
+
+
+def resumed(
+    session_folder: Path,
+    *,
+    protocol: str | None = None,
+    candidates: Iterable[str] | None = None,
+    operator: str = "",
+    device: str | None = None,
+    windowed: bool = False,
+    screen: int | None = None,
+) -> NewSession:
+    """Return the choices to go on with the session in a folder: its own, and where its windows open now.
+
+    Raises
+    ------
+    StoreError
+        It is no session's folder, its journal cannot be read, or the session is finished.
+    SessionError
+        No protocol at hand is of its study.
+    """
+    study, folder = locate(session_folder)
+    done = progress(session_folder)
+    if done.ended is not None:
+        raise StoreError(
+            f"{folder.path} is finished ({done.ended}): it cannot go on; use a new session number for another visit"
+        )
+    start = done.start
+    return NewSession(
+        source=protocol if protocol is not None else find_protocol(start, candidates),
+        participant=start["participant"],
+        session=start["session"],
+        seed=start["seed"],
+        operator=operator,
+        language=start["language"],
+        device=device if device is not None else start["device"],
+        windowed=windowed or start["pilot"],
+        screen=screen,
+        results=study.path,
+        pilot=start["pilot"],
+        recordings=bool(start.get("recordings")),
+        resumes=session_folder,
+    )
+
+
+def draw_seed() -> int:
+    """Return a seed that nobody chose, short enough to be read aloud."""
+    return secrets.randbelow(MAX_SEED) + 1
+
+
+def study_results(results: Path, study: str, device: str, *, pilot: bool = False) -> Path:
+    """Return a study's folder under ``results``; pilots and simulated hands are kept apart from participants' data."""
+    name = f"{study}-{device}" if device == SIMULATED_DEVICE else study
+    return study_folder(results, name, pilot=pilot).path

@@ -1,0 +1,56 @@
+"""Device and servo of a session, opened at rest and let go of in the order of safety."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from study_app.devices import open_device
+from study_app.gui.choices import SIMULATED_DEVICE, NewSession
+from study_app.protocol.model import Protocol
+from study_app.protocol.schedule import stream
+
+if TYPE_CHECKING:
+    from study_app.devices.base import Device
+    from study_app.haptics.servo import Servo
+
+
+@dataclass(frozen=True, slots=True)
+class Machine:
+    """Device and servo, running at rest."""
+
+    device: Device
+    servo: Servo
+
+    @property
+    def described(self) -> dict[str, Any]:
+        """What the receipt may say: the size of the servo's wake would name a parameter of a liquid."""
+        told = {name: value for name, value in self.servo.describe().items() if name != "elements"}
+        return self.device.describe() | told
+
+    def stop(self) -> None:
+        """Zero force, then let go of the device."""
+        try:
+            self.servo.stop()
+        finally:
+            self.device.close()
+
+
+def open_machine(chosen: NewSession, study: Protocol) -> Machine:
+    """Open the device and start the servo at rest; compiling takes a minute the first time."""
+    from study_app.haptics.pack import elements_needed  # noqa: PLC0415 - the compiler: only once it is needed
+    from study_app.haptics.servo import Servo  # noqa: PLC0415
+
+    x, y, z = study.device.workspace_m
+    options: dict[str, Any] = {"workspace_m": (x / 2, y / 2, z / 2), "force_limit_n": study.device.force_limit_n}
+    if chosen.device == SIMULATED_DEVICE:
+        options["random"] = stream(chosen.seed, f"run/{chosen.participant}/tremor")
+    device = open_device(chosen.device, **options)
+    try:
+        elements = max(elements_needed(study.scene_for(condition)) for condition in study.conditions)
+        servo = Servo(device, rate_hz=study.device.rate_hz, elements=elements)
+        servo.start()
+    except BaseException:
+        device.close()
+        raise
+    return Machine(device, servo)

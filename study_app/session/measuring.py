@@ -1,0 +1,62 @@
+"""Measures what ``preflight`` judges: two seconds of the servo at rest, and the disk that the results will be on."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from study_app.errors import StoreError
+from study_app.haptics.telemetry import timing
+from study_app.session.ports import ServoPort
+from study_app.session.preflight import Facts, Screen
+from study_app.store.atomic import probe
+
+LOOK_S = 1 / 60
+
+
+def measure(
+    servo: ServoPort,
+    results: Path,
+    *,
+    device: str,
+    screen: Screen,
+    participant: str,
+    recordings: bool,
+    lasts_s: float,
+    sleep: Callable[[float], None] = time.sleep,
+) -> Facts:
+    """Look at a running servo for ``lasts_s`` and at the disk of the study folder ``results``, leaving no trace."""
+    reader = servo.telemetry.reader()
+    ages_s: list[float] = []
+    for _ in range(max(1, round(lasts_s / LOOK_S))):
+        sleep(LOOK_S)
+        newest = servo.telemetry.latest()
+        if newest is not None:
+            ages_s.append((servo.now_ns() - int(newest["time_ns"])) * 1e-9)
+    samples = reader.read()
+    probe_s, free_bytes, fault = _probe(results)
+    return Facts(
+        device=device,
+        fresh_share=float((samples["fresh"] != 0).mean()) if len(samples) else 0.0,
+        timing=timing(samples, servo.rate_hz),
+        sample_age_s=float(np.percentile(ages_s, 95)) if ages_s else 0.0,
+        screen=screen,
+        probe_s=probe_s,
+        probe_fault=fault,
+        free_bytes=free_bytes,
+        participant=participant,
+        recordings=recordings,
+    )
+
+
+def _probe(results: Path) -> tuple[float | None, int | None, str]:
+    """Return how long the disk took for a small file [s] and how much room it has [bytes], or what is wrong with it."""
+    began = time.perf_counter()
+    try:
+        free_bytes = probe(results)
+    except StoreError as error:
+        return None, None, str(error)
+    return time.perf_counter() - began, free_bytes, ""

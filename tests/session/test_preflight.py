@@ -1,0 +1,121 @@
+"""What the pre-flight says of facts, and that it measures them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from study_app.devices.scripted import ScriptedDevice
+from study_app.errors import StoreError
+from study_app.haptics.clock import VirtualClock
+from study_app.haptics.servo import Servo
+from study_app.haptics.telemetry import Timing
+from study_app.protocol.model import Protocol
+from study_app.session import measuring
+from study_app.session.measuring import measure
+from study_app.session.preflight import Facts, Screen, checks, refused
+from tests.session import small
+
+WELL = Facts(
+    device="mouse",
+    fresh_share=1.0,
+    timing=Timing(2000, 1000.0, 5e-5, 1e-4, 2e-3, 0),
+    sample_age_s=0.001,
+    screen=Screen(60.0, 1.0),
+    probe_s=0.002,
+    probe_fault="",
+    free_bytes=10**10,
+    participant="P007",
+    recordings=True,
+)
+
+
+def verdicts(study: Protocol | None = None, **changed: Any) -> dict[str, str]:
+    return {check.name: check.verdict for check in checks(replace(WELL, **changed), study or small.protocol())}
+
+
+def test_where_all_is_well_nothing_is_said_but_so() -> None:
+    assert set(verdicts().values()) == {"ok"}
+    assert refused(checks(WELL, small.protocol())) == ""
+
+
+@pytest.mark.parametrize(
+    ("changed", "name", "verdict"),
+    [
+        ({"fresh_share": 0.2}, "Device", "failure"),
+        ({"timing": Timing(0, 0.0, 0.0, 0.0, 0.0, 0)}, "Device", "failure"),
+        ({"timing": Timing(800, 400.0, 5e-5, 1e-4, 2e-3, 0)}, "Servo rate", "failure"),
+        ({"timing": Timing(1900, 950.0, 5e-5, 1e-4, 2e-3, 0)}, "Servo rate", "warning"),
+        ({"timing": Timing(2000, 1000.0, 5e-5, 2.1e-3, 2e-3, 0)}, "Servo lateness", "warning"),
+        ({"timing": Timing(2000, 1000.0, 5e-5, 1e-4, 21e-3, 9)}, "Servo lateness", "warning"),
+        ({"sample_age_s": 0.01}, "Visual delay", "warning"),
+        ({"screen": Screen(30.0, 1.0)}, "Visual delay", "warning"),
+        ({"screen": Screen(60.0, 1.5)}, "Screen", "warning"),
+        ({"probe_s": None, "probe_fault": "the folder is read-only"}, "Results folder", "failure"),
+        ({"probe_s": 0.4}, "Results folder", "warning"),
+        ({"free_bytes": 50_000_000}, "Free space", "failure"),
+        ({"free_bytes": None}, "Free space", "warning"),
+    ],
+)
+def test_each_fact_has_its_limit(changed: dict[str, Any], name: str, verdict: str) -> None:
+    assert verdicts(**changed)[name] == verdict
+    reason = refused(checks(replace(WELL, **changed), small.protocol()))
+    assert (name.lower() in reason) == (verdict == "failure")
+
+
+def test_less_room_is_enough_without_recordings() -> None:
+    free_bytes = 60_500_000
+    assert verdicts(free_bytes=free_bytes, recordings=True)["Free space"] == "failure"
+    assert verdicts(free_bytes=free_bytes, recordings=False)["Free space"] == "ok"
+
+
+def test_a_dealt_order_wants_a_number_in_the_id() -> None:
+    blocks = small.TABLES["blocks"] | {"feeling": small.TABLES["blocks"]["feeling"] | {"order": "williams"}}
+    dealt = Protocol.model_validate(small.TABLES | {"blocks": blocks})
+    assert verdicts(dealt)["Balance"] == "ok"
+    assert verdicts(dealt, participant="Anna")["Balance"] == "warning"
+    assert "Balance" not in verdicts()
+
+
+def measured(results: Path) -> Facts:
+    device = ScriptedDevice()
+    with device, Servo(device, clock=VirtualClock(), elements=10) as servo:
+        return measure(
+            servo,
+            results,
+            device="scripted",
+            screen=Screen(60.0, 1.0),
+            participant="P001",
+            recordings=True,
+            lasts_s=0.5,
+            sleep=lambda seconds: void(servo.advance(round(seconds * 1000))),
+        )
+
+
+def void(_: object) -> None:
+    """Drop what a call returned."""
+
+
+def test_servo_and_disk_are_measured_and_nothing_is_left(tmp_path: Path) -> None:
+    facts = measured(tmp_path / "not" / "yet")
+    assert facts.timing.rate_hz == pytest.approx(1000, rel=1e-3)
+    assert facts.fresh_share == 1.0
+    assert 0 <= facts.sample_age_s <= 0.001
+    assert facts.probe_s is not None
+    assert facts.free_bytes is not None
+    assert list(tmp_path.iterdir()) == []
+    assert refused(checks(facts, small.protocol())) == ""
+
+
+def test_a_disk_that_takes_nothing_is_a_failure_with_its_reason(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(_folder: Path) -> int:
+        raise StoreError("the disk is full")
+
+    monkeypatch.setattr(measuring, "probe", full)
+    facts = measured(tmp_path)
+    assert "the disk is full" in refused(checks(facts, small.protocol()))
