@@ -19,17 +19,15 @@ def clear(vector: Any) -> None:
 @part
 def copy(source: Any, to: Any) -> None:
     """Set ``to`` to ``source``."""
-    to[0] = source[0]
-    to[1] = source[1]
-    to[2] = source[2]
+    x, y, z = source[0], source[1], source[2]  # all read before one is written: they travel together
+    to[0], to[1], to[2] = x, y, z
 
 
 @part
 def subtract(a: Any, b: Any, to: Any) -> None:
     """Set ``to`` to a − b."""
-    to[0] = a[0] - b[0]
-    to[1] = a[1] - b[1]
-    to[2] = a[2] - b[2]
+    x, y, z = a[0] - b[0], a[1] - b[1], a[2] - b[2]
+    to[0], to[1], to[2] = x, y, z
 
 
 @part
