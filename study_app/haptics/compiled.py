@@ -14,12 +14,14 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
+from numba.core.options import DefaultOptions
 
 _PACKAGE = Path(__file__).resolve().parent.parent
 _KERNEL_FOLDERS = ("haptics", "devices", "evaluation")
 
 _OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
-_NO_MEMORY: dict[str, Any] = {"_nrt": False}  # numba's own name for it; its stubs do not know it
+# numba's own name for it, which its stubs do not know; without it ticks are slower, and just as right.
+_NO_MEMORY: dict[str, Any] = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
 
 F = TypeVar("F", bound=Callable[..., Any])
 
