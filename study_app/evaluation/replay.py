@@ -1,0 +1,217 @@
+"""Every force of a session once more: from the recorded times and places, by the tick that sent them.
+
+The recordings keep the CRC-32 of each second of exact forces; here the forces are computed again and compared with
+that. The same version of the program on the same kind of processor gives the same bits; seconds that differ are named.
+The key is opened in memory alone, and nothing of it is told: who replays a session stays blind.
+
+A recording begins shortly before its trial, so that the force it begins with is known; one that follows another without
+a pause goes on from where that one was.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study_app.errors import StoreError
+from study_app.haptics.compiled import kernel
+from study_app.haptics.layout import LIMITER_FADE, LIMITER_STOP, STATUS_DEVICE_LOST
+from study_app.haptics.pack import pack
+from study_app.haptics.safety import SCENE_FADE_S, START_FADE_S, begin_scene, new_safety
+from study_app.haptics.scene import Scene
+from study_app.haptics.tick import tick
+from study_app.protocol.model import Protocol
+from study_app.store import blinding, journal, receipt, recording
+from study_app.store.journal import Line
+from study_app.store.layout import locate
+
+NAMED_SECONDS = 8
+
+
+@dataclass(frozen=True, slots=True)
+class Replayed:
+    """What a replay found.
+
+    ``differences`` has a sentence for each recording whose forces came out otherwise, ``uncompared`` one for each that
+    could not be computed again, or not to its end. ``lasted_s`` is how long the hand moved, ``took_s`` the replay.
+    """
+
+    recordings: int
+    lasted_s: float
+    took_s: float
+    differences: tuple[str, ...]
+    uncompared: tuple[str, ...]
+
+
+def replay(session_folder: Path) -> Replayed:
+    """Compute every recorded force of a session again, and compare.
+
+    Raises
+    ------
+    StoreError
+        It is no session's folder, or its journal, receipt, key or a recording cannot be read.
+    """
+    study, session = locate(session_folder)
+    lines = journal.read(session.journal)
+    kept = receipt.read(session.receipt)
+    key = blinding.read_key(study.path)
+    if key.hash != kept["key_hash"]:
+        raise StoreError(f"{study.key} is not the key that {session.path} ran under: restore it from a copy")
+    protocol = _whole(kept["protocol"], key)
+    limit_n = float(kept["device"].get("force_limit_n", np.inf))
+    began = time.perf_counter()
+    found = _Found()
+    before: _Before | None = None
+    for line, code in _recorded(lines):
+        scene = protocol.scene_for(key.condition(*code))
+        samples = recording.read_samples(session.path / line["recording"])
+        checks = recording.read_checks(session.path / line["recording"])
+        before = _again(samples, scene, limit_n, before)
+        found.compare(f"trial {line['trial']}, attempt {line['attempt']}", samples, before, checks)
+    took_s = time.perf_counter() - began
+    return Replayed(found.recordings, found.lasted_s, took_s, tuple(found.differences), tuple(found.uncompared))
+
+
+@dataclass(slots=True)
+class _Before:
+    """A recording computed again, and the models in the state it left them in: what the next one may go on from."""
+
+    serial: int
+    model: Any
+    safety: Any
+    samples: Any
+
+
+def _again(samples: Any, scene: Scene, limit_n: float, before: _Before | None) -> _Before:
+    """Return the forces of ``samples`` computed again, in a copy; the scene that is theirs is the last one's."""
+    out = samples.copy()
+    serial = int(out.scene[-1]) if len(out) else 0
+    rest = pack(scene.model_copy(update={"liquids": ()}))
+    model = pack(scene)
+    first = 0
+    shared = _shared(before, out)
+    if before is not None and shared is not None:
+        first = shared
+        _copy_forces(before.samples[len(before.samples) - first :], out[:first])
+        _run(rest, before.model, model, before.serial, serial, before.safety[0], out, first)
+        return _Before(serial, model, before.safety, out)
+    safety = new_safety(limit_n)
+    if len(out) and out.tick[0] != 0:
+        _assume(safety[0], out[0])
+        first = 1
+    _run(rest, rest, model, 0, serial, safety[0], out, first)
+    return _Before(serial, model, safety, out)
+
+
+def _shared(before: _Before | None, out: Any) -> int | None:
+    """Return how many samples the recording before holds too, if this one goes on from it without a gap."""
+    if before is None or len(out) == 0 or len(before.samples) == 0:
+        return None
+    shared = int(before.samples.tick[-1] + 1 - out.tick[0])
+    return shared if 0 <= shared <= min(len(out), len(before.samples)) else None
+
+
+def _copy_forces(known: Any, out: Any) -> None:
+    for name in ("force_n", "device_force_n"):
+        out[name] = known[name]
+
+
+def _assume(safety: Any, sample: Any) -> None:
+    """Take the first sample as it was recorded, exactly; a fade under way is over before the trial begins."""
+    fades = bool(sample.limiters & LIMITER_FADE)
+    safety.started = 1
+    safety.turn_ns = safety.usable_ns = sample.time_ns
+    safety.fade = 0.0 if fades else 1.0
+    safety.fade_s = START_FADE_S if fades else SCENE_FADE_S
+    safety.sent_n[:] = sample.device_force_n
+
+
+@kernel
+def _run(
+    rest: Any, earlier: Any, model: Any, serial_before: int, serial: int, safety: Any, out: Any, first: int
+) -> None:
+    """Take each of ``out`` from ``first`` on as the servo took it, and write the forces that came out."""
+    for i in range(first, out.shape[0]):
+        sample = out[i]
+        if i > 0 and sample.scene != out[i - 1].scene:
+            begin_scene(safety)
+        if sample.status == STATUS_DEVICE_LOST and sample.fresh == 0:
+            for axis in range(3):
+                sample.force_n[axis] = 0.0
+                sample.device_force_n[axis] = 0.0
+            continue
+        safety.stop = 1 if sample.limiters & LIMITER_STOP else 0
+        if sample.scene == serial and serial != 0:
+            tick(model, safety, sample)
+        elif sample.scene == serial_before and serial_before != 0:
+            tick(earlier, safety, sample)
+        else:
+            tick(rest, safety, sample)
+
+
+class _Found:
+    """What comes out recording by recording."""
+
+    def __init__(self) -> None:
+        self.recordings = 0
+        self.lasted_s = 0.0
+        self.differences: list[str] = []
+        self.uncompared: list[str] = []
+
+    def compare(self, name: str, samples: Any, again: _Before, checks: recording.Checks) -> None:
+        """Compare one recording's checks with those of the forces computed again."""
+        self.recordings += 1
+        if len(samples) == 0:
+            self.uncompared.append(f"{name}: holds no sample")
+            return
+        self.lasted_s += float(samples.time_ns[-1] - samples.time_ns[0]) * 1e-9
+        whole = _until_gap(samples.tick)
+        if whole < len(samples):
+            lost_s = whole / checks.rows
+            self.uncompared.append(f"{name}: samples are missing after {lost_s:.1f} s; what follows was not compared")
+        for what, kept, forces in (
+            ("force on the hand", checks.device_force, again.samples.device_force_n),
+            ("force of the liquids", checks.effect_force, again.samples.force_n),
+        ):
+            sums = recording.crcs(forces, checks.rows)
+            seconds = [
+                second
+                for second, (one, other) in enumerate(zip(kept, sums, strict=True))
+                if one != other and min((second + 1) * checks.rows, len(samples)) <= whole
+            ]
+            if seconds:
+                self.differences.append(f"{name}: the {what} differs in {_listed(seconds)} of {len(sums)} seconds")
+
+
+def _until_gap(ticks: NDArray[np.int64]) -> int:
+    """Return how many samples come before the first one that is missing."""
+    gaps = np.flatnonzero(np.diff(ticks) != 1)
+    return int(gaps[0]) + 1 if gaps.size else len(ticks)
+
+
+def _listed(seconds: list[int]) -> str:
+    shown = ", ".join(map(str, seconds[:NAMED_SECONDS]))
+    more = f" … ({len(seconds)} in all)" if len(seconds) > NAMED_SECONDS else ""
+    return f"second {shown}{more}"
+
+
+def _recorded(lines: list[Line]) -> Iterator[tuple[Line, tuple[str, str]]]:
+    """Yield each line about a whole recording, in the order of presentation, with its trial's block and code."""
+    told = {(line["trial"], line["attempt"]): line for line in lines if line["event"] == "recorded"}
+    for line in lines:
+        if line["event"] == "trial_started" and (which := (line["trial"], line["attempt"])) in told:
+            yield told[which], (line["block"], line["code"])
+
+
+def _whole(published: Mapping[str, Any], key: blinding.Key) -> Protocol:
+    """Return the protocol of a receipt with what the key keeps of it."""
+    blocks = {name: dict(block) for name, block in published["blocks"].items()}
+    for name, block in blocks.items():
+        block["conditions"] = [key.condition(name, code) for code in block.pop("codes")]
+    return Protocol.model_validate({**published, **key.tables, "blocks": blocks})

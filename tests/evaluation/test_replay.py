@@ -1,0 +1,173 @@
+"""Sessions replayed: the forces come out again to the last bit, and what was changed is named."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa  # type: ignore[import-untyped]
+import pytest
+from pyarrow import parquet
+
+from study_app.devices.scripted import ScriptedDevice
+from study_app.errors import StoreError
+from study_app.evaluation.replay import replay
+from study_app.haptics.clock import VirtualClock
+from study_app.haptics.servo import Servo
+from study_app.protocol.schedule import build_schedule
+from study_app.session.events import Begin, Continue, EndAsked, ForceStopped, PauseAsked, RepeatAsked, ResumeAsked
+from study_app.session.ports import Ports
+from study_app.session.rehearsal import rehearse
+from study_app.session.runner import Runner
+from study_app.store.journal import SessionClock
+from study_app.store.layout import StudyFolder
+from study_app.store.session import begin
+from tests.faults import short
+from tests.session import small
+
+SECONDS = 1000  # ticks
+
+
+def troubled(folder: Path) -> Path:
+    """Hold a session in which all happens that changes a force from outside; return its folder."""
+    study = small.protocol()
+    device = ScriptedDevice()
+    t_s = np.arange(0, 60, 0.005)
+    with device, Servo(device, clock=VirtualClock(), elements=100) as servo:
+        clock = SessionClock(servo.now_ns)
+        store = begin(
+            folder,
+            study,
+            b"small",
+            "P001",
+            seed=1,
+            operator="",
+            language="en",
+            device=device.describe(),
+            screens={},
+            simulated=True,
+            recordings=True,
+            clock=clock,
+        )
+        with store:
+            ports = Ports(servo, store, lambda _page: None, clock.seconds, store.recorder)
+            runner = Runner(study, build_schedule(study, "P001", 1), store.key.codes, ports, "en")
+            device.follow(t_s, np.column_stack((0.03 * np.sin(6 * t_s), 0.01 * np.cos(9 * t_s), 0 * t_s)))
+
+            def wait(ticks: int) -> None:
+                for _ in range(ticks // 50):
+                    servo.advance(50)
+                    runner.poll()
+
+            runner.post(Begin(clock.seconds()))
+            servo.advance(20)
+            runner.post(Continue(clock.seconds()))  # so early that the servo's own fade is under way
+            wait(700)
+            runner.post(RepeatAsked(clock.seconds(), "a sneeze"))  # from one force into the next
+            wait(850)
+            servo.advance(7)
+            runner.post(RepeatAsked(clock.seconds(), "another"))
+            wait(900)
+            runner.post(ForceStopped(clock.seconds(), "operator"))
+            wait(300)
+            runner.post(ResumeAsked(clock.seconds()))
+            wait(800)
+            runner.post(PauseAsked(clock.seconds(), "operator"))
+            wait(2000)
+            runner.post(ResumeAsked(clock.seconds()))
+            wait(1500)
+            runner.post(EndAsked(clock.seconds(), "aborted", ""))
+            place: Path = store.folder.path
+    return place
+
+
+@pytest.fixture(scope="module")
+def rehearsed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("replay")
+    rehearse(short.write(folder), participants=1, seed=1, results=folder / "results")
+    return folder / "results"
+
+
+def session(results: Path) -> Path:
+    return StudyFolder(results).sessions()[0].path
+
+
+def copied(results: Path, to: Path) -> Path:
+    for path in results.rglob("*"):
+        if path.is_file():
+            there = to / path.relative_to(results)
+            there.parent.mkdir(parents=True, exist_ok=True)
+            there.write_bytes(path.read_bytes())
+    return session(to)
+
+
+def test_a_rehearsed_session_comes_out_to_the_last_bit(rehearsed: Path) -> None:
+    found = replay(session(rehearsed))
+    assert (found.differences, found.uncompared) == ((), ())
+    assert found.recordings == 4
+    assert found.lasted_s > 3
+
+
+def test_repeats_pauses_stops_and_fades_come_out_to_the_last_bit(tmp_path: Path) -> None:
+    found = replay(troubled(tmp_path / "results"))
+    assert (found.differences, found.uncompared) == ((), ())
+    assert found.recordings == 5
+
+
+def rewrite(path: Path, change: Callable[[dict[str, Any]], None]) -> None:
+    """Change the columns of a recording and keep its checks, as a mistake or a forger would."""
+    facts = parquet.read_metadata(path).metadata[b"liquid_study"]
+    table = parquet.read_table(path)
+    columns = {name: table.column(name).to_numpy().copy() for name in table.column_names}
+    change(columns)
+    with parquet.ParquetWriter(path, table.schema) as writer:
+        writer.write_table(pa.table(columns, schema=table.schema))
+        writer.add_key_value_metadata({b"liquid_study": facts})
+
+
+def test_a_place_that_was_changed_is_named_by_trial_and_second(rehearsed: Path, tmp_path: Path) -> None:
+    place = copied(rehearsed, tmp_path / "changed")
+
+    def nudge(columns: dict[str, Any]) -> None:
+        columns["position_x_m"][-5:] += 1e-9
+
+    rewrite(place / "recordings" / "trial-002.parquet", nudge)
+    found = replay(place)
+    last = len(parquet.read_table(place / "recordings" / "trial-002.parquet")) // SECONDS
+    assert found.differences == (
+        f"trial 2, attempt 1: the force on the hand differs in second {last} of {last + 1} seconds",
+        f"trial 2, attempt 1: the force of the liquids differs in second {last} of {last + 1} seconds",
+    )
+
+
+def test_missing_samples_are_said_and_not_compared(rehearsed: Path, tmp_path: Path) -> None:
+    place = copied(rehearsed, tmp_path / "gap")
+
+    def lose(columns: dict[str, Any]) -> None:
+        columns["tick"][-100:] += 7
+
+    rewrite(place / "recordings" / "trial-001.parquet", lose)
+    found = replay(place)
+    assert found.differences == ()
+    (said,) = found.uncompared
+    assert said.startswith("trial 1, attempt 1: samples are missing after")
+
+
+def test_no_sentence_tells_a_condition(rehearsed: Path, tmp_path: Path) -> None:
+    place = copied(rehearsed, tmp_path / "told")
+    for path in place.glob("recordings/trial-00?.parquet"):
+        rewrite(path, lambda columns: columns["position_y_m"].__iadd__(1e-9))
+    text = "\n".join(replay(place).differences)
+    assert len(text.splitlines()) == 8
+    assert not any(word in text for word in ("thin", "thick", "prompt", "late", "200", "1400"))
+
+
+def test_another_key_is_refused(rehearsed: Path, tmp_path: Path) -> None:
+    place = copied(rehearsed, tmp_path / "key")
+    receipt = json.loads((place / "receipt.json").read_text())
+    (place / "receipt.json").write_text(json.dumps(receipt | {"key_hash": "0" * 64}))
+    with pytest.raises(StoreError, match="not the key"):
+        replay(place)
