@@ -2,13 +2,13 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from study_app.haptics.motion import Motion
 from study_app.haptics.offline import simulate
 from study_app.haptics.scene import AddedMass, Box, Uniform
-from tests.haptics.scenes import UNBENT, liquid, moving, scene, vectors
+from tests.haptics.scenes import UNBENT, examples, liquid, moving, scene, vectors
 
 VOLUME_M3 = math.pi / 6 * 0.068**3
 
@@ -21,6 +21,7 @@ def speeding_up(acceleration, ticks=50, interval_s=1e-3):
     return moving(np.outer(np.arange(ticks) * interval_s, acceleration), interval_s)
 
 
+@settings(max_examples=examples(60), deadline=None)
 @given(
     density=st.floats(1, 20_000),
     coefficient=st.floats(0, 10),

@@ -2,13 +2,13 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from study_app.haptics.motion import Motion
 from study_app.haptics.offline import simulate
 from study_app.haptics.scene import Body, Box
-from tests.haptics.scenes import liquid, moving, scene, vectors
+from tests.haptics.scenes import examples, liquid, moving, scene, vectors
 
 G = 9.80665
 
@@ -21,6 +21,7 @@ def floating(density=1000.0, **fields):
     return liquid(density, effects=("buoyancy",), **fields)
 
 
+@settings(max_examples=examples(60), deadline=None)
 @given(density=st.floats(1, 20_000), own=st.floats(1, 20_000), diameter=st.floats(0.001, 1))
 def test_the_displaced_weight_less_the_own(density, own, diameter):
     felt = simulate(scene(floating(density), body=Body(diameter_m=diameter, density_kg_m3=own)), moving([(1, -2, 3)]))
