@@ -1,0 +1,53 @@
+"""The commands: parse words, call one function, give an exit code.
+
+0 done · 1 a bug (with traceback) · 2 something the user can mend (one line) · 3 a check that found something.
+Each command imports what it needs when it runs, so that ``--help`` loads neither Qt nor the compiler.
+"""
+
+from __future__ import annotations
+
+import sys
+
+import click
+
+from study_app import __version__
+from study_app.cli import model, results, running
+from study_app.cli.words import EXIT_USER_ERROR
+from study_app.errors import StudyError
+
+
+@click.group(invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="liquid-study")
+@click.pass_context
+def commands(context: click.Context) -> None:
+    """Run, record and analyse studies of how liquids feel.
+
+    Without a command the home window opens. FILE is a protocol or scene file, or the name of a shipped one (rek2024,
+    physical_liquids, demo); RESULTS is a study folder such as results/rek2024, SESSION one of its ses-NN folders.
+    """
+    if context.invoked_subcommand is None:
+        from study_app import app
+
+        context.exit(app.home())
+
+
+for module in (running, results, model):
+    for command in vars(module).values():
+        if isinstance(command, click.Command):
+            commands.add_command(command)
+
+
+def main() -> None:
+    """Run a command; turn what the user can mend into one line and exit code 2."""
+    try:
+        code = commands.main(standalone_mode=False)
+    except click.UsageError as error:
+        command = error.ctx.command_path if error.ctx else "liquid-study"
+        click.echo(f"{command}: {error.format_message()} (see {command} --help)", err=True)
+        sys.exit(EXIT_USER_ERROR)
+    except (click.Abort, KeyboardInterrupt):
+        sys.exit(130)
+    except StudyError as error:
+        click.echo(f"liquid-study: {error}", err=True)
+        sys.exit(EXIT_USER_ERROR)
+    sys.exit(code if isinstance(code, int) else 0)

@@ -1,0 +1,55 @@
+"""The commands about the force model alone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+
+@click.command()
+@click.option("--scene", required=True, metavar="FILE", help="Protocol or scene file, or the name of a shipped one.")
+@click.option("--liquid", required=True, metavar="NAME", help="Id of the liquid in that file.")
+@click.option("--path", required=True, metavar="PATH", help="Motion CSV, or a programmed path: circle, line, stop …")
+@click.option("--out", required=True, type=click.Path(path_type=Path), metavar="OUT", help="CSV to write.")
+@click.option("--set", "changes", multiple=True, metavar="NAME=VALUE", help="Override a parameter; may come again.")
+def simulate(scene: str, liquid: str, path: str, out: Path, changes: tuple[str, ...]) -> None:
+    """Compute the force along a motion, with the servo's own tick, without a device or a clock."""
+    from study_app.haptics import motion, offline, paths
+    from study_app.haptics.override import override_all
+    from study_app.protocol.load import load_scene
+
+    chosen = override_all(load_scene(scene, liquid), dict(_assignment(change) for change in changes))
+    moved = paths.path(path, rate_hz=chosen.rate_hz) if path in paths.NAMES else motion.read(Path(path))
+    table = offline.simulate(chosen, moved)
+    motion.write(out, table)
+    click.echo(f"{out}: {len(table)} rows")
+
+
+def _assignment(change: str) -> tuple[str, str]:
+    name, separator, value = change.partition("=")
+    if not separator:
+        raise click.UsageError(f"--set {change}: write NAME=VALUE, such as --set density_kg_m3=1200")
+    return name.strip(), value.strip()
+
+
+@click.command()
+@click.argument("scene", metavar="FILE")
+@click.option("--liquid", metavar="NAME", help="Only this one; default: every liquid of the file.")
+def scene(scene: str, liquid: str | None) -> None:
+    """Print which effects a scene calls for, why, and the measured cost of each."""
+    from study_app.evaluation.cost import report
+    from study_app.protocol.load import load_scene, load_scenes
+
+    chosen = [load_scene(scene, liquid)] if liquid else list(load_scenes(scene).values())
+    click.echo("\n\n".join(report(one) for one in chosen))
+
+
+@click.command()
+@click.option("--to", required=True, type=click.Path(path_type=Path), metavar="DIR", help="Folder to write into.")
+def figures(to: Path) -> None:
+    """Draw the thesis' Figs 3 to 8 anew: force over time on programmed paths, with captions."""
+    from study_app.evaluation.figures import figures as draw
+
+    for written in draw(to):
+        click.echo(written)

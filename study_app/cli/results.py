@@ -1,0 +1,126 @@
+"""The commands that read, prove and evaluate results folders."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from study_app.cli.words import EXIT_FOUND, SESSION
+
+
+@click.command()
+@click.argument("results", type=click.Path(path_type=Path))
+@click.option("--to", required=True, type=click.Path(path_type=Path), metavar="DIR", help="Folder to write into.")
+def export(results: Path, to: Path) -> None:
+    """Write the tidy tables of all participants, with a codebook."""
+    from study_app.analysis.export import export as export_study
+
+    for written in export_study(results, to):
+        click.echo(written)
+
+
+@click.command()
+@click.argument("results", type=click.Path(path_type=Path))
+@click.option("--to", required=True, type=click.Path(path_type=Path), metavar="DIR", help="Folder to write into.")
+def plot(results: Path, to: Path) -> None:
+    """Draw the responses: by code until unblinded, by name after."""
+    from study_app.analysis.figures import plot as plot_study
+
+    for written in plot_study(results, to):
+        click.echo(written)
+
+
+@click.command()
+@click.argument("results", type=click.Path(path_type=Path))
+@click.option("--by", required=True, metavar="NAME", help="Who opens the key.")
+@click.option("--reason", required=True, metavar="TEXT", help="Why; recorded with the time.")
+def unblind(results: Path, by: str, reason: str) -> None:
+    """Open the sealed key of a study; who, when and why are recorded."""
+    from study_app.store.blinding import reveal
+
+    for block, codes in reveal(results, by=by, reason=reason).items():
+        for code, condition in codes.items():
+            click.echo(f"{block}  {code}  {condition}")
+
+
+@click.command()
+@click.argument("results", type=click.Path(path_type=Path))
+@click.option("--participant", required=True, metavar="ID")
+@click.option("--session", type=click.IntRange(1, 99), default=1, show_default=True)
+@click.option("--trial", type=click.IntRange(1), help="Only this trial; default: the whole session.")
+@click.option("--by", required=True, metavar="NAME", help="Who decides, or the rule's name.")
+@click.option("--reason", required=True, metavar="TEXT")
+def exclude(results: Path, participant: str, session: int, trial: int | None, by: str, reason: str) -> None:
+    """Leave a session or a trial out of the analysis, with a reason; nothing is deleted."""
+    from study_app.store.exclusions import exclude as exclude_from
+    from study_app.store.exclusions import named
+
+    click.echo(named(exclude_from(results, participant, session, trial=trial, by=by, reason=reason)))
+
+
+@click.command()
+@SESSION
+def rebuild(session: Path) -> None:
+    """Make a session's tables again from its journal."""
+    from study_app.store.rebuild import rebuild as rebuild_session
+
+    made = rebuild_session(session)
+    for path in made.rewritten:
+        click.echo(f"rewritten  {path}")
+    for path in made.swept:
+        click.echo(f"removed    {path}, left half-written")
+    if made.torn_bytes:
+        click.echo(f"the journal ends in {made.torn_bytes} bytes of a line that was never finished; left as they are")
+    if not (made.rewritten or made.swept):
+        click.echo("nothing to do: every table is what the journal says")
+
+
+@click.command()
+@SESSION
+def reproduce(session: Path) -> None:
+    """Make a session's orders again from its receipt and compare them with those that were run."""
+    from study_app.store.reproduced import reproduced
+
+    differences = reproduced(session)
+    for difference in differences:
+        click.echo(difference)
+    click.echo("the orders differ" if differences else "reproduced: trials and statements came in the receipt's order")
+    if differences:
+        click.get_current_context().exit(EXIT_FOUND)
+
+
+@click.command()
+@click.argument("folder", type=click.Path(path_type=Path))
+def verify(folder: Path) -> None:
+    """Check everything in a study's folder: columns, checksums, receipts, journals, key, recordings, Psych-DS."""
+    from study_app.store.verify import verify as verify_study
+
+    found = verify_study(folder)
+    for kind, findings in (
+        ("error", (*found.errors, *found.psychds.errors)),
+        ("warning", (*found.warnings, *found.psychds.warnings)),
+    ):
+        for finding in findings:
+            click.echo(f"{kind}: {finding}")
+    click.echo(f"{found.sessions} sessions: {'sound' if found.sound else 'not sound'}")
+    if not found.sound:
+        click.get_current_context().exit(EXIT_FOUND)
+
+
+@click.command()
+@SESSION
+def replay(session: Path) -> None:
+    """Compute every force again from the recording, with the same kernel, and name the seconds that differ."""
+    from study_app.evaluation.replay import replay as replay_session
+
+    found = replay_session(session)
+    for sentence in (*found.differences, *found.uncompared):
+        click.echo(sentence)
+    pace = found.lasted_s / found.took_s if found.took_s else 0.0
+    verdict = "forces differ" if found.differences else "every force compared is the same"
+    click.echo(
+        f"{found.recordings} recordings, {found.lasted_s:.1f} s, {pace:.0f} times as fast as they ran: {verdict}"
+    )
+    if found.differences:
+        click.get_current_context().exit(EXIT_FOUND)

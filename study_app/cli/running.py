@@ -1,0 +1,139 @@
+"""The commands that describe and hold sessions."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from study_app.cli.words import FILE, RESULTS, SESSION
+
+WINDOWED = click.option("--windowed", is_flag=True, help="Show the participant's window in a frame, not full-screen.")
+SCREEN = click.option("--screen", type=click.IntRange(1), help="Number of the participant's screen.")
+OPERATOR = click.option("--operator", default="", metavar="INITIALS", help="Who runs the session.")
+
+
+@click.command()
+@click.argument("protocol", metavar="FILE", required=False)
+@click.option("--schema", is_flag=True, help="Print the JSON Schema of protocol files instead.")
+def check(protocol: str | None, *, schema: bool) -> None:
+    """Print the study in words, or every problem of the file with line and hint."""
+    from study_app.protocol import describe, load
+
+    if schema:
+        import json
+
+        from study_app.protocol.model import schema as protocol_schema
+
+        click.echo(json.dumps(protocol_schema(), indent=2, ensure_ascii=False))
+        return
+    if protocol is None:
+        raise click.UsageError("check needs a protocol: a file, or one of " + ", ".join(load.shipped()))
+    click.echo(describe.describe(load.load(protocol)))
+
+
+@click.command()
+@FILE
+@click.option("--participants", type=click.IntRange(1, 9999), required=True)
+@click.option("--seed", type=click.IntRange(0), default=1, show_default=True)
+def design(protocol: str, participants: int, seed: int) -> None:
+    """Count positions and carry-over of the orders of N participants, before anyone is invited."""
+    from study_app.protocol.design import balance, describe_balance, numbered
+    from study_app.protocol.load import load
+
+    click.echo(describe_balance(balance(load(protocol), numbered(participants), seed)))
+
+
+@click.command()
+@FILE
+@click.option("--participant", metavar="ID", required=True, help="Letters and digits, such as P007.")
+@click.option("--session", type=click.IntRange(1, 99), default=1, show_default=True, help="Session number.")
+@click.option("--seed", type=click.IntRange(0), help="Default: drawn, shown and recorded.")
+@click.option("--device", default="mouse", show_default=True, metavar="NAME", help="mouse or scripted.")
+@click.option("--language", metavar="LANG", help="Default: the protocol's first.")
+@OPERATOR
+@WINDOWED
+@SCREEN
+@click.option("--pilot", is_flag=True, help="Try it out: windowed, marked, kept apart in results/<study>-pilot.")
+@click.option("--no-recordings", is_flag=True, help="Keep answers and trial rows only, not every sample and frame.")
+@RESULTS
+def run(
+    protocol: str,
+    participant: str,
+    session: int,
+    seed: int | None,
+    device: str,
+    language: str | None,
+    operator: str,
+    *,
+    windowed: bool,
+    screen: int | None,
+    pilot: bool,
+    no_recordings: bool,
+    results: Path | None,
+) -> None:
+    """Run a session with a participant, without dialogs."""
+    from study_app import app
+
+    code = app.run(
+        protocol,
+        participant=participant,
+        session=session,
+        seed=seed,
+        device=device,
+        language=language,
+        operator=operator,
+        windowed=windowed,
+        screen=screen,
+        results=results,
+        pilot=pilot,
+        recordings=not no_recordings,
+        tell=click.echo,
+    )
+    click.get_current_context().exit(code)
+
+
+@click.command()
+@FILE
+@click.option("--participants", type=click.IntRange(1, 999), default=1, show_default=True)
+@click.option("--seed", type=click.IntRange(0), default=1, show_default=True)
+@click.option("--no-recordings", is_flag=True, help="Keep answers and trial rows only, not every sample and frame.")
+@RESULTS
+def rehearse(protocol: str, participants: int, seed: int, *, no_recordings: bool, results: Path | None) -> None:
+    """Run whole sessions with simulated participants, faster than real time; every row says simulated."""
+    from study_app.session.rehearsal import rehearse as rehearse_study
+
+    folder = rehearse_study(
+        protocol,
+        participants=participants,
+        seed=seed,
+        results=results,
+        recordings=not no_recordings,
+        progress=click.echo,
+    )
+    click.echo(f"{folder}: {participants} simulated participant{'s' if participants > 1 else ''}")
+
+
+@click.command()
+@SESSION
+@click.option("--protocol", metavar="FILE", help="Its protocol; default: looked for among those at hand.")
+@click.option("--device", metavar="NAME", help="Default: the one it began with.")
+@OPERATOR
+@WINDOWED
+@SCREEN
+def resume(
+    session: Path, protocol: str | None, device: str | None, operator: str, *, windowed: bool, screen: int | None
+) -> None:
+    """Go on with a session whose program was ended: same order and seed, at the interrupted trial."""
+    from study_app import app
+
+    code = app.resume(
+        session,
+        protocol=protocol,
+        device=device,
+        operator=operator,
+        windowed=windowed,
+        screen=screen,
+        tell=click.echo,
+    )
+    click.get_current_context().exit(code)
