@@ -368,6 +368,7 @@ class SessionBridge(QObject):
         for timer in self._timers:
             timer.stop()
         sys.excepthook = self._hook_before
+        self.participant.may_close = True
         self.participant.close()
         self.operator.may_close = True
         if self.operator.question is not None:

@@ -47,6 +47,7 @@ class ParticipantWindow(QWidget):
     captures_pointer : hold and hide the pointer in the tank, because it is the device
     pilot : a coloured frame and the title say that this is no participant's session
 
+    While ``may_close`` is false, closing the window in the middle of a session is a pause.
     ``event`` carries the session's events; ``pointer`` the hand's place [m] and ``buttons`` the buttons' bits while the
     pointer is captured; ``painted`` (time painted, time of the sample) [ns] of every view that was drawn.
     """
@@ -71,6 +72,7 @@ class ParticipantWindow(QWidget):
         self._clock = clock
         self._windowed = windowed
         self._captures = captures_pointer
+        self.may_close = False
         self.frame_px = PILOT_FRAME if pilot else 0
         self._page: Page | None = None
         self._widget: PageWidget | TankWidget = ReadingPage(
@@ -180,7 +182,7 @@ class ParticipantWindow(QWidget):
 
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802
         """Do not let the participant close a session by accident: that is a pause."""
-        if event.spontaneous() and not isinstance(self._page, EndPage | None):
+        if not self.may_close and not isinstance(self._page, EndPage | None):
             event.ignore()
             self._pause()
             return

@@ -1,8 +1,8 @@
 """Kills rehearsed sessions at random moments and lets them be resumed: run as a program, once for all of them.
 
-Everything is loaded and compiled once, then each session is a fork that is killed with SIGKILL, and each going on
-another one (or a rebuilding, where all but the files after the last line was there). For every session it prints a line of JSON: the folder, after how long it was killed, what its journal held
-then, and how the going on ended.
+Everything is loaded and compiled once; then each session is a fork that is killed with SIGKILL, and each going on
+another one (or a rebuilding, where only files that follow from the journal were missing). For every session it writes a
+line of JSON: the folder, after how long it was killed, what its journal held then, and how the going on ended.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def main(protocol: str, folder: str, count: str, seed: str) -> None:
     began = time.perf_counter()
     assert forked(lambda: session(protocol, scratch)) == 0
     lasts_s = time.perf_counter() - began
-    draw = random.Random(int(seed))
+    draw = random.Random(int(seed))  # noqa: S311 - moments, not secrets
     for number in range(int(count)):
         killed = Path(folder) / f"killed-{number:02d}"
         place = killed / "data" / "sub-P001" / "ses-01"
@@ -64,7 +64,8 @@ def main(protocol: str, folder: str, count: str, seed: str) -> None:
             resumed = forked(lambda place=place: rebuild(place))
         elif code == -signal.SIGKILL and "\n" in held:
             resumed = forked(lambda place=place: rehearsal.resume(place, protocol=protocol))
-        print(json.dumps({"folder": str(killed), "after_s": after_s, "code": code, "held": held, "resumed": resumed}))
+        became = {"folder": str(killed), "after_s": after_s, "code": code, "held": held, "resumed": resumed}
+        sys.stdout.write(json.dumps(became) + "\n")
         sys.stdout.flush()
 
 

@@ -1,4 +1,4 @@
-"""A study of seconds: the demo with tasks that are soon over, and statements on which the simulated rater has no opinion.
+"""A study of seconds: the demo with tasks that are soon over, and statements that the simulated rater does not know.
 
 So answers depend on person and trial alone, and a trial that is presented again is answered as it was.
 """

@@ -1,0 +1,6 @@
+"""Tests with windows are left out where Qt cannot be loaded."""
+
+try:
+    import PySide6.QtWidgets  # noqa: F401
+except ImportError:
+    collect_ignore = ["test_windows.py", "test_leaks.py"]

@@ -1,0 +1,134 @@
+"""A disk that takes nothing: before a session it is refused, within one it waits, and nothing is lost or doubled."""
+
+from __future__ import annotations
+
+import csv
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from study_app.errors import StoreError
+from study_app.session.events import Note
+from study_app.session.pages import EndPage, PausePage, TroublePage
+from study_app.session.runner import RETRY_S
+from study_app.session.state import Phase
+from study_app.store import journal
+from study_app.store.verify import verify
+from tests.faults.worlds import StoredWorld
+from tests.session import small
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="limits the size of files as POSIX systems can")
+
+ADMINISTRATOR = hasattr(os, "geteuid") and os.geteuid() == 0
+
+
+@contextmanager
+def no_file_longer_than(size: int) -> Iterator[None]:
+    """Let the system refuse to make any file of this process longer, in the middle of a write if need be."""
+    import resource
+
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+def finish(world: StoredWorld) -> None:
+    world.until(Phase.COMPLETE)
+    assert isinstance(world.pages[-1], EndPage)
+
+
+def answers(world: StoredWorld) -> list[tuple[str, str, str]]:
+    with world.store.folder.table("small", "responses").open(newline="", encoding="utf-8") as file:
+        return [(row["trial"], row["item"], row["response"]) for row in csv.DictReader(file)]
+
+
+@pytest.mark.parametrize("phase", [Phase.READING, Phase.TASK, Phase.ANSWERING])
+@pytest.mark.parametrize("room", [0, 1, 40])
+def test_a_disk_that_fills_up_is_waited_for_and_nothing_is_lost_or_doubled(
+    tmp_path: Path, phase: Phase, room: int
+) -> None:
+    undisturbed, world = StoredWorld(tmp_path / "one"), StoredWorld(tmp_path / "two")
+    for each in (undisturbed, world):
+        each.start()
+        each.until(phase)
+    path = world.store.folder.journal
+    with no_file_longer_than(path.stat().st_size + room):
+        world.runner.post(Note(world.clock(), "note", "as long as a line of the journal is wont to be"))
+        assert isinstance(world.pages[-1], TroublePage)
+        assert "journal" in (world.runner.stalled or "")
+        assert journal.scan(path).torn_bytes == 0
+        world.run(3 * RETRY_S)
+        assert isinstance(world.pages[-1], TroublePage)
+    world.run(RETRY_S + 0.1)
+    assert world.runner.stalled is None
+    assert isinstance(world.pages[-1], PausePage)
+    for each in (undisturbed, world):
+        finish(each)
+    assert len(answers(world)) == small.RESPONSES
+    assert answers(world) == answers(undisturbed)
+    assert [line["n"] for line in world.lines] == list(range(1, len(world.lines) + 1))
+    assert [line["event"] for line in world.lines].count("note") == 1
+    assert verify(tmp_path / "two").errors == ()
+
+
+def test_a_session_whose_last_line_meets_a_full_disk_is_finished_when_there_is_room(tmp_path: Path) -> None:
+    world = StoredWorld(tmp_path / "study")
+    world.start()
+    while not (world.state.phase is Phase.READING and world.state.page_id == "thanks"):
+        world.step()
+    with no_file_longer_than(world.store.folder.journal.stat().st_size + 100):
+        world.step()  # page_left, and no room for the end
+        assert world.runner.stalled
+    world.run(RETRY_S + 0.1)
+    assert world.runner.stalled is None
+    assert isinstance(world.pages[-1], EndPage)
+    assert world.lines[-1]["status"] == "completed"
+    assert verify(tmp_path / "study").sound
+
+
+def test_tables_that_cannot_be_written_stop_no_session(tmp_path: Path) -> None:
+    world = StoredWorld(tmp_path / "study")
+    world.start()
+    table = world.store.folder.table("small", "responses")
+    table.unlink()
+    table.mkdir()
+    (table / "open in another program").touch()
+    world.until(Phase.ANSWERING)
+    world.step()
+    assert world.store.behind is not None
+    assert world.runner.stalled is None
+    (table / "open in another program").unlink()
+    table.rmdir()
+    finish(world)
+    assert len(answers(world)) == small.RESPONSES
+    assert verify(tmp_path / "study").errors == ()
+
+
+@pytest.mark.skipif(ADMINISTRATOR, reason="the administrator may write everywhere")
+def test_a_folder_that_becomes_read_only_stops_no_session(tmp_path: Path) -> None:
+    world = StoredWorld(tmp_path / "study")
+    world.start()
+    world.until(Phase.ANSWERING)
+    folder = world.store.folder.path
+    folder.chmod(0o500)
+    world.step()
+    assert world.store.behind is not None
+    folder.chmod(0o700)
+    finish(world)
+    assert verify(tmp_path / "study").errors == ()
+
+
+def test_a_disk_that_is_full_at_the_start_refuses_the_session_and_keeps_its_id_free(tmp_path: Path) -> None:
+    with no_file_longer_than(200), pytest.raises(StoreError, match="cannot be written"):
+        StoredWorld(tmp_path / "study")
+    world = StoredWorld(tmp_path / "study")
+    world.start()
+    finish(world)
+    assert verify(tmp_path / "study").errors == ()

@@ -1,0 +1,122 @@
+"""A double-blind session to its end: nothing that can be seen or read tells a condition."""
+
+from __future__ import annotations
+
+import logging
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+from PySide6.QtWidgets import QApplication, QLabel, QWidget
+
+from study_app import app
+from study_app.gui import beginning
+from study_app.gui.operator import OperatorWindow
+from study_app.gui.participant import ParticipantWindow
+from study_app.protocol.load import load, source_bytes
+from study_app.session.pages import TaskPage
+from study_app.store.leaks import leaks, telltales
+from tests.faults import short
+from tests.faults.windows import Person
+
+pytestmark = pytest.mark.usefixtures("qapp")
+
+# Ids, parameters and delays that occur nowhere by chance.
+CONCEALED = (
+    (r"\bliquids\.thin\b", "liquids.quagmire"),
+    (r"\bliquids\.thick\b", "liquids.mildew"),
+    (r'liquid = "thin"', 'liquid = "quagmire"'),
+    (r'liquid = "thick"', 'liquid = "mildew"'),
+    (r"conditions\.thin\b", "conditions.feel_quagmire"),
+    (r"conditions\.thick\b", "conditions.feel_mildew"),
+    (r"conditions\.prompt\b", "conditions.see_brisk"),
+    (r"conditions\.late\b", "conditions.see_tardy"),
+    (r'\["thin", "thick"\]', '["feel_quagmire", "feel_mildew"]'),
+    (r'\["prompt", "late"\]', '["see_brisk", "see_tardy"]'),
+    (r"density_kg_m3 = 1000\b", "density_kg_m3 = 1013.7"),
+    (r"density_kg_m3 = 1400\b", "density_kg_m3 = 1391.3"),
+    (r"length = 1700\b", "length = 1717"),
+    (r"scaling = 1700\b", "scaling = 1931"),
+    (r"exponent = 0\.75", "exponent = 0.7513"),
+    (r"delay_ms = 200\b", "delay_ms = 137.31"),
+)
+
+
+@pytest.fixture
+def concealed(tmp_path: Path) -> Path:
+    path = short.write(tmp_path)
+    text = path.read_text(encoding="utf-8")
+    for pattern, word in CONCEALED:
+        text, found = re.subn(pattern, word, text)
+        assert found, pattern
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def words_of(top: QWidget) -> set[str]:
+    """Return all that a window says: titles, texts, tips and names for those who cannot see."""
+    found = {top.windowTitle()}
+    for widget in (top, *top.findChildren(QWidget)):
+        found |= {widget.accessibleName(), widget.accessibleDescription(), widget.toolTip(), widget.windowTitle()}
+        found |= {widget.objectName(), widget.statusTip(), widget.whatsThis()}
+        text = getattr(widget, "text", None)
+        if callable(text):
+            found.add(str(text()))
+    return found
+
+
+def traces_of(operator: OperatorWindow) -> set[str]:
+    """Return names and labels of all that is plotted, and what stands where the force would be."""
+    named = set()
+    for card in (operator.lateness, operator.position):
+        for item in card.plot.items():
+            named |= {str(getattr(item, "toPlainText", str)()), str(getattr(item, "labelText", ""))}
+    return named | {label.text() for label in operator.force.findChildren(QLabel)}
+
+
+def test_nothing_seen_written_or_logged_tells_a_condition(
+    concealed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(beginning, "MEASURED_S", 0.1)
+    caplog.set_level(logging.DEBUG)
+    said: set[str] = set()
+    tasks: set[int] = set()
+    forces: list[Any] = []
+
+    def watch(participant: ParticipantWindow, operator: OperatorWindow) -> bool:
+        for top in QApplication.topLevelWidgets():
+            said.update(words_of(top))
+        said.update(traces_of(operator))
+        said.add(repr(participant.page))
+        if isinstance(participant.page, TaskPage):
+            tasks.add(participant.page.trial)
+            operator.mark_set.emit()
+        forces.append(operator.force.isVisible())
+        return False
+
+    told: list[str] = []
+    results = tmp_path / "results"
+    protocol = load(str(concealed))
+    assert source_bytes(str(concealed))
+    person = Person(watch)
+    code = app.run(
+        str(concealed),
+        participant="P001",
+        device="scripted",
+        windowed=True,
+        seed=3,
+        operator="AK",
+        results=results,
+        tell=told.append,
+    )
+    person.deleteLater()
+    assert code == 0
+    assert tasks == {1, 2, 3, 4}
+    words = telltales(protocol)
+    assert {"quagmire", "1013.7", "1717", "137.31", "see_tardy"} <= words.words
+    logged = [record.getMessage() for record in caplog.records]
+    for text in (*said, *told, *logged):
+        assert words.in_text(text) == [], text
+    assert leaks(results, protocol) == []
+    assert len(said) > 100

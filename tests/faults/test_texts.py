@@ -1,0 +1,52 @@
+"""What people type goes in and comes out as it was, by every reader."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from study_app.analysis.tables import load_study
+from study_app.session.events import EndAsked, Note, RepeatAsked
+from study_app.session.state import Phase
+from study_app.store import journal
+from study_app.store.exclusions import exclude, exclusions
+from study_app.store.verify import verify
+from tests.faults.worlds import StoredWorld
+
+TEXTS = (
+    'she said "oil, or tar"',
+    "two\nlines",
+    "a\ttab",
+    "🌊 naïve Łukasz 水",
+    "=SUM(A1:A9)",
+    "n/a",
+    " leading and trailing ",
+    ";-@+'",
+    "x" * 10_000,
+)
+
+
+@pytest.mark.parametrize("text", TEXTS)
+def test_a_free_text_survives_journal_tables_and_readers(tmp_path: Path, text: str) -> None:
+    world = StoredWorld(tmp_path / "study")
+    world.start()
+    world.until(Phase.TASK)
+    world.runner.post(Note(world.clock(), "note", text))
+    world.runner.post(RepeatAsked(world.clock(), f"again: {text}"))
+    world.runner.post(EndAsked(world.clock(), "withdrawn", text))
+    lines = journal.read(world.store.folder.journal)
+    assert [line["text"] for line in lines if line["event"] == "note"] == [text]
+    assert lines[-1]["reason"] == text
+    path = world.store.folder.table("small", "trials")
+    with path.open(newline="", encoding="utf-8") as file:
+        first, _ = list(csv.DictReader(file))
+    assert first["notes"] == f"{text}\nrepeated: again: {text}"
+    assert pd.read_csv(path, keep_default_na=False)["notes"][0] == first["notes"]
+    excluded = exclude(tmp_path / "study", "P001", 1, by="AK", reason=text)
+    assert exclusions(tmp_path / "study") == (excluded,)
+    assert excluded.reason == text.strip()
+    assert verify(tmp_path / "study").errors == ()
+    assert load_study(tmp_path / "study") is not None

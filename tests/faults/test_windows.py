@@ -1,0 +1,150 @@
+"""Windows that are closed, by whomever: zero force, everything kept, and a last line that says how it ended."""
+
+from __future__ import annotations
+
+import os
+import signal
+from pathlib import Path
+from typing import Any
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+
+from study_app import app
+from study_app.errors import StudyError
+from study_app.gui import beginning
+from study_app.gui.machine import Machine
+from study_app.gui.operator import OperatorWindow
+from study_app.gui.participant import ParticipantWindow
+from study_app.session.pages import PausePage, TaskPage
+from study_app.store import journal
+from study_app.store.layout import StudyFolder
+from study_app.store.verify import verify
+from tests.faults import short
+from tests.faults.windows import Person
+
+pytestmark = pytest.mark.usefixtures("qapp")
+
+
+@pytest.fixture(autouse=True)
+def machines(monkeypatch: pytest.MonkeyPatch) -> list[Machine]:
+    """Return the machines that are opened; the pre-flight takes a tenth of a second."""
+    monkeypatch.setattr(beginning, "MEASURED_S", 0.1)
+    opened: list[Machine] = []
+    open_machine = app.open_machine
+    monkeypatch.setattr(app, "open_machine", lambda *chosen: opened.append(open_machine(*chosen)) or opened[-1])
+    return opened
+
+
+def hold(folder: Path, watch: Any) -> tuple[int | str, list[dict[str, Any]]]:
+    """Run a session; return the exit code or the error, and its journal."""
+    results = folder / "results"
+    person = Person(watch)
+    try:
+        code: int | str = app.run(
+            str(short.write(folder)), participant="P001", device="scripted", windowed=True, seed=3, results=results
+        )
+    except StudyError as error:
+        code = str(error)
+    person.deleteLater()
+    (session,) = StudyFolder(results).sessions()
+    assert verify(results).errors == ()
+    return code, journal.read(session.journal)
+
+
+def in_tank(participant: ParticipantWindow) -> bool:
+    return isinstance(participant.page, TaskPage)
+
+
+def test_the_participants_window_that_is_closed_is_a_pause(tmp_path: Path, machines: list[Machine]) -> None:
+    done: list[str] = []
+
+    def watch(participant: ParticipantWindow, operator: OperatorWindow) -> bool:
+        if not done and in_tank(participant):
+            participant.windowHandle().close()  # as Alt+F4 and the cross in its frame do
+            done.append("closed")
+            return True
+        if done == ["closed"] and isinstance(participant.page, PausePage):
+            done.append("paused")
+            operator.resume_asked.emit()
+            return True
+        return False
+
+    code, lines = hold(tmp_path, watch)
+    assert (code, done) == (0, ["closed", "paused"])
+    assert lines[-1]["status"] == "completed"
+
+
+def test_escape_again_and_again_loses_nothing(tmp_path: Path) -> None:
+    pressed: list[int] = []
+
+    def watch(participant: ParticipantWindow, operator: OperatorWindow) -> bool:
+        if len(pressed) < 12 and participant.page is not None:
+            pressed.append(1)
+            QTest.keyClick(participant, Qt.Key.Key_Escape)
+            if isinstance(participant.page, PausePage):
+                operator.resume_asked.emit()
+            return True
+        if isinstance(participant.page, PausePage):
+            operator.resume_asked.emit()
+            return True
+        return False
+
+    code, lines = hold(tmp_path, watch)
+    assert code == 0
+    assert sum(len(line["items"]) for line in lines if line["event"] == "responses") == short.ANSWERS
+    assert any(line["event"] == "paused" for line in lines)
+
+
+def test_the_operators_window_that_is_closed_twice_ends_the_session(tmp_path: Path, machines: list[Machine]) -> None:
+    forces: list[bool] = []
+
+    def watch(participant: ParticipantWindow, operator: OperatorWindow) -> bool:
+        if in_tank(participant) or forces:
+            operator.windowHandle().close()
+            forces.append(machines[0].servo.force_is_on)
+            return True
+        return False
+
+    _, lines = hold(tmp_path, watch)
+    assert not any(forces)
+    assert (lines[-1]["status"], lines[-1]["reason"]) == ("aborted", "the window was closed")
+
+
+def test_a_request_to_terminate_in_a_trial_keeps_it_and_says_so(tmp_path: Path, machines: list[Machine]) -> None:
+    def watch(participant: ParticipantWindow, _operator: OperatorWindow) -> bool:
+        if in_tank(participant):
+            os.kill(os.getpid(), signal.SIGTERM)
+            return True
+        return False
+
+    code, lines = hold(tmp_path, watch)
+    assert code == 128 + signal.SIGTERM
+    assert [line["event"] for line in lines[-3:]] == ["trial_ended", "recorded", "session_ended"]
+    assert "SIGTERM" in lines[-1]["reason"]
+    assert not machines[0].servo.force_is_on
+
+
+def test_a_device_that_vanishes_is_a_calm_page_a_reason_and_a_broken_session(
+    tmp_path: Path, machines: list[Machine]
+) -> None:
+    seen: list[tuple[str, str]] = []
+
+    def watch(participant: ParticipantWindow, operator: OperatorWindow) -> bool:
+        if in_tank(participant) and not seen:
+            machines[0].device.unplug()  # type: ignore[attr-defined]
+            return True
+        page = participant.page
+        if type(page).__name__ == "TroublePage" and not seen:
+            seen.append((page.paragraph, operator.banner.what.text()))
+            operator.end_asked.emit("aborted", "cable")
+            return True
+        return False
+
+    said, lines = hold(tmp_path, watch)
+    assert "stopped answering" in str(said)
+    calm, reason = seen[0]
+    assert "stopped answering" in reason
+    assert "device" not in calm
+    assert lines[-1]["status"] == "broken"

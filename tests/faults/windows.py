@@ -1,0 +1,50 @@
+"""Runs the program with its windows, and looks at them every 20 ms."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+from PySide6.QtCore import QObject, Qt, QTimer
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication, QWidget
+
+from study_app.gui.operator import OperatorWindow
+from study_app.gui.participant import ParticipantWindow
+from study_app.session.pages import EndPage, QuestionnairePage, TextPage
+
+W = TypeVar("W", bound=QWidget)
+
+
+def window(kind: type[W]) -> W | None:
+    """Return the window of that kind that is shown."""
+    return next((one for one in QApplication.topLevelWidgets() if isinstance(one, kind) and one.isVisible()), None)
+
+
+class Person(QObject):
+    """Goes through a session with keys and clicks; before every look calls ``watch``, which may act in its place."""
+
+    def __init__(self, watch: Callable[[ParticipantWindow, OperatorWindow], object]) -> None:
+        super().__init__()
+        self._watch = watch
+        self._answered: Any = None
+        self._timer = QTimer(self)
+        self._timer.timeout.connect(self.look)
+        self._timer.start(20)
+
+    def look(self) -> None:
+        participant, operator = window(ParticipantWindow), window(OperatorWindow)
+        if participant is None or operator is None or participant.page is None:
+            return
+        if self._watch(participant, operator):
+            return
+        page = participant.page
+        if isinstance(page, TextPage):
+            QTest.keyClick(participant.widget, Qt.Key.Key_Return)
+        elif isinstance(page, QuestionnairePage) and page is not self._answered:
+            self._answered = page
+            for number in range(len(page.items)):
+                QTest.keyClick(participant.focusWidget(), Qt.Key(Qt.Key.Key_1 + number))
+            QTest.keyClick(participant.focusWidget(), Qt.Key.Key_Return)
+        elif isinstance(page, EndPage):
+            QTest.mouseClick(operator.buttons.close_session, Qt.MouseButton.LeftButton)

@@ -1,0 +1,75 @@
+"""A session of the small study with a real store and a servo that is all memory, walked through by hand."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from study_app.protocol.schedule import build_schedule
+from study_app.session.events import Begin, Chosen, Continue, ItemShown, ResumeAsked, Submitted
+from study_app.session.ports import Ports
+from study_app.session.runner import Runner
+from study_app.session.state import Phase
+from study_app.store.journal import SessionClock
+from study_app.store.open_session import SessionStore
+from study_app.store.session import begin
+from tests.session import small
+from tests.session.fakes import World
+
+LEFT, RIGHT = (-0.02, 0.0, 0.0), (0.02, 0.0, 0.0)
+
+
+class StoredWorld(World):
+    """``World`` whose journal is a session in ``folder``."""
+
+    def __init__(self, folder: Path, participant: str = "P001") -> None:
+        super().__init__()
+        self.store: SessionStore = begin(
+            folder,
+            small.protocol(),
+            b"small",
+            participant,
+            seed=1,
+            operator="AK",
+            language="en",
+            device={"name": "memory"},
+            screens={},
+            simulated=False,
+            clock=SessionClock(self.servo.now_ns),
+        )
+        plan = small.opened().plan
+        ports = Ports(self.servo, self.store, self._present, self.clock)
+        schedule = build_schedule(plan.protocol, participant, 1)
+        self.runner = Runner(plan.protocol, schedule, self.store.key.codes, ports, "en")
+
+    @property
+    def lines(self) -> tuple[dict[str, Any], ...]:
+        return self.store.lines
+
+    def start(self) -> None:
+        self.runner.post(Begin(self.clock()))
+
+    def step(self) -> None:
+        """Go on by a page, an answer page or a piece of a task."""
+        state = self.state
+        match state.phase:
+            case Phase.READING:
+                self.runner.post(Continue(self.clock()))
+            case Phase.ANSWERING:
+                for item in state.trial.items:
+                    self.runner.post(ItemShown(self.clock(), item))
+                    self.runner.post(Chosen(self.clock(), item, 5))
+                self.runner.post(Submitted(self.clock()))
+            case Phase.PAUSED:
+                self.runner.post(ResumeAsked(self.clock()))
+            case _:
+                self.run(0.3, LEFT)
+                self.run(0.3, RIGHT)
+
+    def until(self, phase: Phase) -> None:
+        """Go on until that phase comes."""
+        for _ in range(100):
+            if self.state.phase is phase:
+                return
+            self.step()
+        raise AssertionError(self.state.phase)
