@@ -12,6 +12,7 @@ from typing import Any
 
 import study_app
 from study_app.errors import StoreError
+from study_app.protocol.diff import CONDITIONS_DIFFER, differences
 from study_app.protocol.load import protocol_hash
 from study_app.protocol.model import Protocol
 from study_app.protocol.schedule import stream
@@ -29,7 +30,6 @@ from study_app.store.recorder import Lost, Recorded, event_of, recording_files
 from study_app.store.session import make_recorder, surroundings
 
 SHOWN_DIFFERENCES = 6
-SHOWN_LETTERS = 40
 
 
 def reopen(
@@ -98,29 +98,6 @@ def reopen(
     return store
 
 
-def difference(before: Any, after: Any, place: str = "") -> Iterator[str]:
-    """Yield what differs between two JSON values, each with its place: ``pages.consent.body: 'old' → 'new'``."""
-    if isinstance(before, dict) and isinstance(after, dict):
-        for name in {**before, **after}:
-            inside = f"{place}.{name}" if place else str(name)
-            if name not in after:
-                yield f"{inside}: {_short(before[name])} is gone"
-            elif name not in before:
-                yield f"{inside}: {_short(after[name])} is new"
-            else:
-                yield from difference(before[name], after[name], inside)
-    elif isinstance(before, list) and isinstance(after, list) and len(before) == len(after):
-        for index, (old, new) in enumerate(zip(before, after, strict=True), start=1):
-            yield from difference(old, new, f"{place}.{index}")
-    elif before != after:
-        yield f"{place}: {_short(before)} → {_short(after)}"
-
-
-def _short(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= SHOWN_LETTERS else f"{text[: SHOWN_LETTERS - 1]}…"
-
-
 def _unfinished(folder: SessionFolder, lines: list[Line]) -> Line:
     """Return the first line of a session that can go on."""
     if not lines:
@@ -139,9 +116,9 @@ def _same_protocol(place: Place, first: Mapping[str, Any], start: Line, protocol
     """Refuse a protocol whose file is not the one the session began with, and say what differs."""
     if protocol_hash(source) == start["protocol_hash"]:
         return
-    found = list(difference(first["protocol"], json.loads(json.dumps(receipt.without_conditions(protocol)))))
+    found = list(differences(first["protocol"], json.loads(json.dumps(receipt.without_conditions(protocol)))))
     if not same_conditions(place.study_folder.path, protocol):
-        found.append("conditions differ")
+        found.append(CONDITIONS_DIFFER)
     if not found:
         found.append("comments, order or notation, nothing that is run")
     listed = "; ".join(found[:SHOWN_DIFFERENCES])
