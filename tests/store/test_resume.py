@@ -224,7 +224,7 @@ def changed(tables: dict[str, Any], path: str, value: Any) -> Protocol:
         (
             "pages.consent.body",
             "You must stay.",
-            "pages.consent.body: 'You may stop at any time.' before, 'You must stay.' now",
+            'pages.consent.body: "You may stop at any time." before, "You must stay." now',
         ),
         ("tasks.feel.max_s", 10, "tasks.feel.max_s: 9 before, 10 now"),
         ("sequence", ["consent", "liquids", "delays"], "sequence: "),
