@@ -229,4 +229,5 @@ def _limits(protocol: Protocol) -> list[tuple[str, str]]:
         (f"{limits.lateness_ms:g} ms", "lateness of ticks (99th percentile)"),
         (f"{limits.worst_gap_ms:g} ms", "between two ticks"),
         (f"{limits.delay_error_ms:g} ms", "error of the delay (95th percentile)"),
+        (f"{limits.frame_gap_ms:g} ms", "between two frames"),
     ]

@@ -129,6 +129,7 @@ class Limits(Table):
     lateness_ms: float = Field(default=2, gt=0, description="99th percentile of the lateness of ticks [ms].")
     worst_gap_ms: float = Field(default=20, gt=0, description="Longest time between two ticks [ms].")
     delay_error_ms: float = Field(default=25, gt=0, description="95th percentile of achieved − requested delay [ms].")
+    frame_gap_ms: float = Field(default=250, gt=0, description="Longest time that one frame stands in the tank [ms].")
 
 
 T = TypeVar("T")

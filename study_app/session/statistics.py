@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from study_app.haptics.layout import LIMITER_NAMES, SAMPLE
+from study_app.haptics.layout import LIMITER_GLITCH, LIMITER_NAMES, SAMPLE
 from study_app.haptics.telemetry import timing
 
 _TIMES = np.dtype([(name, SAMPLE[name]) for name in ("tick", "time_ns", "lateness_ns")])
@@ -32,6 +32,8 @@ class TrialStatistics:
         self._late_s = late_s
         self._times: list[Any] = []
         self._ages_ns: list[int] = []
+        self._painted_ns = 0
+        self._frame_gap_ns = 0
         self._last_m: NDArray[np.float64] | None = None
         self._path_m = 0.0
         self._force_sum_n = 0.0
@@ -46,7 +48,7 @@ class TrialStatistics:
         for name in _TIMES.fields or ():
             times[name] = samples[name]
         self._times.append(times)
-        self._move(samples["position_m"])
+        self._move(samples["position_m"][samples["limiters"] & LIMITER_GLITCH == 0])
         force_n = np.sqrt(np.einsum("ij,ij->i", samples["device_force_n"], samples["device_force_n"]))
         self._force_sum_n += float(force_n.sum())
         self._force_peak_n = max(self._force_peak_n, float(force_n.max()))
@@ -57,6 +59,9 @@ class TrialStatistics:
 
     def frame(self, painted_ns: int, shown_ns: int) -> None:
         """Take a frame that was painted at one moment and showed another [ns]."""
+        if self._ages_ns:
+            self._frame_gap_ns = max(self._frame_gap_ns, painted_ns - self._painted_ns)
+        self._painted_ns = painted_ns
         self._ages_ns.append(painted_ns - shown_ns)
 
     def summary(self, samples_dropped: int) -> dict[str, Any]:
@@ -107,4 +112,5 @@ class TrialStatistics:
             "delay_error_mean_ms": float(errors_s.mean()) * 1e3 if seen else None,
             "delay_error_p95_ms": float(np.percentile(errors_s, 95)) * 1e3 if seen else None,
             "delay_error_max_ms": float(errors_s.max()) * 1e3 if seen else None,
+            "worst_frame_gap_ms": self._frame_gap_ns * 1e-6 if errors_s.size > 1 else None,
         }

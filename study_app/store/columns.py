@@ -172,6 +172,7 @@ TRIALS: tuple[Column, ...] = (
         "delay_error_p95_ms", "number", "Visual delay, achieved less requested: 95th percentile.", "ms", may_miss=True
     ),
     Column("delay_error_max_ms", "number", "Visual delay, achieved less requested: largest.", "ms", may_miss=True),
+    _measure("worst_frame_gap_ms", "Longest time that one frame stood before the next was shown.", "ms"),
     Column(
         "valid",
         "flag",

@@ -27,6 +27,7 @@ _JUDGED = (
     ("lateness_p99_ms", "lateness_ms"),
     ("worst_gap_ms", "worst_gap_ms"),
     ("delay_error_p95_ms", "delay_error_ms"),
+    ("worst_frame_gap_ms", "frame_gap_ms"),
 )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,11 +12,15 @@ import pytest
 from study_app.devices.scripted import ScriptedDevice
 from study_app.haptics.clock import VirtualClock
 from study_app.haptics.servo import Servo
+from study_app.protocol.schedule import build_schedule
 from study_app.session.events import Begin, Continue, EndAsked, ForceStopped, PauseAsked, ResumeAsked
 from study_app.session.pages import PausePage, TroublePage
 from study_app.session.ports import Ports
 from study_app.session.runner import BUTTON_STOP, Runner
 from study_app.session.state import Phase
+from study_app.store.journal import SessionClock
+from study_app.store.session import begin
+from study_app.store.tables import trials
 from tests.session import small
 from tests.session.fakes import FakeJournal
 
@@ -115,3 +120,63 @@ def test_a_task_is_followed_on_the_device_and_drawn_from_its_history(bench: Benc
     assert row["tick_rate_hz"] == pytest.approx(1000)
     assert row["force_mean_n"] > 0.1
     assert row["limiter_stop"] == 0
+
+
+class Judged:
+    """A whole practice trial on the real servo, kept in a real session: what its row says of it."""
+
+    def __init__(self, folder: Path, *, late_ns: int = 0, stall_s: float = 0.0) -> None:
+        study = small.protocol()
+        device, clock = ScriptedDevice(), VirtualClock()
+        with device, Servo(device, clock=clock, elements=100) as servo:
+            session_clock = SessionClock(servo.now_ns)
+            store = begin(
+                folder,
+                study,
+                b"small",
+                "P001",
+                seed=1,
+                operator="",
+                language="en",
+                device=device.describe(),
+                screens={},
+                simulated=True,
+                clock=session_clock,
+            )
+            with store:
+                ports = Ports(servo, store, lambda _page: None, session_clock.seconds)
+                runner = Runner(study, build_schedule(study, "P001", 1), store.key.codes, ports, "en")
+                runner.post(Begin(0.0))
+                runner.post(Continue(0.0))
+                for frame in range(200):
+                    if frame == 60:
+                        clock._memory[0].now_ns += late_ns  # the system gave the servo no time
+                    if frame == 90:
+                        servo.advance(round(stall_s * 1000))  # the window draws nothing meanwhile
+                    servo.advance(16)
+                    view = runner.view(servo.now_ns())
+                    if view is not None:
+                        runner.frame_shown(servo.now_ns() + 3_000_000, view.sample_time_ns)
+                    runner.poll()
+            self.row = next(row for row in trials(store.lines) if row["outcome"] == "complete")
+
+
+def test_a_trial_without_incidents_is_valid(tmp_path: Path) -> None:
+    row = Judged(tmp_path / "study").row
+    assert row["valid"] is True
+    assert row["worst_frame_gap_ms"] == pytest.approx(16)
+    assert row["delay_error_mean_ms"] == pytest.approx(3, abs=1)
+
+
+def test_a_late_servo_makes_its_trial_invalid(tmp_path: Path) -> None:
+    row = Judged(tmp_path / "study", late_ns=30_000_000).row
+    assert row["worst_gap_ms"] == pytest.approx(31, abs=1)
+    assert row["valid"] is False
+
+
+def test_a_window_that_stood_still_makes_its_trial_invalid(tmp_path: Path) -> None:
+    row = Judged(tmp_path / "study", stall_s=0.4).row
+    assert row["worst_frame_gap_ms"] == pytest.approx(416, abs=1)
+    assert row["worst_gap_ms"] == pytest.approx(1)
+    assert row["delay_error_p95_ms"] < 25  # frames that never came have no age
+    assert row["valid"] is False

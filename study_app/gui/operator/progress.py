@@ -124,6 +124,7 @@ def _trial_ended(progress: SessionProgress, at_s: float, fields: Mapping[str, An
             ("lateness_p99_ms", limits.lateness_ms),
             ("worst_gap_ms", limits.worst_gap_ms),
             ("delay_error_p95_ms", limits.delay_error_ms),
+            ("worst_frame_gap_ms", limits.frame_gap_ms),
         )
     )
     return replace(progress, trials_done={**progress.trials_done, fields["trial"]: within})
