@@ -24,13 +24,13 @@ def window(kind: type[W]) -> W | None:
 class Person(QObject):
     """Goes through a session with keys and clicks; before every look calls ``watch``, which may act in its place."""
 
-    def __init__(self, watch: Callable[[ParticipantWindow, OperatorWindow], object]) -> None:
+    def __init__(self, watch: Callable[[ParticipantWindow, OperatorWindow], object], *, every_ms: int = 20) -> None:
         super().__init__()
         self._watch = watch
         self._answered: Any = None
         self._timer = QTimer(self)
         self._timer.timeout.connect(self.look)
-        self._timer.start(20)
+        self._timer.start(every_ms)
 
     def look(self) -> None:
         participant, operator = window(ParticipantWindow), window(OperatorWindow)

@@ -1,0 +1,135 @@
+"""How long an answer takes to become the next page: kept on the disk, then composed, shown and painted.
+
+Run it by itself: ``python tests/benchmarks/answer.py [PROTOCOL] [ANSWERS] [FOLDER]``. Each answer is a page of
+statements that is confirmed: from the key that confirms it to the end of the first painting of what follows, in a
+window of 1366 × 768 without a screen, with a journal whose lines are flushed to the disk of FOLDER (default: the
+system's temporary one). A plain write and flush on the same disk is timed beside it: most of the time waits for that.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+import time
+from contextlib import suppress
+from pathlib import Path
+
+os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+
+import numpy as np
+from PySide6.QtWidgets import QApplication
+
+from study_app.errors import SessionError
+from study_app.gui.participant import ParticipantWindow
+from study_app.protocol.load import load, parse, source_bytes
+from study_app.protocol.schedule import build_schedule
+from study_app.protocol.words import words
+from study_app.session.events import Begin, Chosen, Continue, Event, Submitted
+from study_app.session.pages import Page
+from study_app.session.ports import Ports
+from study_app.session.runner import Runner
+from study_app.session.state import Phase
+from study_app.store.journal import SessionClock
+from study_app.store.session import begin
+from tests.session.fakes import FakeServo
+
+
+def main(name: str = "rek2024", answers: int = 100, folder: str = "") -> None:
+    """Answer through sessions until there are enough, and print the table."""
+    application = QApplication.instance() or QApplication([])
+    pages_ms: list[float] = []
+    choices_ms: list[float] = []
+    with tempfile.TemporaryDirectory(dir=folder or None) as scratch:
+        number = 0
+        while len(pages_ms) < answers:
+            number += 1
+            session(application, name, Path(scratch) / "results", f"P{number:03d}", pages_ms, choices_ms)
+        flush_ms = flushes(Path(scratch) / "probe")
+    print(f"{load(name).study.name}: {len(pages_ms)} pages answered in {number} sessions, offscreen")
+    print("                                   p50 ms    p99 ms    max ms")
+    for what, took in (
+        ("page confirmed → next page painted", pages_ms),
+        ("choice → on the disk", choices_ms),
+        ("4 kB written and flushed, bare", flush_ms),
+    ):
+        p50, p99 = np.percentile(took, (50, 99))
+        print(f"{what:<34} {p50:7.2f} {p99:9.2f} {max(took):9.2f}")
+
+
+def session(
+    application: object, name: str, results: Path, participant: str, pages_ms: list[float], choices_ms: list[float]
+) -> None:
+    """Go through a session with a servo that is all memory; time what follows each answer."""
+    source = source_bytes(name)
+    study = parse(source, name)
+    servo = FakeServo([])
+    clock = SessionClock(servo.now_ns)
+    store = begin(
+        results,
+        study,
+        source,
+        participant,
+        seed=1,
+        operator="",
+        language=study.study.languages[0],
+        device={"name": "memory"},
+        screens={},
+        simulated=True,
+        clock=clock,
+    )
+    window = ParticipantWindow(words(study.study.languages[0]), clock=clock.seconds, windowed=True)
+    window.open_on()
+
+    def present(page: Page) -> None:
+        window.show_page(page)
+
+    ports = Ports(servo, store, present, clock.seconds)
+    runner = Runner(study, build_schedule(study, participant, 1), store.key.codes, ports, study.study.languages[0])
+
+    def hear(event: Event) -> None:
+        with suppress(SessionError):  # a page says what it shows when it is seen, which may be too late here
+            runner.post(event)
+
+    window.event.connect(hear)
+    runner.post(Begin(clock.seconds()))
+    places = [target for task in study.tasks.values() for target in getattr(task, "targets_m", ())] or [(0.0, 0.0, 0.0)]
+    turn = 0
+    while not runner.finished:
+        state = runner.state
+        if state.phase is Phase.READING:
+            runner.post(Continue(clock.seconds()))
+        elif state.phase is Phase.ANSWERING:
+            for item in state.trial.items:
+                began = time.perf_counter()
+                runner.post(Chosen(clock.seconds(), item, 4))
+                choices_ms.append((time.perf_counter() - began) * 1e3)
+            began = time.perf_counter()
+            runner.post(Submitted(clock.seconds()))
+            window.widget.repaint()
+            pages_ms.append((time.perf_counter() - began) * 1e3)
+        else:
+            servo.run(1.0, places[turn % len(places)])
+            runner.post(Continue(clock.seconds()))
+            runner.poll()
+            turn += 1
+        QApplication.processEvents()
+    window.may_close = True
+    window.close()
+    store.close()
+
+
+def flushes(path: Path) -> list[float]:
+    """Return how long writing and flushing 4 kB takes, a hundred times [ms]."""
+    took: list[float] = []
+    with path.open("wb", buffering=0) as file:
+        for _ in range(100):
+            began = time.perf_counter()
+            file.write(b"x" * 4096)
+            os.fsync(file.fileno())
+            took.append((time.perf_counter() - began) * 1e3)
+    return took
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:2], *map(int, sys.argv[2:3]), *sys.argv[3:4])
