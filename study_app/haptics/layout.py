@@ -37,7 +37,7 @@ LIMITER_NORM = 1 << 3
 LIMITER_SLEW = 1 << 4
 LIMITER_FADE = 1 << 5
 LIMITER_STALE = 1 << 6
-LIMITER_GLITCH = 1 << 7
+LIMITER_GLITCH = 1 << 7  # the position was refused: nobody may believe it
 LIMITER_STOP = 1 << 8
 
 LIMITER_NAMES = ("slope", "non_finite", "energy", "norm", "slew", "fade", "stale", "glitch", "stop")
@@ -47,6 +47,9 @@ STATUS_OK = 0
 STATUS_STALE_FAULT = 1
 STATUS_DEVICE_LOST = 2
 STATUS_NON_FINITE = 3
+
+# The device button that stops the force, heard by the servo itself, as a bit of Sample.buttons: button 4.
+BUTTON_STOP = 1 << 3
 
 SAMPLE = np.dtype(
     [

@@ -12,7 +12,7 @@ import numpy as np
 
 from study_app.haptics.cfunctions import NOW, READ, READ_LOST, READ_NEW, SLEEP, WRITE, call_at, fence
 from study_app.haptics.compiled import kernel
-from study_app.haptics.layout import STATUS_DEVICE_LOST, STATUS_OK
+from study_app.haptics.layout import BUTTON_STOP, STATUS_DEVICE_LOST, STATUS_OK
 from study_app.haptics.safety import begin_scene
 from study_app.haptics.tick import tick
 
@@ -22,7 +22,7 @@ CONTROL = np.dtype(
     [
         # written by the host
         ("run", np.int64),  # 1 while the loop may go on
-        ("stop", np.int64),  # 1 for no force
+        ("stop", np.int64),  # 1 for no force; the loop sets it too, when the device's stop button is down
         ("request", np.int64),  # counts the scenes handed over; the newest is in slot request % 2
         ("serial", np.int64, (2,)),  # what telemetry calls the scene of each slot; 0 is rest
         ("period_ns", np.int64),
@@ -87,6 +87,8 @@ def run(control: Any, slots: Any, safety: Any, reading: Any, output: Any, device
         sample.time_ns = began_ns
         sample.lateness_ns = began_ns - host.deadline_ns
         _sense(sample, reading, device)
+        if sample.buttons & BUTTON_STOP:
+            host.stop = 1
         _take_scene(host, safety[0], sample)
         if sample.status == STATUS_OK:
             safety[0].stop = host.stop

@@ -146,8 +146,11 @@ class Servo:
         return self._loop.clock.now_ns()
 
     def describe(self) -> dict[str, Any]:
-        """Return what a receipt should record: the rate, and the priority that the system granted to the thread."""
-        return {"rate_hz": self.rate_hz, "priority": self._loop.priority, "elements": self.elements}
+        """Return what a receipt should record: the rate, and the priority that the system granted to the thread.
+
+        Nothing that follows from the liquids: they are blinded.
+        """
+        return {"rate_hz": self.rate_hz, "priority": self._loop.priority}
 
     def __enter__(self) -> Self:
         if self._loop.clock.runs:

@@ -157,9 +157,8 @@ class _Machine:
 
     @property
     def described(self) -> dict[str, Any]:
-        """What the receipt may say: the size of the servo's wake would name a parameter of a liquid."""
-        told = {name: value for name, value in self.servo.describe().items() if name != "elements"}
-        return self.device.describe() | told
+        """What the receipt says of device and servo."""
+        return self.device.describe() | self.servo.describe()
 
     def __enter__(self) -> Self:
         self.device.open()

@@ -18,6 +18,7 @@ PROBE = np.dtype(
         ("bad_at_read", np.int64),
         ("stall_at_read", np.int64),
         ("stall_ns", np.int64),
+        ("buttons", np.int64),
         ("clock", np.intp),
         ("forces_n", np.float64, (WRITES, 3)),
     ],
@@ -43,6 +44,7 @@ def _read(context, now_ns, reading):
     out = _reading_at(reading)
     for axis in range(3):
         out.position_m[axis] = probe.velocity_mps[axis] * now_ns * 1e-9
+    out.buttons = probe.buttons
     if probe.reads == probe.bad_at_read:
         out.position_m[1] = np.nan
     return READ_NEW

@@ -21,6 +21,7 @@ from study_app.devices.scripted import ScriptedDevice
 from study_app.errors import DeviceLost, ServoFault, StudyError
 from study_app.haptics.clock import VirtualClock
 from study_app.haptics.layout import (
+    BUTTON_STOP,
     LIMITER_FADE,
     LIMITER_STOP,
     STATUS_DEVICE_LOST,
@@ -260,6 +261,17 @@ def test_a_force_stop_is_zero_on_the_next_tick(servo, probe):
     servo.advance(1)
     assert is_zero(probe.forces_n[-1])
     assert servo.telemetry.latest().limiters & LIMITER_STOP
+    servo.advance(1000)
+    assert is_zero(probe.forces_n[-1000:])
+
+
+def test_the_stop_button_of_the_device_is_heard_by_the_servo_itself(servo, probe):
+    felt(servo)
+    probe.state.buttons = BUTTON_STOP
+    servo.advance(1)
+    assert is_zero(probe.forces_n[-1])
+    assert not servo.force_is_on
+    probe.state.buttons = 0
     servo.advance(1000)
     assert is_zero(probe.forces_n[-1000:])
 
