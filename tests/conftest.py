@@ -4,7 +4,12 @@ import logging
 import os
 from collections.abc import Iterator
 
+import hypothesis
 import pytest
+
+# An example may compile on a fresh machine: how long one takes is no failure.
+hypothesis.settings.register_profile("unhurried", deadline=None)
+hypothesis.settings.load_profile("unhurried")
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
