@@ -27,7 +27,7 @@ M = TypeVar("M", bound=BaseModel)
 class SceneTable(SceneDefaults):
     """The scene of a file that holds no study: rate and force limit stand here, there is no device table."""
 
-    rate_hz: float = Field(default=1000, ge=50, le=20_000, description="Nominal rate of ticks [Hz].")
+    rate_hz: float = Field(default=1000, ge=50, le=5000, description="Nominal rate of ticks [Hz].")
     force_limit_n: float = Field(default=8, gt=0, le=8, description="Largest force on the hand [N].")
 
 
