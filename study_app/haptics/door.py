@@ -30,8 +30,11 @@ def admit(parameters: Record, state: Record, safety: Record, sample: Record) -> 
     Δt is the time since the last accepted sample, so that the next one covers any gap; the first takes the nominal
     period. A position that is not finite, or that a hand of 10 m/s could not have reached within Δt, is refused; after
     five refusals in a row estimator and wakes have lost the body, and the next finite position is a new beginning.
+    A position that the device only repeats after it was refused is marked as refused too.
     """
     if sample.fresh == 0:
+        if state.rejected > 0:
+            sample.limiters |= LIMITER_GLITCH
         return 0.0
     interval_s: float = parameters.period_s
     if state.tracking:

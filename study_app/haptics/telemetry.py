@@ -15,7 +15,7 @@ import numpy as np
 
 from study_app.haptics.cfunctions import fence
 from study_app.haptics.compiled import kernel
-from study_app.haptics.layout import SAMPLE, records
+from study_app.haptics.layout import LIMITER_GLITCH, SAMPLE, records
 
 HISTORY = 32_768  # samples kept: 32 s at 1 kHz, 6 MB
 
@@ -49,8 +49,8 @@ class Telemetry:
         """Return where the handle was at a moment [m, (3,), hand frame], and the moment this is true of [ns].
 
         Between two samples the position is interpolated and the moment is ``time_ns`` itself; before the oldest and
-        after the newest it is that sample's place and time, never an extrapolation. Samples without a finite position
-        are passed over. Before the first sample: the origin, at 0.
+        after the newest it is that sample's place and time, never an extrapolation. Samples whose position is not
+        finite or was refused at the door are passed over. Before the first sample: the origin, at 0.
         """
         position = np.zeros(3)
         moment = _position_at(self.ring, self.written, time_ns, position)
@@ -149,10 +149,10 @@ def _position_at(ring: Any, written: Any, time_ns: int, position: Any) -> Any:
         else:
             high = middle
     before = low
-    while before >= oldest and not _finite(ring[before % size].position_m):
+    while before >= oldest and not _believed(ring[before % size]):
         before -= 1
     after = high
-    while after < end and not _finite(ring[after % size].position_m):
+    while after < end and not _believed(ring[after % size]):
         after += 1
     if before < oldest and after >= end:
         return 0
@@ -175,5 +175,8 @@ def _place(sample: Any, position: Any) -> Any:
 
 
 @kernel
-def _finite(position: Any) -> bool:
+def _believed(sample: Any) -> bool:
+    if sample.limiters & LIMITER_GLITCH != 0:
+        return False
+    position = sample.position_m
     return math.isfinite(position[0]) and math.isfinite(position[1]) and math.isfinite(position[2])

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study_app.errors import SessionError, StoreError, StudyError
+from study_app.haptics.layout import BUTTON_STOP, LIMITER_GLITCH
 from study_app.protocol.model import Protocol as Study
 from study_app.protocol.schedule import Schedule
 from study_app.session import compose
@@ -44,7 +45,6 @@ from study_app.session.statistics import TrialStatistics
 from study_app.session.tasks import TaskView, Tracker, track
 
 BUTTON_CONTINUE = 1 << 0
-BUTTON_STOP = 1 << 3
 RETRY_S = 1.0  # a disk that took nothing is tried again so often
 
 
@@ -330,7 +330,7 @@ class Runner:
         if running is None or running.tracker.done:
             return
         mine = samples[samples["scene"] == running.serial]
-        reached = running.tracker.feed(mine)
+        reached = running.tracker.feed(mine[mine["limiters"] & LIMITER_GLITCH == 0])
         end_ns = running.tracker.end_ns
         running.statistics.feed(mine if end_ns is None else mine[mine["time_ns"] <= end_ns])
         self._carry_out_all(

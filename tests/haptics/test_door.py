@@ -66,6 +66,15 @@ def test_an_impossible_position_is_not_used_and_counted(bad):
     assert after.velocity_mps[0] == pytest.approx(1.0, rel=0.02)
 
 
+def test_a_refused_position_that_the_device_repeats_is_refused_again():
+    hand = Hand(WATER)
+    hand.sweep(0.1, 50)
+    assert hand.turn((1.0, 1.0, 1.0)).limiters & LIMITER_GLITCH
+    assert hand.turn(None).limiters & LIMITER_GLITCH
+    assert hand.turn((0.0053, 0, 0)).limiters & LIMITER_GLITCH == 0
+    assert hand.turn(None).limiters & LIMITER_GLITCH == 0
+
+
 def test_ten_metres_a_second_of_hand_is_the_border_whatever_the_scale():
     for scale in (0.5, 10.0):
         hand = Hand(scene(scale=scale))

@@ -11,7 +11,7 @@ if numba.config.DISABLE_JIT:
 
 from study_app.haptics.cfunctions import fence
 from study_app.haptics.compiled import kernel
-from study_app.haptics.layout import SAMPLE, records
+from study_app.haptics.layout import LIMITER_GLITCH, SAMPLE, records
 from study_app.haptics.telemetry import Telemetry, timing
 
 MS = 1_000_000
@@ -163,6 +163,17 @@ def test_positions_that_are_no_numbers_are_passed_over():
     only = Telemetry(8)
     push(only, 1, position=(np.inf, 0, 0))
     assert only.position_at(0)[1] == 0
+
+
+def test_positions_that_were_refused_are_passed_over():
+    telemetry = Telemetry(16)
+    push(telemetry, 6)
+    telemetry.ring[3].position_m = (1.0, 1.0, 1.0)
+    telemetry.ring[3].limiters = LIMITER_GLITCH
+    assert telemetry.position_at(3 * MS)[0] == pytest.approx([3e-3, 0, -6e-3])
+    telemetry.ring[5].limiters = LIMITER_GLITCH
+    position, moment = telemetry.position_at(6 * MS)
+    assert (position[0], moment) == (4e-3, 4 * MS)
 
 
 # timing

@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from study_app.errors import ServoFault, SessionError, StoreError
+from study_app.haptics.layout import LIMITER_GLITCH
 from study_app.session.events import (
     Begin,
     Chosen,
@@ -159,6 +160,22 @@ def test_every_target_that_is_reached_is_kept_at_once() -> None:
     assert [(line["trial"], line["target"], line["t_task_s"]) for line in reached] == [
         (world.state.trial.number, 0, pytest.approx(0.25))
     ]
+
+
+def test_a_sample_that_was_refused_at_the_door_changes_nothing_but_its_own_count() -> None:
+    worlds = at_block("seeing"), at_block("seeing")
+    for world, position_m, limiters in zip(worlds, (LEFT, (1.0, 1.0, 1.0)), (0, LIMITER_GLITCH), strict=True):
+        world.servo.run(0.1, LEFT)
+        world.servo.run(0.001, position_m, limiters=limiters)
+        world.run(0.199, LEFT)
+        world.run(0.5, RIGHT)
+    spared, glitched = worlds
+    assert [line["t_task_s"] for line in glitched.journal.of("target_reached")] == [
+        line["t_task_s"] for line in spared.journal.of("target_reached")
+    ]
+    spared_row, row = (world.journal.of("trial_ended")[-1] for world in worlds)
+    assert row["path_length_m"] == pytest.approx(0.04)
+    assert row == spared_row | {"limiter_glitch": 1}
 
 
 def test_what_is_drawn_is_as_old_as_the_trial_asks() -> None:
