@@ -16,11 +16,12 @@ from study_app.errors import StoreError
 _TEMPORARY = re.compile(r"\.[^.].*\.[0-9a-f]{8}\.tmp")  # not those of hidden files: markers come and go
 
 
-def write_file(path: Path, content: bytes) -> None:
+def write_file(path: Path, content: bytes, *, waits: bool = True) -> None:
     """Put ``content`` at ``path``, replacing what was there in one step.
 
     Written beside, flushed to the disk, renamed over the old file, and the folder's entry flushed. On any failure the
-    old file is untouched and nothing is left beside it.
+    old file is untouched and nothing is left beside it. Without ``waits`` nothing is flushed: for files that can be
+    made again, since a power cut may then take them.
 
     Raises
     ------
@@ -29,9 +30,10 @@ def write_file(path: Path, content: bytes) -> None:
     """
     half = beside(path)
     try:
-        _write_through(half, content)
+        _write_through(half, content, waits=waits)
         half.replace(path)
-        sync_folder(path.parent)
+        if waits:
+            sync_folder(path.parent)
     except OSError as error:
         raise cannot_write(path, error) from error
     finally:
@@ -205,7 +207,8 @@ def _ends_whole(file: BinaryIO, size: int) -> bool:
     return file.read(1) == b"\n"
 
 
-def _write_through(path: Path, content: bytes) -> None:
+def _write_through(path: Path, content: bytes, *, waits: bool = True) -> None:
     with path.open("xb", buffering=0) as file:
         write_whole(file, content)
-        os.fsync(file.fileno())
+        if waits:
+            os.fsync(file.fileno())

@@ -91,15 +91,16 @@ class SessionStore:
     def write_tables(self) -> None:
         """Bring the session's tables up to date with its journal.
 
-        A table that cannot be replaced now (open in another program, no space) stops no session: nothing is lost, since
-        tables are made from the journal. ``behind`` says why, and the next call tries again. What became of recordings
-        since the last call is journalled first.
+        While the session runs nobody waits until the disk has them, for the participant waits for the next page; at its
+        end they are flushed. A table that cannot be replaced now (open in another program, no space) stops no session:
+        nothing is lost, since tables are made from the journal. ``behind`` says why, and the next call tries again. What
+        became of recordings since the last call is journalled first.
         """
         try:
             self._keep_recordings()
             for path, content in table_files(self.place, self._lines):
                 if self._written.get(path) != content:
-                    write_file(path, content)
+                    write_file(path, content, waits=self._journal.closed)
                     self._written[path] = content
         except StoreError as error:
             self.behind = error
@@ -121,6 +122,7 @@ class SessionStore:
             self.append("session_ended", status=status, reason=reason)
             self._journal.close()
             self._receipt |= {"status": status, "reason": reason, "ended_at": self._lines[-1]["at"]}
+            self._written.clear()
         self.write_tables()
         failures = [] if self.behind is None else [self.behind]
         for write in (self._write_receipt, self._write_participants, self._write_checksums):

@@ -527,3 +527,25 @@ def test_an_end_that_was_half_written_is_finished_by_another_call(
     store.finish("completed")
     assert [line["event"] for line in store.lines].count("session_ended") == 1
     assert store.folder.checksums.exists()
+
+
+def test_while_it_runs_only_the_journal_is_waited_for_and_at_its_end_every_table(
+    start: Callable[..., SessionStore], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store = start()
+    flushed: list[Path] = []
+    fsync = os.fsync
+
+    def watch(descriptor: int) -> None:
+        flushed.append(Path(f"/proc/self/fd/{descriptor}").readlink())
+        fsync(descriptor)
+
+    if not Path("/proc/self/fd").exists():
+        pytest.skip("the system does not name open files")
+    monkeypatch.setattr(os, "fsync", watch)
+    store.append("note", kind="note", text="a note")
+    store.write_tables()
+    assert flushed == [store.folder.journal]
+    store.finish("withdrawn")
+    for name in ("responses", "trials"):
+        assert any(store.folder.table(store.place.study, name).name in path.name for path in flushed)
