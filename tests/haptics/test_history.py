@@ -79,7 +79,7 @@ def test_a_sudden_start_is_felt_long_after(fluid, factors):
 @settings(max_examples=examples(30), deadline=None)
 @given(
     legs=st.lists(st.floats(-2, 2), min_size=1, max_size=8),
-    pace=st.sampled_from([[1.0], [1.0, 0.7, 1.4, 0.25, 3.0], [0.21], [5.0]]),
+    pace=st.sampled_from([[1.0], [1.0, 0.7, 1.4, 0.9, 3.0], [5.0], [0.21]]),
 )
 def test_within_the_window_and_far_beyond_it_is_the_integral(legs, pace):
     ticks = 40 * len(legs) if COMPILED else 12 * len(legs)
@@ -89,7 +89,9 @@ def test_within_the_window_and_far_beyond_it_is_the_integral(legs, pace):
     felt = simulate(tank(**HONEY, history={"window_s": 0.02}), motion).fy_n
     exact = [basset(HONEY, motion.t_s[: k + 1], speed[: k + 1], motion.t_s[k]) for k in range(1, ticks)]
     assert felt[0] == 0.0
-    assert abs(felt[1:] - exact).max() <= 0.02 * max(abs(np.array(exact)).max(), 1e-12)
+    # Ticks that come five times too fast outgrow the rows of the window: the exponentials count from a fifth of it.
+    worst = 0.02 if pace == [0.21] else 0.002
+    assert abs(felt[1:] - exact).max() <= worst * max(abs(np.array(exact)).max(), 1e-12)
 
 
 def test_even_motion_has_no_history():

@@ -63,6 +63,16 @@ def test_within_one_cell_the_first_ticks_are_the_definition():
     assert vectors(simulate(felt, motion), "wake") == pytest.approx(literal(felt, motion), rel=1e-3)
 
 
+@pytest.mark.parametrize("exponent", [0.5, 1.0, 2.0])
+def test_what_fades_counts_less_in_the_response_too(exponent):
+    felt = tank(decay=0.95, exponent=exponent)
+    motion, (moved, _, again) = legs(((1.0, 0, 0), 0.02), ((0.0, 0, 0), 0.03), ((0.2, 0, 0), 0.02))
+    exact = literal(felt, motion)
+    assert vectors(simulate(felt, motion), "wake")[moved:again] == pytest.approx(
+        exact[moved:again], rel=0.01, abs=1e-12
+    )
+
+
 def test_who_leaves_fast_after_a_stop_feels_nothing_and_who_returns_does():
     there, back = ((0.0, 0.0, 2.0), 0.3), ((0.0, 0.0, -2.0), 0.3)
     motion, (_, stopped, left, _, returned, _) = legs(
