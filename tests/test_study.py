@@ -18,12 +18,14 @@ import pytest
 from study_app.analysis.export import export
 from study_app.analysis.figures import plot
 from study_app.errors import StoreError
+from study_app.evaluation.replay import replay
 from study_app.protocol.load import load, shipped
 from study_app.protocol.schedule import build_schedule, stream
 from study_app.session.rehearsal import rehearse
 from study_app.store import journal
 from study_app.store.blinding import open_or_draw_key
 from study_app.store.layout import SessionFolder, StudyFolder
+from study_app.store.verify import verify
 
 CLOCK_COLUMNS = {"answered_at", "trial_started_at", "session_started_at", "session_ended_at"}
 
@@ -88,6 +90,20 @@ def test_sessions_are_complete_and_their_trials_valid(rehearsed: tuple[str, Stud
             ("0", "0", "0")
         }
         assert all(abs(float(row["delay_error_mean_ms"])) < 10 and int(row["frames"]) > 100 for row in trials)
+
+
+def test_a_rehearsed_study_is_sound_and_every_force_of_it_comes_out_again(rehearsed: tuple[str, StudyFolder]) -> None:
+    _, folder = rehearsed
+    assert verify(folder.path).sound
+    assert verify(folder.path).warnings == ()
+    for session in folder.sessions():
+        found = replay(session.path)
+        assert (found.differences, found.uncompared) == ((), ())
+        assert found.recordings == len(journal_events(session, "trial_started"))
+
+
+def journal_events(session: SessionFolder, name: str) -> list[dict[str, Any]]:
+    return [line for line in journal.read(session.journal) if line["event"] == name]
 
 
 def test_the_receipt_says_how_it_ended_and_what_ran_it(rehearsed: tuple[str, StudyFolder]) -> None:
