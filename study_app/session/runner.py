@@ -47,6 +47,11 @@ from study_app.session.tasks import TaskView, Tracker, track
 BUTTON_CONTINUE = 1 << 0
 RETRY_S = 1.0  # a disk that took nothing is tried again so often
 
+# Everything is drawn this much later than the trial asks. Then the moment to draw lies between two samples at every
+# delay, none included, and is met exactly; else the newest sample, up to a tick old, would stand in where there is no
+# delay, and the error of the delay would tell such trials from all others. Two ticks at 1 kHz.
+SETTLED_S = 0.002
+
 
 @dataclass(frozen=True, slots=True)
 class TankView:
@@ -63,7 +68,7 @@ class _Running:
 
     trial: int
     serial: int
-    delay_ns: int
+    drawn_after_ns: int
     linger_ns: int
     tracker: Tracker
     statistics: TrialStatistics
@@ -185,11 +190,14 @@ class Runner:
             self._end_when_seen(running, running.tracker.end_ns)
 
     def view(self, now_ns: int) -> TankView | None:
-        """Return what is to be drawn at ``now_ns`` (servo's clock), as late as the trial asks; None without a trial."""
+        """Return what is to be drawn at ``now_ns`` (servo's clock), as late as the trial asks and ``SETTLED_S`` more.
+
+        None without a trial.
+        """
         running = self._running
         if running is None:
             return None
-        position_m, shown_ns = self._ports.servo.telemetry.position_at(now_ns - running.delay_ns)
+        position_m, shown_ns = self._ports.servo.telemetry.position_at(now_ns - running.drawn_after_ns)
         return TankView(position_m, running.tracker.at(shown_ns), shown_ns)
 
     def frame_shown(self, painted_ns: int, sample_ns: int) -> None:
@@ -307,8 +315,8 @@ class Runner:
         self._running = _Running(
             trial=command.trial,
             serial=serial,
-            delay_ns=round(command.delay_s * 1e9),
-            linger_ns=round(command.linger_s * 1e9),
+            drawn_after_ns=round((command.delay_s + SETTLED_S) * 1e9),
+            linger_ns=round((command.linger_s + SETTLED_S) * 1e9),
             tracker=track(command.task),
             statistics=statistics,
             dropped_before=self._reader.dropped,

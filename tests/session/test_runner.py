@@ -23,7 +23,7 @@ from study_app.session.events import (
 )
 from study_app.session.moves import END_SHOWN_S
 from study_app.session.pages import EndPage, PausePage, QuestionnairePage, TaskPage, TroublePage
-from study_app.session.runner import BUTTON_CONTINUE, BUTTON_STOP, RETRY_S
+from study_app.session.runner import BUTTON_CONTINUE, BUTTON_STOP, RETRY_S, SETTLED_S
 from study_app.session.state import Phase
 from tests.session.fakes import World
 
@@ -136,7 +136,7 @@ def test_an_exploration_goes_on_until_its_longest_time_and_not_by_the_space_bar_
     practising.run(0.5)
     assert practising.state.phase is Phase.TASK
     practising.runner.post(Continue(1.4))
-    practising.run(END_SHOWN_S)
+    practising.run(END_SHOWN_S + SETTLED_S)
     assert practising.log[:3] == ["rest", "trial_ended", "trial_started"]
     (ended,) = practising.journal.of("trial_ended")
     assert ended["outcome"] == "complete"
@@ -184,11 +184,11 @@ def test_what_is_drawn_is_as_old_as_the_trial_asks() -> None:
     world.run(0.1, LEFT)
     now = world.servo.now_ns()
     late = world.runner.view(now)
-    assert late.sample_time_ns == now - 137_000_000
+    assert late.sample_time_ns == now - 139_000_000
     assert tuple(late.position_m) == AWAY
     assert late.task.dwell == 0.0
     assert world.runner.task.dwell == pytest.approx(0.099 / 0.25)
-    world.run(0.137, LEFT)
+    world.run(0.139, LEFT)
     seen = world.runner.view(world.servo.now_ns())
     assert tuple(seen.position_m) == LEFT
     assert seen.task.dwell == pytest.approx(0.099 / 0.25)
@@ -208,7 +208,7 @@ def test_a_task_is_left_when_its_end_was_drawn_as_late_as_it_may_be_in_its_block
     world.run(0.3, LEFT)
     world.run(0.251, RIGHT)
     assert world.runner.task.reached == 2
-    world.run(0.136 + END_SHOWN_S, RIGHT)
+    world.run(0.136 + SETTLED_S + END_SHOWN_S, RIGHT)
     assert world.state.phase is Phase.TASK
     world.run(0.001, RIGHT)
     assert world.state.phase is Phase.ANSWERING
@@ -221,8 +221,8 @@ def test_the_end_of_a_delayed_task_is_drawn_before_it_is_left() -> None:
     world.run(0.251, RIGHT)
     end_ns = world.servo.now_ns()
     assert world.runner.view(end_ns).task.reached == 1
-    world.run(0.136, RIGHT)
-    assert world.runner.view(end_ns + 137_000_000).task.reached == 2
+    world.run(0.138, RIGHT)
+    assert world.runner.view(end_ns + 139_000_000).task.reached == 2
 
 
 def test_the_row_of_a_trial_holds_the_error_of_the_delay_and_never_the_delay() -> None:
@@ -235,8 +235,8 @@ def test_the_row_of_a_trial_holds_the_error_of_the_delay_and_never_the_delay() -
     world.run(0.5, RIGHT)
     row = world.journal.of("trial_ended")[-1]
     assert (row["frames"], row["frames_late"]) == (4, 1)  # the study allows 25 ms
-    assert row["delay_error_mean_ms"] == pytest.approx(13.75)
-    assert row["delay_error_max_ms"] == pytest.approx(40)
+    assert row["delay_error_mean_ms"] == pytest.approx(13.75 + 1000 * SETTLED_S)
+    assert row["delay_error_max_ms"] == pytest.approx(40 + 1000 * SETTLED_S)
     assert 137 not in [round(value) for value in row.values() if isinstance(value, float)]
 
 
@@ -535,7 +535,7 @@ def test_every_turn_of_a_trial_is_recorded_and_those_shortly_before_it() -> None
         world.run(0.4)
     world.run(0.05)
     first, second = recorded(tape)
-    assert first == list(range(5000 - 600 + 1, 5000 + 3200 + 1))  # until it was left, 100 ms after its end
+    assert first == list(range(5000 - 600 + 1, 5000 + 3200 + 1))  # until it was left, after its end was shown
     assert second == list(range(8200 - 600 + 1, 8250 + 1))
     assert [told for told in tape.told if isinstance(told, tuple)] == [
         ("start", 1, 1, 1000.0),

@@ -12,11 +12,12 @@ import pytest
 from study_app.devices.scripted import ScriptedDevice
 from study_app.haptics.clock import VirtualClock
 from study_app.haptics.servo import Servo
-from study_app.protocol.schedule import build_schedule
+from study_app.protocol.model import Protocol
+from study_app.protocol.schedule import build_schedule, draw_key, stream
 from study_app.session.events import Begin, Continue, EndAsked, ForceStopped, PauseAsked, ResumeAsked
 from study_app.session.pages import PausePage, TroublePage
 from study_app.session.ports import Ports
-from study_app.session.runner import BUTTON_STOP, Runner
+from study_app.session.runner import BUTTON_STOP, SETTLED_S, Runner
 from study_app.session.state import Phase
 from study_app.store.journal import SessionClock
 from study_app.store.session import begin
@@ -112,7 +113,7 @@ def test_a_task_is_followed_on_the_device_and_drawn_from_its_history(bench: Benc
     now_ns = bench.servo.now_ns()
     view = bench.runner.view(now_ns)
     assert view is not None
-    assert 0 <= now_ns - view.sample_time_ns <= 1_000_000
+    assert now_ns - view.sample_time_ns == round(SETTLED_S * 1e9)
     bench.run(2800)
     assert bench.runner.state.trial.number == 2
     (row,) = bench.journal.of("trial_ended")
@@ -165,7 +166,38 @@ def test_a_trial_without_incidents_is_valid(tmp_path: Path) -> None:
     row = Judged(tmp_path / "study").row
     assert row["valid"] is True
     assert row["worst_frame_gap_ms"] == pytest.approx(16)
-    assert row["delay_error_mean_ms"] == pytest.approx(3, abs=1)
+    assert row["delay_error_mean_ms"] == pytest.approx(3 + 1000 * SETTLED_S)
+
+
+def delay_error_ms(delay_ms: float) -> float:
+    """Return the mean error of the delay in a trial whose samples come irregularly, and frames at any time between."""
+    blocks = small.TABLES["blocks"] | {"practice": small.TABLES["blocks"]["practice"] | {"conditions": ["on_time"]}}
+    conditions = small.TABLES["conditions"] | {"on_time": {"liquid": "thin", "delay_ms": delay_ms}}
+    study = Protocol.model_validate(small.TABLES | {"blocks": blocks, "conditions": conditions})
+    clock, draw, journal = VirtualClock(), np.random.default_rng(1), FakeJournal([])
+    device = ScriptedDevice()
+    with device, Servo(device, clock=clock, elements=100) as servo:
+        ports = Ports(servo, journal, lambda _page: None, lambda: servo.now_ns() / 1e9)
+        key = draw_key(study, stream(1, "key").random)
+        runner = Runner(study, build_schedule(study, "P001", 1), key, ports, "en")
+        runner.post(Begin(0.0))
+        runner.post(Continue(0.0))
+        servo.advance(200)  # as much history as any delay asks for
+        while not journal.of("trial_ended"):
+            for _ in range(16):
+                clock._memory[0].now_ns += int(draw.integers(600_000))  # the system is late
+                servo.advance(1)
+            view = runner.view(servo.now_ns() + int(draw.integers(400_000)))
+            if view is not None:
+                runner.frame_shown(servo.now_ns() + 3_000_000, view.sample_time_ns)
+            runner.poll()
+    (row,) = journal.of("trial_ended")
+    assert row["frames"] > 100
+    return float(row["delay_error_mean_ms"])
+
+
+def test_the_error_of_the_delay_does_not_tell_whether_there_is_one() -> None:
+    assert delay_error_ms(0) == pytest.approx(delay_error_ms(50), abs=0.05)
 
 
 def test_a_late_servo_makes_its_trial_invalid(tmp_path: Path) -> None:
