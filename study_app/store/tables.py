@@ -58,7 +58,7 @@ def trials(lines: Sequence[Line]) -> list[Row]:
             case "trial_ended":
                 row = _row_of(rows, line)
                 row |= {name: line.get(name) for name in _MEASURED}
-                row |= {"outcome": line["outcome"], "valid": _verdict(row, limits)}
+                row |= {"outcome": line["outcome"], "valid": within_limits(row, limits)}
             case "session_ended" | "session_resumed":
                 _interrupt(rows)
             case "recorded":
@@ -92,6 +92,19 @@ def participant(lines: Sequence[Line]) -> Row:
         "responses": len(answered),
         "validity": None if not verdicts else "valid" if all(verdicts) else "invalid",
     }
+
+
+def within_limits(measured: Mapping[str, Any], limits: Mapping[str, float]) -> bool | None:
+    """Return whether a trial's measured columns keep the protocol's limits, by size; None where nothing was measured.
+
+    ``limits`` are those of the journal's first line, or ``Limits`` of a protocol as a mapping.
+    """
+    judged = [
+        abs(measured[measure]) <= limits[limit]
+        for measure, limit in _JUDGED
+        if measured.get(measure) is not None and limit in limits
+    ]
+    return all(judged) if judged else None
 
 
 def latest(rows: Iterable[Row]) -> list[Row]:
@@ -173,11 +186,3 @@ def _note(row: Row, text: str, *, mark: bool = False) -> None:
     row["marked"] = row["marked"] or mark
     if text:
         row["notes"] = text if row["notes"] is None else f"{row['notes']}\n{text}"
-
-
-def _verdict(row: Row, limits: Mapping[str, float]) -> bool | None:
-    """Return whether what was measured keeps the limits; None where nothing was measured."""
-    judged = [
-        abs(row[measure]) <= limits[limit] for measure, limit in _JUDGED if row[measure] is not None and limit in limits
-    ]
-    return all(judged) if judged else None

@@ -11,6 +11,7 @@ from typing import Any
 
 from study_app.protocol.model import Protocol
 from study_app.protocol.schedule import PageStep, Schedule, Trial
+from study_app.store.tables import within_limits
 
 # A block of more trials than this is one row of the rail ("Delay settings 1 to 7"), so that a day's study fits it.
 ROWS_PER_BLOCK = 4
@@ -30,8 +31,8 @@ class SessionProgress:
     """What the journal of a session of ``protocol`` says so far.
 
     ``step`` indexes the schedule's steps (−1 before the first); ``durations_s`` holds the steps left behind;
-    ``answers`` counts the answered items of each trial, ``trials_done`` says of each trial whether it kept the
-    protocol's limits.
+    ``answers`` counts the answered items of each trial, ``trials_done`` says of each trial whether nothing
+    measured in it broke the protocol's limits.
     """
 
     protocol: Protocol
@@ -117,17 +118,8 @@ def _trial_ended(progress: SessionProgress, at_s: float, fields: Mapping[str, An
     progress = replace(progress, trial_lasted_s=lasted)
     if fields["outcome"] not in {"complete", "timeout"}:
         return progress
-    limits = progress.protocol.limits
-    within = all(
-        fields.get(name) is None or fields[name] <= limit
-        for name, limit in (
-            ("lateness_p99_ms", limits.lateness_ms),
-            ("worst_gap_ms", limits.worst_gap_ms),
-            ("delay_error_p95_ms", limits.delay_error_ms),
-            ("worst_frame_gap_ms", limits.frame_gap_ms),
-        )
-    )
-    return replace(progress, trials_done={**progress.trials_done, fields["trial"]: within})
+    within = within_limits(fields, progress.protocol.limits.model_dump())
+    return replace(progress, trials_done={**progress.trials_done, fields["trial"]: within is not False})
 
 
 def _responses(progress: SessionProgress, _at_s: float, fields: Mapping[str, Any]) -> SessionProgress:

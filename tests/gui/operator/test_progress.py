@@ -5,6 +5,7 @@ from __future__ import annotations
 from study_app.gui.operator.progress import SessionProgress, progress_after, stages
 from study_app.protocol.load import load
 from study_app.protocol.schedule import build_schedule
+from study_app.store.tables import within_limits
 
 
 def test_pages_and_trials_move_the_step_and_keep_their_durations(told):
@@ -48,6 +49,17 @@ def test_a_trial_beyond_a_limit_is_done_but_not_within_limits(told):
     told.end(2, lateness_p99_ms=limit * 1.1)
     assert told.progress.trials_done == {1: True, 2: False}
     assert told.progress.trials_within_limits == 1
+
+
+def test_a_picture_that_came_too_early_is_judged_as_in_the_trials_table(told):
+    told.welcome()
+    told.start(1)
+    told.end(1, delay_error_p95_ms=-40.0)
+    assert within_limits({"delay_error_p95_ms": -40.0}, told.protocol.limits.model_dump()) is False
+    assert told.progress.trials_done == {1: False}
+    told.start(2)
+    told.end(2)
+    assert told.progress.trials_done == {1: False, 2: True}
 
 
 def test_a_repeat_takes_back_the_trials_answers(told):
