@@ -13,7 +13,7 @@ from study_app.protocol.load import protocol_hash
 from study_app.protocol.model import Protocol
 from study_app.protocol.schedule import stream
 from study_app.store import receipt
-from study_app.store.atomic import cannot_write, sync_folder
+from study_app.store.atomic import cannot_write, is_there, sync_folder
 from study_app.store.blinding import Key, open_or_draw_key
 from study_app.store.description import check_study, write_description
 from study_app.store.journal import Journal, SessionClock
@@ -127,9 +127,13 @@ def surroundings(device: Mapping[str, Any], screens: Mapping[str, Any], clock: S
 
 
 def _make_folder(path: Path) -> None:
-    """Create the study's folder, which several programs may share."""
+    """Create the study's folder, which several programs may share, and let no power cut take it or one above it."""
+    path = path.absolute()
+    missing = [level for level in (path, *path.parents) if not is_there(level)]
     try:
         path.mkdir(parents=True, exist_ok=True)
+        for level in missing:
+            sync_folder(level.parent)
     except OSError as error:
         raise cannot_write(path, error) from error
 

@@ -20,6 +20,7 @@ from study_app import __version__
 from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
 from study_app.store import journal, receipt
+from study_app.store.atomic import sync_folder
 from study_app.store.checksums import read_checksums
 from study_app.store.opening import is_open
 from study_app.store.recording import read_facts
@@ -57,6 +58,26 @@ def test_everything_is_there_before_the_first_trial(tmp_path: Path, start: Calla
         "data/sub-P007/ses-01/subject-P007_session-01_task-brackish_description-trials_data.csv",
     }
     store.close()
+
+
+def test_the_entry_of_every_folder_that_is_created_is_flushed(
+    tmp_path: Path, start: Callable[..., SessionStore], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    flushed: list[Path] = []
+
+    def sync(path: Path) -> None:
+        flushed.append(path)
+        sync_folder(path)
+
+    monkeypatch.setattr("study_app.store.session.sync_folder", sync)
+    results = tmp_path / "results" / "study"
+    start(results=results).close()
+    created = [results.parent, results, results / "data", results / "data/sub-P007", results / "data/sub-P007/ses-01"]
+    assert [folder for folder in created if folder.parent not in flushed] == []
+    flushed.clear()
+    start("P008", results=results).close()
+    assert tmp_path not in flushed
+    assert results.parent not in flushed
 
 
 def test_the_first_line_says_what_is_run(start: Callable[..., SessionStore]) -> None:
