@@ -63,7 +63,6 @@ def _task_page(state: SessionState) -> TaskPage:
         trial=trial.number,
         instruction=_text(state, task.instruction),
         task=task,
-        delay_s=protocol.delay_s(state.plan.condition(trial)),
         workspace_m=protocol.device.workspace_m,
         body_radius_m=protocol.scene.body.diameter_m / 2 / protocol.scene.scale,
         progress=_progress(state),

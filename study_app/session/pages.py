@@ -5,7 +5,7 @@ Texts are already in the participant's language. Lengths are metres in the hand 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 from study_app.protocol.model import Explore, Reach
@@ -36,7 +36,7 @@ class TextPage:
 
 @dataclass(frozen=True, slots=True)
 class TaskPage:
-    """The tank: move the ball; what is drawn is ``delay_s`` old. Never print or log ``delay_s``: it is blinded.
+    """The tank: move the ball. Nothing of the condition is here: how late the tank is drawn is the runner's to know.
 
     ``workspace_m`` holds the full sizes of the tank along x, y, z, centred on the device's middle.
     """
@@ -44,7 +44,6 @@ class TaskPage:
     trial: int
     instruction: str
     task: Explore | Reach
-    delay_s: float = field(repr=False)
     workspace_m: tuple[float, float, float]
     body_radius_m: float
     progress: Progress | None

@@ -42,7 +42,6 @@ def page() -> TaskPage:
         trial=6,
         instruction=instruction,
         task=task,
-        delay_s=0.0,
         workspace_m=(0.1, 0.06, 0.06),
         body_radius_m=0.0034,
         progress=Progress(2, 2, "Delay setting 3", 3, 7),

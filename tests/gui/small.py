@@ -79,7 +79,6 @@ def task_page(task: Explore | Reach | None = None, **changed: Any) -> TaskPage:
         "trial": 3,
         "instruction": task.instruction,
         "task": task,
-        "delay_s": 0.137,
         "workspace_m": (0.1, 0.06, 0.06),
         "body_radius_m": 0.0034,
         "progress": Progress(2, 2, "Delay setting 3", 3, 7),

@@ -230,18 +230,6 @@ def test_painted_comes_once_a_view_with_the_moment_of_painting(tank: TankWidget,
     assert before <= told[0][0] <= time.monotonic_ns()
 
 
-def test_delay_changes_no_pixel_and_is_said_nowhere(qtbot: Any) -> None:
-    pictures = []
-    for delay_s in (0.0, 0.137):
-        widget = TankWidget(task_page(delay_s=delay_s), words("en"))
-        qtbot.addWidget(widget)
-        widget.resize(960, 640)
-        widget.show_view(view((0.01, 0, 0)))
-        pictures.append(shown(widget))
-        assert "137" not in widget.accessibleName() + widget.windowTitle() + widget.toolTip()
-    assert (pictures[0] == pictures[1]).all()
-
-
 def test_exploration_may_be_left_after_its_least_time(qtbot: Any) -> None:
     widget = TankWidget(task_page(explore()), words("en"))
     qtbot.addWidget(widget)

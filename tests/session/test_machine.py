@@ -180,16 +180,18 @@ def test_the_scene_of_a_trial_is_the_one_behind_its_code() -> None:
     assert start.condition == state.plan.key["feeling"][state.trial.code]
 
 
-def test_the_page_of_a_delayed_trial_asks_for_that_delay() -> None:
-    state, pages = small.opened(), []
+def test_a_delayed_trial_starts_with_its_delay_and_its_page_says_nothing_of_it() -> None:
+    state, delays, pages = small.opened(), {}, []
     while state.phase not in FINAL:
         state, commands = advance(state, small.next_event(state, 1.0))
-        if isinstance(shown(commands), TaskPage):
-            pages.append((state.trial, shown(commands)))
-    delays = {trial.code: page.delay_s for trial, page in pages if trial.block == "seeing"}
+        if isinstance(shown(commands), TaskPage) and state.trial.block == "seeing":
+            (start,) = [command for command in commands if isinstance(command, StartTrial)]
+            delays[state.trial.code] = start.delay_s
+            pages.append(replace(shown(commands), trial=0, progress=None))
     key = small.opened().plan.key["seeing"]
     late = small.ODD_DELAY_MS / 1000
     assert delays == {code: late if condition == "is_late" else 0.0 for code, condition in key.items()}
+    assert pages == pages[:1] * 2
 
 
 def test_progress_names_part_setting_and_place_by_neutral_words() -> None:

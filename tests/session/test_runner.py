@@ -50,10 +50,9 @@ def at_block(block: str, *, delayed: bool = False, seed: int = 1) -> World:
     world.runner.post(Begin(0.0))
     for _ in range(200):
         state = world.state
-        if state.phase is Phase.TASK and state.trial.block == block:
-            page = world.pages[-1]
-            if not delayed or page.delay_s > 0:
-                return world
+        there = state.phase is Phase.TASK and state.trial.block == block
+        if there and (not delayed or state.plan.protocol.delay_s(state.plan.condition(state.trial)) > 0):
+            return world
         step(world)
     raise AssertionError(block)
 
