@@ -41,7 +41,7 @@ def main(name: str = "rek2024", seconds: float = 600.0) -> None:
         application = app.QApplication.instance() or app.QApplication(["load"])
         person = Person(watch, every_ms=16)
         app.run(name, participant="P001", device="scripted", windowed=True, seed=1, results=results, tell=print)
-        person.deleteLater()
+        person.leave()
         (session,) = StudyFolder(results).sessions()
         (table,) = session.path.glob("*description-trials_data.csv")
         with table.open(newline="", encoding="utf-8") as file:

@@ -110,7 +110,7 @@ def test_nothing_seen_written_or_logged_tells_a_condition(
         results=results,
         tell=told.append,
     )
-    person.deleteLater()
+    person.leave()
     assert code == 0
     assert tasks == {1, 2, 3, 4}
     words = telltales(protocol)

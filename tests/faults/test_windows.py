@@ -47,7 +47,7 @@ def hold(folder: Path, watch: Any) -> tuple[int | str, list[dict[str, Any]]]:
         )
     except StudyError as error:
         code = str(error)
-    person.deleteLater()
+    person.leave()
     (session,) = StudyFolder(results).sessions()
     assert verify(results).errors == ()
     return code, journal.read(session.journal)

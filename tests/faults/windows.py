@@ -32,6 +32,11 @@ class Person(QObject):
         self._timer.timeout.connect(self.look)
         self._timer.start(every_ms)
 
+    def leave(self) -> None:
+        """Look no more."""
+        self._timer.stop()
+        self.deleteLater()
+
     def look(self) -> None:
         participant, operator = window(ParticipantWindow), window(OperatorWindow)
         if participant is None or operator is None or participant.page is None:
