@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QEvent, QRect, QSize, Qt, QTimer, Signal
+from PySide6.QtCore import QEvent, QRect, QSize, Qt, Signal
 from PySide6.QtGui import QCloseEvent, QColor, QKeyEvent, QPainter, QPaintEvent, QPixmap, QResizeEvent, QScreen
 from PySide6.QtWidgets import QWidget
 
+from study_app.gui.escape import EscapeHold
 from study_app.gui.pages.base import PageWidget
 from study_app.gui.pages.questionnaire import QuestionnaireWidget
 from study_app.gui.pages.text import NoticeWidget, PauseWidget, ReadingPage, TextWidget
@@ -30,7 +31,6 @@ if TYPE_CHECKING:
     from study_app.protocol.words import Words
     from study_app.session.runner import TankView
 
-HOLD_MS = 600
 LEAST_SIZE = QSize(1024, 640)
 WINDOWED_SIZE = QSize(1366, 768)
 PILOT_FRAME = 10
@@ -81,10 +81,10 @@ class ParticipantWindow(QWidget):
         self._capture = PointerCapture(self)
         self._capture.moved.connect(self.pointer)
         self._capture.pressed.connect(self.buttons)
-        self._hold = QTimer(self)
-        self._hold.setSingleShot(True)
-        self._hold.setInterval(HOLD_MS)
-        self._hold.timeout.connect(self._stop_force)
+        self._escape = EscapeHold(self)
+        self._escape.held.connect(self._stop_force)
+        self._escape.tapped.connect(self._pause)
+        self.installEventFilter(self._escape)
         self.setWindowTitle(f"{words.window_title} – pilot" if pilot else words.window_title)
         self.setObjectName("participant")
         self.setFont(font("body"))
@@ -125,7 +125,6 @@ class ParticipantWindow(QWidget):
     def show_page(self, page: Page) -> None:
         """Put a page in place of the present one, whole and at once."""
         self._capture.release()
-        self._hold.stop()
         old = self._widget
         made = self._make(page, old)
         made.setGeometry(self._room())
@@ -147,33 +146,21 @@ class ParticipantWindow(QWidget):
             self.tank.show_view(view)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802
-        """Hear Esc, and in the tank Space and Enter."""
+        """Hear Space and Enter in the tank."""
         if event.isAutoRepeat():
             return
         key = event.key()
-        if key == Qt.Key.Key_Escape:
-            self._hold.start()
-        elif key in (Qt.Key.Key_Space, Qt.Key.Key_Return, Qt.Key.Key_Enter) and self._may_leave_tank():
+        if key in (Qt.Key.Key_Space, Qt.Key.Key_Return, Qt.Key.Key_Enter) and self._may_leave_tank():
             self.event.emit(Continue(self._clock()))
         else:
             super().keyPressEvent(event)
 
-    def keyReleaseEvent(self, event: QKeyEvent) -> None:  # noqa: N802
-        """Take a short Esc as a pause."""
-        if event.key() == Qt.Key.Key_Escape and not event.isAutoRepeat() and self._hold.isActive():
-            self._hold.stop()
-            self._pause()
-        else:
-            super().keyReleaseEvent(event)
-
     def changeEvent(self, event: QEvent) -> None:  # noqa: N802
         """Let the pointer go and pause when another window is activated."""
         super().changeEvent(event)
-        if event.type() == QEvent.Type.ActivationChange and not self.isActiveWindow():
-            self._hold.stop()
-            if self._capture.held:
-                self._capture.release()
-                self._pause()
+        if event.type() == QEvent.Type.ActivationChange and not self.isActiveWindow() and self._capture.held:
+            self._capture.release()
+            self._pause()
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
         """Let the page fill the window."""

@@ -10,7 +10,7 @@ from PySide6.QtGui import QCursor, QMouseEvent, QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
 
-from study_app.gui import participant as module
+from study_app.gui.escape import HOLD_MS
 from study_app.gui.pages.questionnaire import QuestionnaireWidget
 from study_app.gui.pages.text import NoticeWidget, PauseWidget, TextWidget
 from study_app.gui.participant import LEAST_SIZE, ParticipantWindow
@@ -150,6 +150,10 @@ def test_keyboard_is_on_the_first_statement_when_the_questionnaire_comes(opened:
     assert opened.focus is widget.rows[0]
 
 
+def is_a_force_stop(event: Any) -> bool:
+    return isinstance(event, ForceStopped)
+
+
 @pytest.mark.parametrize("page", [text_page(), task_page(), questionnaire()], ids=lambda page: type(page).__name__)
 def test_short_escape_pauses(opened: Opened, page: Page) -> None:
     opened.window.show_page(page)
@@ -161,10 +165,29 @@ def test_short_escape_pauses(opened: Opened, page: Page) -> None:
 
 def test_escape_held_stops_the_force_and_does_not_pause_as_well(opened: Opened, qtbot: Any) -> None:
     opened.window.show_page(task_page())
-    with qtbot.waitSignal(opened.window.event, timeout=5 * module.HOLD_MS):
+    with qtbot.waitSignal(opened.window.event, timeout=5 * HOLD_MS):
         QTest.keyPress(opened.focus, Qt.Key.Key_Escape)
     QTest.keyRelease(opened.focus, Qt.Key.Key_Escape)
     assert opened.events == [ForceStopped(opened.events[0].at_s, "participant")]
+
+
+def test_escape_held_while_the_page_changes_stops_the_force_all_the_same(opened: Opened, qtbot: Any) -> None:
+    opened.window.show_page(task_page())
+    with qtbot.waitSignal(opened.window.event, timeout=5 * HOLD_MS, check_params_cb=is_a_force_stop):
+        QTest.keyPress(opened.focus, Qt.Key.Key_Escape)
+        opened.window.show_page(questionnaire())
+        opened.window.show_page(text_page())
+    QTest.keyRelease(opened.focus, Qt.Key.Key_Escape)
+    assert [kind for kind in opened.kinds if kind is not ItemShown] == [ForceStopped]
+
+
+def test_escape_held_while_the_window_is_left_stops_nothing(opened: Opened) -> None:
+    opened.window.show_page(task_page())
+    QTest.keyPress(opened.focus, Qt.Key.Key_Escape)
+    QApplication.sendEvent(opened.window, QEvent(QEvent.Type.WindowDeactivate))
+    QTest.keyRelease(opened.focus, Qt.Key.Key_Escape)
+    assert not opened.window._escape._timer.isActive()
+    assert opened.events == []
 
 
 def test_short_escape_on_a_pause_or_an_end_does_nothing(opened: Opened) -> None:

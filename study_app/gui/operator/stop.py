@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QEvent, QObject, QRectF, QSize, Qt, QTimer, Signal
-from PySide6.QtGui import QColor, QKeyEvent, QPainter, QPaintEvent
+from PySide6.QtCore import QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QPushButton, QSizePolicy, QStyle, QStyleOptionButton, QStylePainter
 
 from study_app.gui.cards import Card, Icon
@@ -15,7 +15,6 @@ from study_app.gui.theme import font
 from study_app.gui.themed import Themed
 
 LEAST_WIDTH, LEAST_HEIGHT = 320, 160
-HOLD_MS = 600
 
 
 class StopButton(Themed, QPushButton):
@@ -93,27 +92,3 @@ class StopPanel(Card):
     def _say(self, icon: str, ink: str, word: str) -> None:
         self.sign.show_icon(icon, ink)  # type: ignore[arg-type]  # one of three literals above
         self.word.setText(word)
-
-
-class EscapeHold(QObject):
-    """Sees Esc held for 600 ms in a window and its parts, whichever has the focus; ``held`` then."""
-
-    held = Signal()
-
-    def __init__(self, parent: QObject) -> None:
-        super().__init__(parent)
-        self._timer = QTimer(self)
-        self._timer.setSingleShot(True)
-        self._timer.setInterval(HOLD_MS)
-        self._timer.timeout.connect(self.held)
-
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: N802 - Qt's name
-        """Start at the first press, stop at the release; the keyboard's own repetition counts for neither."""
-        if isinstance(event, QKeyEvent) and event.key() == Qt.Key.Key_Escape and not event.isAutoRepeat():
-            if event.type() == QEvent.Type.KeyPress:
-                self._timer.start()
-            elif event.type() == QEvent.Type.KeyRelease:
-                self._timer.stop()
-        elif event.type() == QEvent.Type.WindowDeactivate:
-            self._timer.stop()
-        return super().eventFilter(watched, event)

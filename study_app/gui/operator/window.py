@@ -10,6 +10,7 @@ from PySide6.QtGui import QCloseEvent, QResizeEvent, QShowEvent
 from PySide6.QtWidgets import QGridLayout, QLayout, QMainWindow, QScrollArea, QVBoxLayout, QWidget
 
 from study_app.gui.dialogs import Notice
+from study_app.gui.escape import EscapeHold
 from study_app.gui.operator.actions import Actions, EndQuestion, ExcludeQuestion, RepeatQuestion
 from study_app.gui.operator.banner import Banner
 from study_app.gui.operator.header import Header
@@ -17,7 +18,7 @@ from study_app.gui.operator.health import ServoHealth
 from study_app.gui.operator.notes import DeviceCard, NotesCard
 from study_app.gui.operator.plots import HiddenForceCard, LatenessCard, PositionCard
 from study_app.gui.operator.rail import Rail
-from study_app.gui.operator.stop import EscapeHold, StopPanel
+from study_app.gui.operator.stop import StopPanel
 from study_app.gui.operator.tiles import Tiles
 from study_app.gui.operator.view import OperatorView
 from study_app.gui.theme import DARK, LIGHT, Theme

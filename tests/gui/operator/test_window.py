@@ -11,8 +11,9 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
+from study_app.gui.escape import HOLD_MS
 from study_app.gui.operator import OperatorWindow
-from study_app.gui.operator.stop import HOLD_MS, LEAST_HEIGHT, LEAST_WIDTH
+from study_app.gui.operator.stop import LEAST_HEIGHT, LEAST_WIDTH
 from study_app.gui.theme import DARK, LIGHT
 
 # The platform without a screen cannot limit or raise windows, and says so.
