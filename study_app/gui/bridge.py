@@ -138,6 +138,8 @@ class SessionBridge(QObject):
         self._hand: Hand | None = None
         self._gone = False
         self._stalled: str | None = None
+        self._faulty = False
+        self._faults = 0
         self._hook_before = sys.excepthook
         self._timers = (
             self._timer(max(4, round(1000 / refresh_hz)), self._frame, precise=True),
@@ -230,6 +232,7 @@ class SessionBridge(QObject):
     def _frame(self) -> None:
         """Look at the device, and draw the tank as late as the trial asks."""
         parts = self.parts
+        self._count_faults()
         self.runner.poll()
         self.health.take(self._reader.read())
         now_s = self._now()
@@ -270,9 +273,16 @@ class SessionBridge(QObject):
     def _show(self) -> None:
         self.operator.show_view(self.view())
 
+    def _count_faults(self) -> None:
+        """Count the servo going from well to faulty."""
+        faulty = self.parts.servo.fault is not None
+        self._faults += faulty and not self._faulty
+        self._faulty = faulty
+
     def view(self) -> OperatorView:
         """Return what the operator is to see now."""
         parts = self.parts
+        self._count_faults()
         return operator_view(
             parts.session,
             parts.journal.progress,
@@ -281,6 +291,8 @@ class SessionBridge(QObject):
             force_on=parts.servo.force_is_on,
             trouble=self.trouble or parts.servo.fault or self.runner.stalled or "",
             waits=self.runner.stalled is not None and not self.trouble,
+            device_ready=not self._faulty,
+            faults=self._faults,
             rate_hz=parts.servo.rate_hz,
         )
 

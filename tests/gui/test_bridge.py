@@ -270,6 +270,23 @@ def test_a_servo_fault_calls_the_operator(bridge, world):
     assert isinstance(bridge.participant.page, TroublePage)
     assert "stopped answering" in bridge.operator.banner.what.text()
     assert "stopped answering" not in bridge.participant.page.paragraph
+    assert bridge.operator.device.chip.word == "Fault"
+    bridge._frame()
+    assert dict(bridge.view().device.rows)["Safety faults"] == "1"
+    world.fault = None
+    bridge._frame()
+    world.fault = "the device 'mouse' stopped answering again"
+    assert dict(bridge.view().device.rows)["Safety faults"] == "2"
+
+
+def test_what_fails_in_the_program_is_no_fault_of_the_device(bridge, world, caplog):
+    begin_trial(bridge, world)
+    bridge.fail(StoreError("the sealed key is gone"))
+    view = bridge.view()
+    assert view.state == "trouble"
+    assert view.device.ready
+    assert dict(view.device.rows)["Safety faults"] == "0"
+    caplog.clear()
 
 
 def test_the_operators_buttons_become_events(bridge, world):

@@ -136,9 +136,15 @@ def operator_view(
     force_on: bool,
     trouble: str = "",
     waits: bool = False,
+    device_ready: bool = True,
+    faults: int = 0,
     rate_hz: float = 1000.0,
 ) -> OperatorView:
-    """Return what the operator sees at ``now_s`` on the session's clock; ``trouble`` is what no journal could say."""
+    """Return what the operator sees at ``now_s`` on the session's clock.
+
+    ``trouble`` is what no journal could say; ``device_ready`` and ``faults`` (how many there were since the program
+    was started) are the servo's own, whatever other trouble there is.
+    """
     trouble = progress.broke or trouble
     state = _state(progress, force_on=force_on, trouble=trouble)
     waits = waits and not progress.broke
@@ -163,8 +169,8 @@ def operator_view(
         device=DeviceView(
             session.device_name,
             session.device_kind,
-            waits or not trouble,
-            (*session.device_rows, ("Safety faults", "1" if trouble and not waits else "0")),
+            device_ready,
+            (*session.device_rows, ("Safety faults", str(faults))),
         ),
         notes=progress.notes[-NOTES_SHOWN:][::-1],
         force_on=force_on,

@@ -48,9 +48,9 @@ class Told:
         items = self.schedule.trials[number - 1].items
         self.tell("responses", 5.0, trial=number, attempt=1, items=[{"item": item} for item in items])
 
-    def view(self, health: ServoHealth | None = None, *, force_on: bool = True, trouble: str = "") -> OperatorView:
+    def view(self, health: ServoHealth | None = None, *, force_on: bool = True, **said: Any) -> OperatorView:
         vitals = (health or ServoHealth(1000.0)).vitals()
-        return operator_view(self.session, self.progress, vitals, now_s=self.now_s, force_on=force_on, trouble=trouble)
+        return operator_view(self.session, self.progress, vitals, now_s=self.now_s, force_on=force_on, **said)
 
 
 @pytest.fixture

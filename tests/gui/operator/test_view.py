@@ -100,8 +100,18 @@ def test_trouble_is_said_and_nothing_but_the_end_is_offered(told):
     view = told.view(force_on=False)
     assert view.state == "trouble"
     assert "stopped answering" in view.trouble
-    assert not view.device.ready
     assert [view.may_pause, view.may_resume, view.may_repeat] == [False, False, False]
+
+
+def test_the_device_is_what_the_servo_says_whatever_else_is_wrong(told):
+    told.welcome()
+    told.tell("broke", what="the disk is full")
+    view = told.view()
+    assert view.device.ready
+    assert dict(view.device.rows)["Safety faults"] == "0"
+    view = told.view(device_ready=False, faults=2)
+    assert not view.device.ready
+    assert dict(view.device.rows)["Safety faults"] == "2"
 
 
 def test_trouble_that_no_journal_could_keep_is_said_too(told):
