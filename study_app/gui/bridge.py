@@ -245,7 +245,7 @@ class SessionBridge(QObject):
             self._post(Continue(now_s))
 
     @_guarded
-    def _painted(self, _painted_ns: int, sample_ns: int) -> None:
+    def _painted(self, sample_ns: int) -> None:
         """Keep when a frame was painted; on the servo's clock, which is not every system's monotonic one."""
         painted_ns = self.parts.servo.now_ns()
         self.runner.frame_shown(painted_ns, sample_ns)

@@ -49,13 +49,13 @@ class ParticipantWindow(QWidget):
 
     While ``may_close`` is false, closing the window in the middle of a session is a pause.
     ``event`` carries the session's events; ``pointer`` the hand's place [m] and ``buttons`` the buttons' bits while the
-    pointer is captured; ``painted`` (time painted, time of the sample) [ns] of every view that was drawn.
+    pointer is captured; ``painted`` the time of the sample [ns] of every view, while it is drawn.
     """
 
     event = Signal(object)  # type: ignore[assignment]  # hides QWidget.event() from Python, not from Qt
     pointer = Signal(float, float, float)
     buttons = Signal(int)
-    painted = Signal(object, object)
+    painted = Signal(object)
 
     def __init__(
         self,

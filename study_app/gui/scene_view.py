@@ -6,7 +6,6 @@ delayed clock, and nothing is smoothed or eased. Nothing here knows which liquid
 
 from __future__ import annotations
 
-import time
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
@@ -46,11 +45,10 @@ ALWAYS = QRegion(0, 0, 1, 1)  # a frame in which nothing moved is a frame too
 class TankWidget(QWidget):
     """Draws a task page and, on it, the views that it is shown.
 
-    ``painted(painted_ns, sample_ns)`` comes once for every view, from inside the painting: the moment on the monotonic
-    clock, and the time of the sample that was drawn.
+    ``painted(sample_ns)`` comes once for every view, from inside the painting, with the time of what was drawn.
     """
 
-    painted = Signal(object, object)
+    painted = Signal(object)
 
     def __init__(self, page: TaskPage, words: Words, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -119,7 +117,7 @@ class TankWidget(QWidget):
         painter.end()
         if self._unpainted and self._view is not None:
             self._unpainted = False
-            self.painted.emit(time.monotonic_ns(), self._view.sample_time_ns)
+            self.painted.emit(self._view.sample_time_ns)
 
     @property
     def _task(self) -> TaskShown | None:

@@ -99,12 +99,10 @@ PARTICIPANT = Theme(
 class TankColours:
     """The tank's own colours: cold water-grey, the same for every liquid, so that nothing betrays which it is."""
 
-    water_deep: str = "#142E40"
     water_light: str = "#2F6079"
     glass: str = "#CFE6F2"
     proxy_light: str = "#FBC061"
     proxy: str = "#E8912A"
-    proxy_dark: str = "#8A4A0C"
     lit: str = "#F4FBFF"
     dim: str = "#A9C4D4"
     shadow: str = "#06131C"

@@ -87,7 +87,6 @@ class Timing:
 
     ticks: int
     rate_hz: float
-    lateness_p50_s: float
     lateness_p99_s: float
     worst_gap_s: float
     overruns: int
@@ -97,8 +96,8 @@ def timing(samples: Any, rate_hz: float) -> Timing:
     """Return the timing of ``samples`` (recarray of ``SAMPLE``, in order, gaps allowed) at the nominal ``rate_hz``."""
     ticks = int(samples.size)
     if ticks == 0:
-        return Timing(0, 0.0, 0.0, 0.0, 0.0, 0)
-    p50, p99 = np.percentile(samples.lateness_ns, (50, 99)) * 1e-9
+        return Timing(0, 0.0, 0.0, 0.0, 0)
+    p99_s = float(np.percentile(samples.lateness_ns, 99)) * 1e-9
     follows = np.diff(samples.tick) == 1
     gaps_s = np.diff(samples.time_ns)[follows] * 1e-9
     deadlines_s = np.diff(samples.time_ns - samples.lateness_ns)[follows] * 1e-9
@@ -106,8 +105,7 @@ def timing(samples: Any, rate_hz: float) -> Timing:
     return Timing(
         ticks=ticks,
         rate_hz=gaps_s.size / elapsed_s if elapsed_s > 0.0 else 0.0,
-        lateness_p50_s=float(p50),
-        lateness_p99_s=float(p99),
+        lateness_p99_s=p99_s,
         worst_gap_s=float(gaps_s.max(initial=0.0)),
         overruns=int(np.rint(deadlines_s * rate_hz - 1.0).sum()),
     )

@@ -35,7 +35,6 @@ class Words:
     continue_in: str  # {seconds}
     continue_now: str
     pause_hint: str
-    tank_name: str
 
     # questionnaire
     please_answer: str
@@ -104,7 +103,6 @@ _ENGLISH = Words(
     continue_in="You can go on in {seconds} s",
     continue_now="Press the space bar to go on",
     pause_hint="Pause · hold to switch the force off",
-    tank_name="Tank with a ball that follows your hand",
     please_answer="Please answer",
     press_keys="press 1 to 7",
     answered="{done} of {of} answered",
@@ -148,7 +146,6 @@ _DUTCH = Words(
     continue_in="U kunt verder over {seconds} s",
     continue_now="Druk op de spatiebalk om verder te gaan",
     pause_hint="Pauze · ingedrukt houden om de kracht uit te schakelen",
-    tank_name="Bak met een bal die uw hand volgt",
     please_answer="Nog te beantwoorden",
     press_keys="druk op 1 tot en met 7",
     answered="{done} van {of} beantwoord",

@@ -388,7 +388,7 @@ def test_painted_frames_are_counted_on_the_servos_clock(bridge, world):
     begin_trial(bridge, world)
     for frame in range(5):
         world.now_s = 2.0 + frame / 60
-        bridge.participant.painted.emit(12345, world.now_ns())
+        bridge.participant.painted.emit(world.now_ns())
     vitals = bridge.health.vitals()
     assert (vitals.frames, vitals.frames_late) == (4, 0)
     assert vitals.frame_rate_hz == pytest.approx(60, abs=0.1)

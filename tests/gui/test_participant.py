@@ -211,7 +211,7 @@ def test_painted_views_are_told(opened: Opened, qtbot: Any) -> None:
     opened.window.show_page(task_page())
     with qtbot.waitSignal(opened.window.painted, timeout=2000) as told:
         opened.window.show_view(view(sample_ns=123_456_789_012))
-    assert told.args[1] == 123_456_789_012
+    assert told.args == [123_456_789_012]
 
 
 def test_views_without_a_tank_are_ignored(opened: Opened) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import time
 from typing import Any
 
 import numpy as np
@@ -218,16 +217,13 @@ def test_nothing_changed_paints_nothing_but_still_counts_as_a_frame(tank: TankWi
     assert changes(before, tank._things) == QRegion()
 
 
-def test_painted_comes_once_a_view_with_the_moment_of_painting(tank: TankWidget, qtbot: Any) -> None:
-    told: list[tuple[int, int]] = []
-    tank.painted.connect(lambda painted_ns, sample_ns: told.append((painted_ns, sample_ns)))
-    before = time.monotonic_ns()
+def test_painted_comes_once_a_view_with_the_time_of_what_was_drawn(tank: TankWidget, qtbot: Any) -> None:
+    told: list[int] = []
+    tank.painted.connect(told.append)
     with qtbot.waitSignal(tank.painted, timeout=1000):
         tank.show_view(view(sample_ns=5_123_456_789_012))
     tank.repaint()  # as when the window is uncovered
-    assert len(told) == 1
-    assert told[0][1] == 5_123_456_789_012
-    assert before <= told[0][0] <= time.monotonic_ns()
+    assert told == [5_123_456_789_012]
 
 
 def test_exploration_may_be_left_after_its_least_time(qtbot: Any) -> None:
