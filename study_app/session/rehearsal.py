@@ -35,6 +35,7 @@ from study_app.session.resume import FIRST, REHEARSED_SCREENS, Start, find_proto
 from study_app.session.runner import Runner
 from study_app.session.simulated import Draw, Explorer, Reacher, Senses, choices, reading_s
 from study_app.store import journal
+from study_app.store.description import check_study
 from study_app.store.journal import SessionClock
 from study_app.store.layout import StudyFolder, check_unused, locate
 from study_app.store.open_session import SessionStore
@@ -73,13 +74,15 @@ def rehearse(
     ProtocolError
         The protocol cannot be used.
     StoreError
-        An id is used already, and then nothing was touched; or results cannot be written.
+        The folder holds another study or an id is used already, and then nothing was touched; or results cannot be
+        written.
     SessionError
         A session broke; what was kept before is safe.
     """
     source = source_bytes(protocol)
     study = parse(source, str(protocol))
     folder = Path("results") / study.study.name if results is None else Path(results)
+    check_study(StudyFolder(folder), study.study.name)
     people = [f"P{number:03d}" for number in range(1, participants + 1)]
     for person in people:
         check_unused(StudyFolder(folder), person, 1)

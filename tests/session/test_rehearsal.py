@@ -20,6 +20,8 @@ from study_app.session.runner import TankView
 from study_app.session.simulated import Reacher, Senses, choices, reading_s
 from study_app.session.strokes import RATE_HZ, exploration
 from study_app.session.tasks import TaskView
+from study_app.store.description import write_description
+from study_app.store.layout import StudyFolder
 from study_app.store.session import SessionStore
 from tests.session import small
 
@@ -165,6 +167,14 @@ def test_a_device_that_is_lost_ends_the_rehearsal_with_a_word_why(
     monkeypatch.setattr(rehearsal._Rehearsal, "_see", pull_the_cable)
     with pytest.raises(SessionError, match="stopped answering"):
         rehearsal.rehearse("demo", participants=1, seed=1, results=tmp_path / "demo")
+
+
+def test_the_folder_of_another_study_is_named_before_an_id_that_is_used_in_it(tmp_path: Path) -> None:
+    folder = StudyFolder(tmp_path / "other")
+    folder.session("P001", 1).path.mkdir(parents=True)
+    write_description(folder, small.protocol().study)
+    with pytest.raises(StoreError, match="holds the study 'small', not 'demo'"):
+        rehearsal.rehearse("demo", participants=1, seed=1, results=folder.path)
 
 
 def test_a_disk_that_fails_ends_the_rehearsal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
