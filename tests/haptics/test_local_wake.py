@@ -9,7 +9,7 @@ from study_app.haptics.motion import Motion
 from study_app.haptics.offline import simulate
 from study_app.haptics.pack import pack
 from study_app.haptics.paths import path
-from study_app.haptics.scene import LocalWake, Uniform
+from study_app.haptics.scene import Box, LocalWake, Uniform
 from tests.haptics.scenes import COMPILED, UNBENT, WATER_FACTOR, Hand, examples, liquid, moving, scene, vectors
 
 STEP_S = 1e-3
@@ -184,6 +184,16 @@ def test_the_oldest_cells_are_merged_and_nothing_of_them_is_lost():
     motion = hand.model.cells["velocity_mps"].sum(axis=0)
     assert motion[0] == pytest.approx(hand.model.cells["speed_mps"].sum())
     assert hand.model.cells["count"].sum() == 600
+
+
+def test_out_of_the_liquid_it_is_forgotten():
+    pool = tank().liquids[0].model_copy(update={"region": Box(size_m=(1, 1, 1))})
+    x_m = np.where((np.arange(120) < 50) | (np.arange(120) > 80), 0.0, 3.0)
+    motion = Motion(np.arange(120) * STEP_S, np.column_stack([x_m, 0 * x_m, 0 * x_m]), np.tile([1.0, 0, 0], (120, 1)))
+    wake = simulate(scene(pool, knee=UNBENT), motion).wake_x_mps
+    assert wake[49] == pytest.approx(0.49)
+    assert not wake[75:82].any()
+    assert wake[82] == pytest.approx(0.01)
 
 
 @pytest.mark.parametrize(("axes", "rises"), [("xz", False), ("xyz", True)])
