@@ -14,13 +14,17 @@ import click
 @click.option("--out", required=True, type=click.Path(path_type=Path), metavar="OUT", help="CSV to write.")
 @click.option("--set", "changes", multiple=True, metavar="NAME=VALUE", help="Override a parameter; may come again.")
 def simulate(scene: str, liquid: str, path: str, out: Path, changes: tuple[str, ...]) -> None:
-    """Compute the force along a motion, with the servo's own tick, without a device or a clock."""
+    """Compute the force along a motion, with the servo's own tick, without a device or a clock.
+
+    Every row of the motion is one tick: give rows at the scene's rate (1 kHz unless its rate_hz says otherwise).
+    """
     from study_app.haptics import motion, offline, paths
     from study_app.haptics.override import override_all
     from study_app.protocol.load import load_scene
 
     chosen = override_all(load_scene(scene, liquid), dict(_assignment(change) for change in changes))
-    moved = paths.path(path, rate_hz=chosen.rate_hz) if path in paths.NAMES else motion.read(Path(path))
+    programmed = path in paths.NAMES or not (Path(path).suffix or Path(path).exists())
+    moved = paths.path(path, rate_hz=chosen.rate_hz) if programmed else motion.read(Path(path))
     table = offline.simulate(chosen, moved)
     motion.write(out, table)
     click.echo(f"{out}: {len(table)} rows")

@@ -20,6 +20,8 @@ PLACES = ("t_s", "x_m", "y_m", "z_m")
 VELOCITIES = ("vx_mps", "vy_mps", "vz_mps")
 MOST_PROBLEMS = 20
 
+HEADER = "t_s,x_m,y_m,z_m, one row a tick"
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
@@ -62,8 +64,10 @@ def read(path: Path) -> Motion:
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
             lines = list(csv.reader(file, strict=True))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise StudyError(f"cannot read the motion {path}: {error}") from error
+    except OSError as error:
+        raise StudyError(f"cannot read the motion {path}: {error.strerror}; name a CSV file of {HEADER}") from error
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise StudyError(f"cannot read the motion {path}: it is no CSV text; name a CSV file of {HEADER}") from error
     while lines and not lines[-1]:
         lines.pop()
     header = tuple(lines[0]) if lines else ()

@@ -48,10 +48,15 @@ def override_all(scene: Scene, values: Mapping[str, object]) -> Scene:
         return Scene.model_validate(tree)
     except ValidationError as error:
         named = ", ".join(f"{name} = {value}" for name, value in values.items())
-        reasons = "; ".join(
-            f"{'.'.join(str(part) for part in problem['loc'])}: {problem['msg']}" for problem in error.errors()
-        )
+        reasons = "; ".join(_reason(problem["loc"], problem["msg"]) for problem in error.errors())
         raise StudyError(f"cannot set {named}: {reasons}") from error
+
+
+def _reason(place: tuple[int | str, ...], message: str) -> str:
+    """Return what is wrong with a parameter, in a scene's own words."""
+    name = ".".join(str(part) for part in place if part != "liquids" and not isinstance(part, int))
+    said = message.removeprefix("Value error, ").split(", unable to parse")[0].replace("Input should be", "must be")
+    return f"{name}: {said}" if name else said
 
 
 def _tables(tree: dict[str, Any]) -> Tables:
