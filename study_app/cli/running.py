@@ -8,6 +8,7 @@ import click
 
 from study_app.cli.words import FILE, RESULTS, SESSION
 
+SEED = click.IntRange(0, 2**31 - 1)
 WINDOWED = click.option("--windowed", is_flag=True, help="Show the participant's window in a frame, not full-screen.")
 SCREEN = click.option("--screen", type=click.IntRange(1), help="Number of the participant's screen.")
 OPERATOR = click.option("--operator", default="", metavar="INITIALS", help="Who runs the session.")
@@ -35,7 +36,7 @@ def check(protocol: str | None, *, schema: bool) -> None:
 @click.command()
 @FILE
 @click.option("--participants", type=click.IntRange(1, 9999), required=True)
-@click.option("--seed", type=click.IntRange(0), default=1, show_default=True)
+@click.option("--seed", type=SEED, default=1, show_default=True)
 def design(protocol: str, participants: int, seed: int) -> None:
     """Count positions and carry-over of the orders of N participants, before anyone is invited."""
     from study_app.protocol.design import balance, describe_balance, numbered
@@ -48,7 +49,7 @@ def design(protocol: str, participants: int, seed: int) -> None:
 @FILE
 @click.option("--participant", metavar="ID", required=True, help="Letters and digits, such as P007.")
 @click.option("--session", type=click.IntRange(1, 99), default=1, show_default=True, help="Session number.")
-@click.option("--seed", type=click.IntRange(0), help="Default: drawn, shown and recorded.")
+@click.option("--seed", type=SEED, help="Default: drawn, shown and recorded.")
 @click.option("--device", default="mouse", show_default=True, metavar="NAME", help="mouse or scripted.")
 @click.option("--language", metavar="LANG", help="Default: the protocol's first.")
 @OPERATOR
@@ -96,7 +97,7 @@ def run(
 @click.command()
 @FILE
 @click.option("--participants", type=click.IntRange(1, 999), default=1, show_default=True)
-@click.option("--seed", type=click.IntRange(0), default=1, show_default=True)
+@click.option("--seed", type=SEED, default=1, show_default=True)
 @click.option("--no-recordings", is_flag=True, help="Keep answers and trial rows only, not every sample and frame.")
 @RESULTS
 def rehearse(protocol: str, participants: int, seed: int, *, no_recordings: bool, results: Path | None) -> None:
