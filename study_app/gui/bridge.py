@@ -309,7 +309,7 @@ class SessionBridge(QObject):
 
     @_guarded
     def _resume(self) -> None:
-        self._post(ResumeAsked(self._now()))
+        self._post(ResumeAsked(self._now(), "operator"))
 
     @_guarded
     def _pause(self) -> None:

@@ -54,9 +54,12 @@ class Words:
     # pause and force stop
     pause_title: str
     pause_body: str
+    pause_held_body: str
     resume: str
     force_off_title: str
     force_off_body: str
+    force_held_title: str
+    force_held_body: str
     force_on: str
 
     # trouble
@@ -118,9 +121,12 @@ _ENGLISH = Words(
     small_numbers=("One", "Two", "Three", "Four", "Five", "Six", "Seven", "Eight", "Nine", "Ten"),
     pause_title="Pause",
     pause_body="Take your time. Everything you have answered is kept. A trial that was under way starts again.",
+    pause_held_body="Please wait; the operator will go on. Everything you have answered is kept.",
     resume="Continue",
     force_off_title="The force is off",
     force_off_body="The device no longer pushes. When you are ready, the force comes back gently.",
+    force_held_title="The operator has switched the force off.",
+    force_held_body="Please wait; the operator will bring it back.",
     force_on="Bring the force back and continue",
     trouble_title="One moment, please",
     trouble_body="The force is off and your answers are kept. The operator will help; there is nothing you have to do.",
@@ -161,9 +167,12 @@ _DUTCH = Words(
     small_numbers=("Eén", "Twee", "Drie", "Vier", "Vijf", "Zes", "Zeven", "Acht", "Negen", "Tien"),
     pause_title="Pauze",
     pause_body="Neem de tijd. Alles wat u hebt geantwoord blijft bewaard. Een onderbroken onderdeel begint opnieuw.",
+    pause_held_body="Wacht even; de onderzoeker gaat zo verder. Alles wat u hebt geantwoord blijft bewaard.",
     resume="Verder",
     force_off_title="De kracht is uit",
     force_off_body="Het apparaat duwt niet meer. Als u klaar bent, komt de kracht geleidelijk terug.",
+    force_held_title="De onderzoeker heeft de kracht uitgeschakeld.",
+    force_held_body="Wacht even; de onderzoeker schakelt de kracht weer in.",
     force_on="Kracht weer inschakelen en verdergaan",
     trouble_title="Een ogenblik geduld",
     trouble_body="De kracht is uit en uw antwoorden zijn bewaard. De onderzoeker helpt; u hoeft niets te doen.",

@@ -25,7 +25,7 @@ def page(state: SessionState) -> Page:
         case Phase.ANSWERING:
             return _questionnaire_page(state)
         case Phase.PAUSED:
-            return PausePage(force_off=state.force_off)
+            return PausePage(force_off=state.force_off, held=state.held)
         case Phase.TROUBLE:
             return TroublePage(_words(state).trouble_title, _words(state).trouble_body)
         case Phase.COMPLETE:

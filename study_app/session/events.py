@@ -66,9 +66,10 @@ class PauseAsked:
 
 @dataclass(frozen=True, slots=True)
 class ResumeAsked:
-    """Go on from the pause; a trial that was under way starts again."""
+    """Go on from the pause; a trial under way starts again. What the operator stopped is the operator's to resume."""
 
     at_s: float
+    by: Literal["participant", "operator"]
 
 
 @dataclass(frozen=True, slots=True)

@@ -57,7 +57,7 @@ TRANSITIONS: dict[tuple[Phase, type[Event]], Move] = {
     (Phase.READING, PauseAsked): moves.pause,  # → paused
     (Phase.TASK, PauseAsked): moves.pause,  # → paused; the attempt is over
     (Phase.ANSWERING, PauseAsked): moves.pause,  # → paused
-    (Phase.PAUSED, PauseAsked): moves.stay,  # two hands were quick
+    (Phase.PAUSED, PauseAsked): moves.pause_again,  # stays
     (Phase.PAUSED, ResumeAsked): moves.resume,  # → reading, answering; task as the next attempt
     # The force: off at once, wherever we are.
     (Phase.READING, ForceStopped): moves.stop_force,  # → paused

@@ -35,7 +35,7 @@ from study_app.session.events import (
     Submitted,
     TaskDone,
 )
-from study_app.session.state import Answer, Phase, SessionState
+from study_app.session.state import Answer, Hold, Phase, SessionState
 
 END_SHOWN_S = 0.1  # a closed ring is seen for so long before the next page
 
@@ -96,21 +96,28 @@ def submit(state: SessionState, _event: Submitted) -> Result:
 
 def pause(state: SessionState, event: PauseAsked) -> Result:
     """Show the pause; a task under way is over as an attempt."""
-    paused = replace(state, phase=Phase.PAUSED, interrupted=state.phase)
+    held: Hold | None = "pause" if event.by == "operator" else None
+    paused = replace(state, phase=Phase.PAUSED, interrupted=state.phase, held=held)
     return paused, (*_break_off(state), Write("paused", {"by": event.by}), WriteTables(), _show(paused))
 
 
-def stay(state: SessionState, _event: PauseAsked) -> Result:
-    """Do nothing."""
-    return state, ()
+def pause_again(state: SessionState, event: PauseAsked) -> Result:
+    """Let the operator take over the participant's pause; else do nothing."""
+    if event.by != "operator" or state.held is not None:
+        return state, ()
+    paused = replace(state, held="pause")
+    return paused, (Write("paused", {"by": event.by}), WriteTables(), _show(paused))
 
 
 def resume(state: SessionState, event: ResumeAsked) -> Result:
-    """Go back to what was interrupted, with the force if it was off."""
-    back: Commands = (Write("resumed", {}),)
+    """Go back to what was interrupted, with the force if it was off; the operator's stop is the operator's to end."""
+    if state.held is not None and event.by != "operator":
+        what = "switched the force off" if state.held == "force" else "paused the session"
+        raise SessionError(f"the operator {what}: the operator resumes it, not the {event.by}")
+    back: Commands = (Write("resumed", {"by": event.by}),)
     if state.force_off:
-        back = (*back, Write("force_restored", {}), FadeIn())
-    state = replace(state, phase=state.interrupted or Phase.READING, interrupted=None, force_off=False)
+        back = (*back, Write("force_restored", {"by": event.by}), FadeIn())
+    state = replace(state, phase=state.interrupted or Phase.READING, interrupted=None, force_off=False, held=None)
     if state.phase is Phase.TASK:
         return _start_trial(replace(state, attempt=state.attempt + 1), back)
     return state, (*back, _show(state))
@@ -119,10 +126,11 @@ def resume(state: SessionState, event: ResumeAsked) -> Result:
 def stop_force(state: SessionState, event: ForceStopped) -> Result:
     """Switch the force off and pause."""
     stopped = Write("force_stopped", {"by": event.by})
+    held: Hold | None = "force" if event.by == "operator" else state.held
     if state.phase is Phase.PAUSED:
-        paused = replace(state, force_off=True)
+        paused = replace(state, force_off=True, held=held)
         return paused, (StopForce(), stopped, _show(paused))
-    paused = replace(state, phase=Phase.PAUSED, interrupted=state.phase, force_off=True)
+    paused = replace(state, phase=Phase.PAUSED, interrupted=state.phase, force_off=True, held=held)
     pausing = (Write("paused", {"by": event.by}), WriteTables(), _show(paused))
     return paused, (StopForce(), *_break_off(state), stopped, *pausing)
 

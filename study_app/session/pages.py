@@ -78,9 +78,13 @@ class QuestionnairePage:
 
 @dataclass(frozen=True, slots=True)
 class PausePage:
-    """The session waits; ``force_off`` says that the force was stopped and fades in only when asked for."""
+    """The session waits; ``force_off`` says that the force was stopped and fades in only when asked for.
+
+    ``held`` says what the operator stopped: then the operator alone resumes, and there is nothing to press.
+    """
 
     force_off: bool
+    held: Literal["pause", "force"] | None = None
 
 
 @dataclass(frozen=True, slots=True)

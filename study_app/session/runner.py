@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -117,6 +117,7 @@ class Runner:
         self._waiting: deque[Event] = deque()
         self._busy = False
         self._stall: _Stall | None = None
+        self._stopped_by: Literal["operator", "program"] = "program"  # who stops the force of a session that stalls
         self._listeners: list[Callable[[SessionState], None]] = []
 
     @property
@@ -281,7 +282,8 @@ class Runner:
             return False
         self._waiting = deque(waiting)  # what a page said that is covered again at once is said again later
         if self._state.phase in {Phase.READING, Phase.TASK, Phase.ANSWERING, Phase.PAUSED}:
-            self._waiting.appendleft(ForceStopped(self._ports.clock(), "program"))
+            self._waiting.appendleft(ForceStopped(self._ports.clock(), self._stopped_by))
+        self._stopped_by = "program"
         if self._waiting and not busy:
             self.post(self._waiting.popleft())
         elif not busy:
@@ -291,6 +293,8 @@ class Runner:
     def _take_while_stalled(self, event: Event, stall: _Stall) -> bool:
         """Return whether the event can be taken after all: an end is, if need be without being written."""
         if isinstance(event, ForceStopped):
+            if event.by == "operator":
+                self._stopped_by = "operator"
             return False
         if not isinstance(event, EndAsked):
             raise SessionError(f"{stall.reason}; until then the session waits")

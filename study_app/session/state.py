@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
+from typing import Literal, TypeAlias
 
 from study_app.errors import SessionError
 from study_app.protocol.model import Protocol, Questionnaire
@@ -24,6 +25,8 @@ class Phase(Enum):
     COMPLETE = "complete"
     ENDED = "ended"
 
+
+Hold: TypeAlias = Literal["pause", "force"]
 
 FINAL = frozenset({Phase.COMPLETE, Phase.ENDED})
 
@@ -73,7 +76,7 @@ class SessionState:
     ``index`` counts the schedule's steps (−1 before the first, their number after the last), ``attempt`` the
     presentations of the present trial from 1. ``answers`` holds the statements of the present questionnaire that were
     shown or answered. ``interrupted`` is the phase that a pause goes back to. ``force_off`` says that the force was
-    stopped and has not been faded in again.
+    stopped and has not been faded in again, ``held`` what the operator stopped, so that the operator alone resumes.
     """
 
     plan: Plan = field(repr=False)
@@ -83,6 +86,7 @@ class SessionState:
     answers: Mapping[str, Answer] = field(default_factory=dict)
     interrupted: Phase | None = None
     force_off: bool = False
+    held: Hold | None = None
 
     @property
     def step(self) -> Step | None:

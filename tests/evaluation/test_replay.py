@@ -73,11 +73,11 @@ def troubled(folder: Path) -> Path:
             wait(900)
             runner.post(ForceStopped(clock.seconds(), "operator"))
             wait(300)
-            runner.post(ResumeAsked(clock.seconds()))
+            runner.post(ResumeAsked(clock.seconds(), "operator"))
             wait(800)
             runner.post(PauseAsked(clock.seconds(), "operator"))
             wait(2000)
-            runner.post(ResumeAsked(clock.seconds()))
+            runner.post(ResumeAsked(clock.seconds(), "operator"))
             wait(1500)
             runner.post(EndAsked(clock.seconds(), "aborted", ""))
             place: Path = store.folder.path

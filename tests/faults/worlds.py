@@ -61,7 +61,7 @@ class StoredWorld(World):
                     self.runner.post(Chosen(self.clock(), item, 5))
                 self.runner.post(Submitted(self.clock()))
             case Phase.PAUSED:
-                self.runner.post(ResumeAsked(self.clock()))
+                self.runner.post(ResumeAsked(self.clock(), "operator"))
             case _:
                 self.run(0.3, LEFT)
                 self.run(0.3, RIGHT)

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from PySide6.QtCore import QEvent, Qt
+from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 from shiboken6 import isValid
 
@@ -22,7 +23,7 @@ from study_app.haptics.layout import SAMPLE, records
 from study_app.protocol.load import load
 from study_app.protocol.schedule import build_schedule, draw_key, stream
 from study_app.protocol.words import words
-from study_app.session.events import Continue, ForceStopped, Submitted
+from study_app.session.events import Continue, ForceStopped, ResumeAsked, Submitted
 from study_app.session.pages import EndPage, PausePage, TaskPage, TextPage, TroublePage
 
 # The platform without a screen cannot limit or raise windows, and says so.
@@ -204,6 +205,20 @@ def test_the_participants_stop_reaches_the_servo_at_once(bridge, world):
     bridge.participant.event.emit(ForceStopped(world.now_s, "participant"))
     assert not world.force_is_on
     assert ("force_stopped", {"by": "participant"}) in world.done
+
+
+def test_the_participant_cannot_bring_back_a_force_that_the_operator_stopped(bridge, world):
+    begin_trial(bridge, world)
+    bridge.operator.stop_asked.emit()
+    assert bridge.participant.page == PausePage(force_off=True, held="force")
+    before = list(world.done)
+    QTest.keyClick(bridge.participant.widget, Qt.Key.Key_Return)
+    bridge.participant.event.emit(ResumeAsked(world.now_s, "participant"))
+    assert not world.force_is_on
+    assert world.done == before
+    bridge.operator.fade_in_asked.emit()
+    assert world.force_is_on
+    assert ("force_restored", {"by": "operator"}) in world.done
 
 
 def test_fade_in_brings_the_force_back_and_the_trial_again(bridge, world):

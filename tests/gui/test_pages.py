@@ -127,6 +127,20 @@ def test_pause_after_a_force_stop_says_that_the_force_is_off(qtbot: Any) -> None
     assert [type(event) for event in told] == [ResumeAsked]
 
 
+@pytest.mark.parametrize("language", ["en", "nl"])
+@pytest.mark.parametrize("page", [PausePage(True, "force"), PausePage(True, "pause"), PausePage(False, "pause")])
+def test_what_the_operator_stopped_has_nothing_to_press(qtbot: Any, page: PausePage, language: str) -> None:
+    said = words(language)
+    widget = PauseWidget(page, said, ManualClock())
+    told = opened(qtbot, widget)
+    assert widget.button is None
+    for key in (Qt.Key.Key_Space, Qt.Key.Key_Return, Qt.Key.Key_Enter):
+        QTest.keyClick(widget, key)
+    assert told == []
+    assert (said.force_held_title in texts(widget)) is (page.held == "force")
+    assert (said.force_held_body if page.force_off else said.pause_held_body) in texts(widget)
+
+
 def test_pause_lies_on_the_page_below_as_a_shade(qtbot: Any) -> None:
     under = QPixmap(1366, 768)
     under.fill(Qt.GlobalColor.white)

@@ -78,6 +78,7 @@ def event_of(kind: type[Any]) -> Any:
         ItemShown: ("liquid",),
         Chosen: ("liquid", 3),
         PauseAsked: ("participant",),
+        ResumeAsked: ("operator",),
         ForceStopped: ("device",),
         Note: ("note", "spilled, coffee"),
         RepeatAsked: ("a call",),
@@ -152,7 +153,10 @@ def test_a_page_to_read_holds_the_protocols_texts_and_the_interfaces_word_where_
     assert (page.id, page.kind, page.title, page.paragraphs) == ("welcome", "consent", "Welcome", ("One.", "Two."))
     assert page.button == "I agree"
     state = small.walk(small.opened(), Phase.READING, times=2)
-    assert shown(advance(advance(state, PauseAsked(1.0, "operator"))[0], ResumeAsked(2.0))[1]).button == "Continue"
+    assert (
+        shown(advance(advance(state, PauseAsked(1.0, "operator"))[0], ResumeAsked(2.0, "operator"))[1]).button
+        == "Continue"
+    )
 
 
 def test_leaving_a_page_is_written_and_so_is_the_next() -> None:
@@ -175,7 +179,7 @@ def test_a_trial_starts_its_scene_and_task_before_it_is_shown() -> None:
 def test_the_scene_of_a_trial_is_the_one_behind_its_code() -> None:
     state = state_in(Phase.TASK)
     paused, _ = advance(state, PauseAsked(1.0, "operator"))
-    _, commands = advance(paused, ResumeAsked(2.0))
+    _, commands = advance(paused, ResumeAsked(2.0, "operator"))
     (start,) = [command for command in commands if isinstance(command, StartTrial)]
     assert start.condition == state.plan.key["feeling"][state.trial.code]
 
@@ -277,7 +281,7 @@ def test_a_pause_during_a_task_ends_the_attempt_and_the_trial_starts_again() -> 
     assert commands[:2] == (StopTrial(), Rest())
     assert commands[2] == Write("trial_ended", {"trial": 2, "attempt": 1, "outcome": "interrupted"}, measured=True)
     assert shown(commands) == PausePage(force_off=False)
-    again, commands = advance(paused, ResumeAsked(9.0))
+    again, commands = advance(paused, ResumeAsked(9.0, "operator"))
     assert written(commands) == ["resumed", "trial_started"]
     assert (again.phase, again.trial.number, again.attempt) == (Phase.TASK, 2, 2)
     assert not any(isinstance(command, FadeIn) for command in commands)
@@ -286,7 +290,7 @@ def test_a_pause_during_a_task_ends_the_attempt_and_the_trial_starts_again() -> 
 def test_a_pause_while_answering_goes_back_to_the_same_page_with_every_choice() -> None:
     answering = state_in(Phase.ANSWERING)
     paused, _ = advance(answering, PauseAsked(5.0, "operator"))
-    back, commands = advance(paused, ResumeAsked(9.0))
+    back, commands = advance(paused, ResumeAsked(9.0, "operator"))
     assert back == answering
     assert dict(shown(commands).chosen) == {"liquid": 5, "strong": 5, "spare": 5}
 
@@ -301,16 +305,77 @@ def test_a_force_stop_is_the_first_command_and_resuming_fades_the_force_in(phase
     stopped, commands = advance(state_in(phase), ForceStopped(5.0, "participant"))
     assert commands[0] == StopForce()
     assert stopped.phase is Phase.PAUSED
-    assert shown(commands) == PausePage(force_off=True)
-    resumed, commands = advance(stopped, ResumeAsked(6.0))
+    assert shown(commands) == PausePage(force_off=True, held="pause" if phase is Phase.PAUSED else None)
+    resumed, commands = advance(stopped, ResumeAsked(6.0, "operator"))
     assert FadeIn() in commands
     assert written(commands)[:2] == ["resumed", "force_restored"]
     assert not resumed.force_off
 
 
+def test_a_force_that_the_operator_stopped_is_the_operators_to_bring_back() -> None:
+    stopped, commands = advance(state_in(Phase.TASK), ForceStopped(5.0, "operator"))
+    assert shown(commands) == PausePage(force_off=True, held="force")
+    with pytest.raises(SessionError, match="the operator switched the force off: the operator resumes it"):
+        advance(stopped, ResumeAsked(6.0, "participant"))
+    resumed, commands = advance(stopped, ResumeAsked(7.0, "operator"))
+    assert commands[:3] == (
+        Write("resumed", {"by": "operator"}),
+        Write("force_restored", {"by": "operator"}),
+        FadeIn(),
+    )
+    assert (resumed.phase, resumed.held, resumed.force_off) == (Phase.TASK, None, False)
+
+
+@pytest.mark.parametrize("by", ["participant", "device", "program"])
+def test_a_force_that_somebody_else_stopped_may_be_brought_back_by_the_participant(by: Any) -> None:
+    stopped, commands = advance(state_in(Phase.READING), ForceStopped(5.0, by))
+    assert shown(commands) == PausePage(force_off=True)
+    _, commands = advance(stopped, ResumeAsked(6.0, "participant"))
+    assert commands[1] == Write("force_restored", {"by": "participant"})
+
+
+@pytest.mark.parametrize("by", ["participant", "device", "program", "operator"])
+def test_no_later_stop_takes_the_operators_stop_away(by: Any) -> None:
+    stopped, _ = advance(state_in(Phase.READING), ForceStopped(5.0, "operator"))
+    again, commands = advance(stopped, ForceStopped(6.0, by))
+    assert shown(commands) == PausePage(force_off=True, held="force")
+    with pytest.raises(SessionError, match="the operator resumes it"):
+        advance(again, ResumeAsked(7.0, "participant"))
+
+
+def test_the_operators_stop_during_the_participants_pause_holds_it() -> None:
+    paused, _ = advance(state_in(Phase.READING), PauseAsked(4.0, "participant"))
+    stopped, _ = advance(paused, ForceStopped(5.0, "operator"))
+    with pytest.raises(SessionError, match="the operator resumes it"):
+        advance(stopped, ResumeAsked(6.0, "participant"))
+
+
+def test_the_operators_pause_is_the_operators_to_end_whoever_stops_the_force_then() -> None:
+    paused, commands = advance(state_in(Phase.ANSWERING), PauseAsked(5.0, "operator"))
+    assert shown(commands) == PausePage(force_off=False, held="pause")
+    stopped, commands = advance(paused, ForceStopped(6.0, "participant"))
+    assert shown(commands) == PausePage(force_off=True, held="pause")
+    for state in (paused, stopped):
+        with pytest.raises(SessionError, match="the operator paused the session: the operator resumes it"):
+            advance(state, ResumeAsked(7.0, "participant"))
+        assert advance(state, ResumeAsked(7.0, "operator"))[0].phase is Phase.ANSWERING
+
+
+def test_the_participants_pause_is_the_participants_to_end_until_the_operator_pauses_too() -> None:
+    paused, _ = advance(state_in(Phase.READING), PauseAsked(5.0, "participant"))
+    _, commands = advance(paused, ResumeAsked(6.0, "participant"))
+    assert commands[0] == Write("resumed", {"by": "participant"})
+    taken_over, commands = advance(paused, PauseAsked(5.5, "operator"))
+    assert commands[0] == Write("paused", {"by": "operator"})
+    assert shown(commands) == PausePage(force_off=False, held="pause")
+    assert advance(taken_over, PauseAsked(5.6, "operator")) == (taken_over, ())
+    with pytest.raises(SessionError, match="the operator resumes it"):
+        advance(taken_over, ResumeAsked(6.0, "participant"))
+
+
 def test_the_force_fades_in_before_a_trial_starts_again() -> None:
     stopped, _ = advance(state_in(Phase.TASK), ForceStopped(5.0, "device"))
-    _, commands = advance(stopped, ResumeAsked(6.0))
+    _, commands = advance(stopped, ResumeAsked(6.0, "operator"))
     order = [type(command) for command in commands]
     assert order.index(FadeIn) < order.index(StartTrial)
 
@@ -442,7 +507,7 @@ def test_whatever_happens_no_answer_is_lost_and_the_session_can_be_ended(events:
 
 def _going_on(state: SessionState) -> Any:
     waiting = state.phase in {Phase.PAUSED, Phase.TROUBLE, *FINAL}
-    return ResumeAsked(1.0) if waiting else small.next_event(state, 1.0)
+    return ResumeAsked(1.0, "operator") if waiting else small.next_event(state, 1.0)
 
 
 def _check_order(commands: tuple[Any, ...]) -> None:
@@ -461,7 +526,7 @@ def test_every_trial_that_was_begun_is_ended_once_per_attempt(seed: int, data: s
     ended: list[tuple[int, int]] = []
     while state.phase not in FINAL:
         if state.phase is Phase.PAUSED:
-            event: Any = ResumeAsked(1.0)
+            event: Any = ResumeAsked(1.0, "operator")
         elif state.phase is Phase.TASK and data.draw(st.booleans()):
             event = data.draw(st.sampled_from([event_of(PauseAsked), event_of(ForceStopped), event_of(RepeatAsked)]))
         else:

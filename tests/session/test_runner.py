@@ -292,7 +292,7 @@ def test_an_interrupted_attempt_keeps_what_was_measured_and_the_trial_starts_aga
     (first,) = practising.journal.of("trial_ended")
     assert (first["attempt"], first["outcome"], first["ticks"]) == (1, "interrupted", 800)
     practising.run(5.0)  # a pause is no exploration
-    practising.runner.post(ResumeAsked(5.8))
+    practising.runner.post(ResumeAsked(5.8, "operator"))
     assert practising.servo.scene == 2
     practising.run(3.2)
     second = practising.journal.of("trial_ended")[-1]
@@ -301,7 +301,7 @@ def test_an_interrupted_attempt_keeps_what_was_measured_and_the_trial_starts_aga
 
 def test_resuming_after_a_force_stop_fades_the_force_in(practising: World) -> None:
     practising.run(0.1, buttons=BUTTON_STOP)
-    practising.runner.post(ResumeAsked(1.0))
+    practising.runner.post(ResumeAsked(1.0, "operator"))
     assert practising.servo.force_is_on
     assert practising.log.index("fade_in") < practising.log.index("load")
 
@@ -408,7 +408,7 @@ def test_when_the_disk_takes_data_again_all_is_kept_in_order_and_once_and_the_se
     assert world.journal.lines[:before] == undisturbed.journal.lines
     after = [(line["event"], line.get("by", line.get("outcome"))) for line in world.journal.lines[before:]]
     assert after == [("trial_ended", "interrupted"), ("force_stopped", "program"), ("paused", "program")]
-    world.runner.post(ResumeAsked(20.0))
+    world.runner.post(ResumeAsked(20.0, "operator"))
     assert world.servo.force_is_on
     assert world.state.phase is Phase.TASK
     assert world.state.attempt == 2
@@ -423,7 +423,7 @@ def test_a_choice_that_met_a_full_disk_is_there_after_the_pause() -> None:
     with pytest.raises(SessionError, match="disk full"):
         world.runner.post(Submitted(9.1))
     wait_for_the_disk(world)
-    world.runner.post(ResumeAsked(20.0))
+    world.runner.post(ResumeAsked(20.0, "operator"))
     assert world.pages[-1].chosen == ((item, 6),)
     assert [line["value"] for line in world.journal.of("choice")] == [6]
 
@@ -438,6 +438,21 @@ def test_every_target_of_a_look_is_kept_however_long_the_disk_was_full() -> None
     wait_for_the_disk(world)
     assert [line["target"] for line in world.journal.of("target_reached")[before:]] == [0, 1]
     assert world.journal.of("trial_ended")[-1]["targets_reached"] == 2
+
+
+def test_the_operators_stop_while_the_disk_is_full_is_not_the_participants_to_undo(practising: World) -> None:
+    stall(practising)
+    practising.runner.post(Note(1.0, "mark", ""))
+    practising.runner.post(ForceStopped(1.1, "operator"))
+    practising.run(RETRY_S + 0.01)  # in vain once
+    assert practising.runner.stalled == "disk full"
+    wait_for_the_disk(practising)
+    assert practising.pages[-1] == PausePage(force_off=True, held="force")
+    with pytest.raises(SessionError, match="the operator resumes it"):
+        practising.runner.post(ResumeAsked(9.0, "participant"))
+    assert not practising.servo.force_is_on
+    practising.runner.post(ResumeAsked(9.1, "operator"))
+    assert practising.servo.force_is_on
 
 
 def test_the_force_can_be_stopped_while_the_disk_is_full(practising: World) -> None:
@@ -553,7 +568,7 @@ def test_frames_are_recorded_with_their_trial_and_attempts_have_recordings_of_th
     world.runner.frame_shown(500, 400)
     world.runner.post(PauseAsked(0.5, "operator"))
     world.run(0.5)
-    world.runner.post(ResumeAsked(1.0))
+    world.runner.post(ResumeAsked(1.0, "operator"))
     told = [told for told in tape.told if isinstance(told, tuple)]
     assert told == [("start", 1, 1, 1000.0), ("frame", 500, 400), ("stop",), ("start", 1, 2, 1000.0)]
 

@@ -68,7 +68,7 @@ def test_a_force_stop_is_zero_force_with_the_next_tick_and_until_it_is_faded_in(
     bench.runner.post(ForceStopped(bench.clock(), "participant"))
     assert (bench.run(500) == 0).all()
     assert bench.pages[-1] == PausePage(force_off=True)
-    bench.runner.post(ResumeAsked(bench.clock()))
+    bench.runner.post(ResumeAsked(bench.clock(), "operator"))
     force_n = bench.run(900)
     assert force_n.max() > 0.5
     assert force_n[:50].max() < 0.15 * force_n.max()  # the start's fade takes half a second
@@ -88,7 +88,7 @@ def test_a_pause_and_an_end_take_the_liquid_away(bench: Bench) -> None:
     bench.runner.post(PauseAsked(bench.clock(), "operator"))
     bench.run(60)  # a change of scene fades
     assert (bench.run(500) == 0).all()
-    bench.runner.post(ResumeAsked(bench.clock()))
+    bench.runner.post(ResumeAsked(bench.clock(), "operator"))
     assert bench.run(500).max() > 0.5
     bench.runner.post(EndAsked(bench.clock(), "withdrawn", ""))
     bench.run(60)

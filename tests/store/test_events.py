@@ -29,11 +29,11 @@ def test_whatever_the_store_writes_is_in_the_dictionary(
 
 
 def test_a_line_without_a_field_of_its_event_is_named() -> None:
-    lines = [line("note", kind="note"), line("paused"), line("resumed"), {"n": 4, "event": "resumed"}]
+    lines = [line("note", kind="note"), line("paused"), line("resumed", by="operator"), {"n": 4, "event": "resumed"}]
     assert list(lacking_fields(lines)) == [
         "line 1 (note) lacks text",
         "line 1 (paused) lacks by",
-        "line 4 (resumed) lacks t_s, at",
+        "line 4 (resumed) lacks t_s, at, by",
     ]
 
 

@@ -203,7 +203,10 @@ class TextWidget(ReadingPage):
 
 
 class PauseWidget(ReadingPage):
-    """The pause, over the page that it interrupts; after a force stop it says that the force is off."""
+    """The pause, over the page that it interrupts; after a force stop it says that the force is off.
+
+    Where the operator stopped, there is nothing to press: the operator goes on.
+    """
 
     def __init__(
         self,
@@ -216,12 +219,16 @@ class PauseWidget(ReadingPage):
     ) -> None:
         self.under = under
         if page.force_off:
-            column = ("stop", words.force_off_title, (words.force_off_body,), PARTICIPANT.bad)
+            title = words.force_held_title if page.held == "force" else words.force_off_title
+            body = words.force_off_body if page.held is None else words.force_held_body
+            column = ("stop", title, (body,), PARTICIPANT.bad)
             label = words.force_on
         else:
-            column = ("pause", words.pause_title, (words.pause_body,), PARTICIPANT.accent)
+            body = words.pause_body if page.held is None else words.pause_held_body
+            column = ("pause", words.pause_title, (body,), PARTICIPANT.accent)
             label = words.resume
-        super().__init__(column, words, clock, button=(label, words.enter_key), parent=parent)
+        button = (label, words.enter_key) if page.held is None else None
+        super().__init__(column, words, clock, button=button, parent=parent)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802
         """Go on with Enter; Space alone could still be the key of the page before."""
@@ -231,8 +238,9 @@ class PauseWidget(ReadingPage):
             super().keyPressEvent(event)
 
     def go_on(self) -> None:
-        """Ask to go on with the session."""
-        self.event_made.emit(ResumeAsked(self._clock()))
+        """Ask to go on with the session, where that is the participant's to do."""
+        if self.button is not None:
+            self.event_made.emit(ResumeAsked(self._clock(), "participant"))
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802
         """Paint the page below as a shade, and a card on it."""
