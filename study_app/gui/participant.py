@@ -5,8 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QEvent, QRect, QSize, Qt, Signal
-from PySide6.QtGui import QCloseEvent, QColor, QKeyEvent, QPainter, QPaintEvent, QPixmap, QResizeEvent, QScreen
+from PySide6.QtCore import QEvent, QRect, QSize, Qt, QTimer, Signal
+from PySide6.QtGui import (
+    QCloseEvent,
+    QColor,
+    QGuiApplication,
+    QKeyEvent,
+    QPainter,
+    QPaintEvent,
+    QPixmap,
+    QResizeEvent,
+    QScreen,
+    QWindow,
+)
 from PySide6.QtWidgets import QWidget
 
 from study_app.gui.escape import EscapeHold
@@ -34,6 +45,7 @@ if TYPE_CHECKING:
 LEAST_SIZE = QSize(1024, 640)
 WINDOWED_SIZE = QSize(1366, 768)
 PILOT_FRAME = 10
+SETTLING_MS = 100  # from one of the program's windows to the next, none may have the keyboard for so long
 
 
 class ParticipantWindow(QWidget):
@@ -81,6 +93,12 @@ class ParticipantWindow(QWidget):
         self._capture = PointerCapture(self)
         self._capture.moved.connect(self.pointer)
         self._capture.pressed.connect(self.buttons)
+        self._settling = QTimer(self)
+        self._settling.setSingleShot(True)
+        self._settling.setInterval(SETTLING_MS)
+        self._settling.timeout.connect(self._pause_if_left)
+        if isinstance(program := QGuiApplication.instance(), QGuiApplication):
+            program.focusWindowChanged.connect(self._focus_moved)
         self._escape = EscapeHold(self)
         self._escape.held.connect(self._stop_force)
         self._escape.tapped.connect(self._pause)
@@ -156,11 +174,15 @@ class ParticipantWindow(QWidget):
             super().keyPressEvent(event)
 
     def changeEvent(self, event: QEvent) -> None:  # noqa: N802
-        """Let the pointer go and pause when another window is activated."""
+        """Hold the pointer in the tank only while this window is active."""
         super().changeEvent(event)
-        if event.type() == QEvent.Type.ActivationChange and not self.isActiveWindow() and self._capture.held:
+        if event.type() != QEvent.Type.ActivationChange or not self._captures or self.tank is None:
+            return
+        if self.isActiveWindow() and not self._capture.held:
+            self._capture.take(self.tank, self.tank.page.workspace_m)
+        elif not self.isActiveWindow() and self._capture.held:
             self._capture.release()
-            self._pause()
+            self.tank.setCursor(Qt.CursorShape.BlankCursor)
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
         """Let the page fill the window."""
@@ -216,6 +238,15 @@ class ParticipantWindow(QWidget):
 
     def _may_leave_tank(self) -> bool:
         return self.tank is not None and self.tank.may_leave
+
+    def _focus_moved(self, _window: QWindow | None) -> None:
+        if self._captures and self.tank is not None:
+            self._settling.start()
+
+    def _pause_if_left(self) -> None:
+        """Pause where the pointer is the device and went to another program; the operator's window is none."""
+        if self.tank is not None and QGuiApplication.focusWindow() is None:
+            self._pause()
 
     def _pause(self) -> None:
         if isinstance(self._page, TextPage | TaskPage | QuestionnairePage):

@@ -249,15 +249,54 @@ def test_pointer_is_held_and_hidden_in_the_tank_alone(captured: Opened) -> None:
     assert captured.window.widget.cursor().shape() == Qt.CursorShape.ArrowCursor
 
 
-def test_losing_the_window_lets_the_pointer_go_and_pauses(captured: Opened, qtbot: Any) -> None:
-    captured.window.show_page(task_page())
+def other_window(captured: Opened, qtbot: Any) -> QWidget:
+    """Return another window of the program, active instead of the participant's."""
     other = QWidget()
     qtbot.addWidget(other)
     other.show()
     other.activateWindow()
     qtbot.waitUntil(lambda: not captured.window.isActiveWindow())
+    return other
+
+
+def test_the_operators_window_lets_the_pointer_go_and_the_trial_goes_on(captured: Opened, qtbot: Any) -> None:
+    captured.window.show_page(task_page())
+    with qtbot.waitSignal(captured.window._settling.timeout):
+        other = other_window(captured, qtbot)
+        assert not captured.window._capture.held
+    assert other.isActiveWindow()
+    assert captured.events == []
+    captured.window.activateWindow()
+    qtbot.waitUntil(lambda: captured.window._capture.held)
+    assert captured.window.widget.cursor().shape() == Qt.CursorShape.BlankCursor
+
+
+@pytest.mark.parametrize("page", [text_page(), questionnaire()], ids=lambda page: type(page).__name__)
+def test_a_window_that_is_active_again_holds_the_pointer_in_the_tank_alone(
+    captured: Opened, qtbot: Any, page: Page
+) -> None:
+    captured.window.show_page(task_page())
+    other = other_window(captured, qtbot)
+    captured.window.show_page(page)
+    other.hide()
+    captured.window.activateWindow()
+    qtbot.waitUntil(captured.window.isActiveWindow)
     assert not captured.window._capture.held
+
+
+def test_another_program_that_takes_the_keyboard_pauses(captured: Opened, qtbot: Any) -> None:
+    captured.window.show_page(task_page())
+    other = other_window(captured, qtbot)
+    with qtbot.waitSignal(captured.window.event):
+        other.windowHandle().destroy()  # no window of the program has the keyboard then
+        QApplication.instance().focusWindowChanged.emit(None)  # type: ignore[union-attr]
     assert captured.events == [PauseAsked(captured.events[0].at_s, "participant")]
+
+
+def test_another_program_pauses_nothing_where_the_pointer_is_not_the_device(opened: Opened, qtbot: Any) -> None:
+    opened.window.show_page(task_page())
+    QApplication.instance().focusWindowChanged.emit(None)  # type: ignore[union-attr]
+    assert not opened.window._settling.isActive()
 
 
 def test_closing_by_accident_is_a_pause(opened: Opened) -> None:
