@@ -227,7 +227,7 @@ PARTICIPANTS: tuple[Column, ...] = (
     Column("device", "text", "The haptic device.", may_miss=True),
     Column("language", "text", "Language of the participant's pages."),
     Column("trials", "integer", "Main trials that ran to their end.", minimum=0),
-    Column("responses", "integer", "Answers on the scale given in main trials.", minimum=0),
+    Column("responses", "integer", "Answers given in main trials, those off the scale included.", minimum=0),
     Column(
         "validity",
         "text",

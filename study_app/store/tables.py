@@ -78,7 +78,7 @@ def participant(lines: Sequence[Line]) -> Row:
     main = [
         row for row in latest(trials(lines)) if row["phase"] == "main" and row["outcome"] in ("complete", "timeout")
     ]
-    answered = [row for row in latest(responses(lines)) if row["phase"] == "main" and row["response"] is not None]
+    answered = [row for row in latest(responses(lines)) if row["phase"] == "main" and row["first_choice_s"] is not None]
     verdicts = [row["valid"] for row in main if row["valid"] is not None]
     return {
         **_session(lines),

@@ -206,7 +206,7 @@ def test_a_participants_row_counts_main_trials_and_their_last_attempt() -> None:
     script.trial(3)
     unfinished = participant(script.lines)
     assert (unfinished["status"], unfinished["session_ended_at"]) == ("unfinished", None)
-    assert (unfinished["trials"], unfinished["responses"]) == (1, 2)
+    assert (unfinished["trials"], unfinished["responses"]) == (1, 3)
     script.add("session_ended", status="withdrawn", reason="tired")
     ended = participant(script.lines)
     assert tuple(ended) == header(TABLES["participants"])
@@ -229,6 +229,16 @@ def test_the_end_of_a_trial_that_never_started_is_refused() -> None:
     script.end(4)
     with pytest.raises(StoreError, match="line 2 is about trial 4, which never started"):
         trials(script.lines)
+
+
+def test_cannot_judge_is_an_answer_and_a_statement_left_out_is_none() -> None:
+    script = Script()
+    script.trial(1)
+    script.end(1)
+    script.answer(1, 7, None, None)
+    script.lines[-1]["items"][2] |= {"first_s": None, "last_s": None, "changes": 0}
+    assert [row["cannot_judge"] for row in responses(script.lines)] == [False, True, False]
+    assert participant(script.lines)["responses"] == 2
 
 
 def test_headers_are_the_same_bytes_for_every_participant(
