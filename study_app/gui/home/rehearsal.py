@@ -62,6 +62,7 @@ class RehearsalDialog(QDialog):
         self.progress.hide()
         self.start = ActionButton("fast_forward", "Rehearse", role="primary")
         self.cancel = ActionButton("", "Cancel")
+        self.start.setDefault(True)
         self.process = QProcess(self)
         self.process.setProcessChannelMode(QProcess.ProcessChannelMode.MergedChannels)
         self._told = ""

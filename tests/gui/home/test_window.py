@@ -131,6 +131,32 @@ def test_a_failed_rehearsal_says_why_and_stays(qtbot, tmp_path, monkeypatch):
     assert dialog.said.text() == "no room left"
 
 
+@pytest.mark.parametrize("at", ["participants", "seed", "start", "dialog"])
+def test_enter_begins_the_rehearsal_wherever_the_keyboard_is(qtbot, tmp_path, monkeypatch, at):
+    dialog = RehearsalDialog(study_facts("demo"), tmp_path)
+    qtbot.addWidget(dialog)
+    dialog.open()
+    qtbot.waitUntil(dialog.isActiveWindow)
+    monkeypatch.setattr("study_app.gui.home.rehearsal.ARGUMENTS", ("-c", "import time; time.sleep(600)"))
+    pressed = dialog if at == "dialog" else getattr(dialog, at)
+    pressed.setFocus()
+    with qtbot.waitSignal(dialog.process.started, timeout=20_000):
+        qtbot.keyClick(pressed, Qt.Key.Key_Return)
+    dialog.reject()
+    assert dialog.process.state() == QProcess.ProcessState.NotRunning
+
+
+def test_enter_on_cancel_cancels(qtbot, tmp_path):
+    dialog = RehearsalDialog(study_facts("demo"), tmp_path)
+    qtbot.addWidget(dialog)
+    dialog.open()
+    qtbot.waitUntil(dialog.isActiveWindow)
+    dialog.cancel.setFocus()
+    qtbot.keyClick(dialog.cancel, Qt.Key.Key_Return)
+    assert not dialog.isVisible()
+    assert dialog.process.state() == QProcess.ProcessState.NotRunning
+
+
 def test_cancelling_a_rehearsal_stops_it(qtbot, tmp_path, monkeypatch):
     dialog = RehearsalDialog(study_facts("demo"), tmp_path)
     qtbot.addWidget(dialog)
