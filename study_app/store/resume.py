@@ -20,6 +20,7 @@ from study_app.store import journal, receipt
 from study_app.store.atomic import is_there, sweep
 from study_app.store.blinding import open_or_draw_key, same_conditions
 from study_app.store.checksums import sha256
+from study_app.store.description import write_description
 from study_app.store.journal import Journal, Line, SessionClock
 from study_app.store.layout import SessionFolder, locate
 from study_app.store.open_session import Place, SessionStore
@@ -93,6 +94,7 @@ def reopen(
             store.append(event, **fields)
         store.note_resumed({"at": clock.at(at_s), **told, **surroundings(device, screens, clock)})
         store.write_tables()
+        write_description(study_folder, protocol.study)
         write_participants(study_folder, place.study)
         failing.pop_all()
     return store

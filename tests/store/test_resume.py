@@ -292,6 +292,17 @@ def test_what_is_missing_is_named_and_nothing_is_written(
     assert not is_open(store.folder.path)
 
 
+def test_a_study_killed_before_it_was_described_is_described(
+    tmp_path: Path, start: Callable[..., SessionStore], again: Again
+) -> None:
+    start().close()
+    (description,) = tmp_path.rglob("dataset_description.json")
+    told = description.read_bytes()
+    description.unlink()
+    again().close()
+    assert description.read_bytes() == told
+
+
 def test_a_session_that_had_not_begun_cannot_go_on(
     tmp_path: Path, start: Callable[..., SessionStore], again: Again
 ) -> None:
