@@ -25,6 +25,9 @@ STROKE = 2.0
 NOTHING = QPen(QColor(0, 0, 0, 0))
 # Dash and gap in stroke widths: x solid, y long dashes, z dots.
 DASHES: tuple[tuple[float, float] | None, ...] = (None, (6.0, 3.0), (1.0, 1.6))
+NAME_MARGIN = 1.0  # around names in the plot of ticks [px]
+MOST_FOR_NAMES = 0.5  # of that plot's height
+P99_ABOVE = 0.1  # the highest the 99th percentile's line ends above the top grid line [decades]
 NAMES = ("x right", "y up", "z near")
 
 
@@ -177,6 +180,8 @@ class LatenessPlot(Plot):
             self.box.addItem(item)
         for name in (self.p99_name, self.limit_name):
             name.textItem.setFont(font("small", weight=600, tabular=True))
+            name.textItem.document().setDocumentMargin(NAME_MARGIN)
+        self.box.sigResized.connect(self._make_room)
         self._show_decades(max(3, int(np.ceil(self._limit + 0.1))), 4)
         self.wear(LIGHT)
 
@@ -185,10 +190,18 @@ class LatenessPlot(Plot):
             return
         self._decades = (across, up)
         self.box.setXRange(-0.02 * across, 1.08 * across, padding=0)
-        self.box.setYRange(-0.3, up + 0.55, padding=0)
+        self._make_room()
         self.show_ticks("bottom", [(k, number(10.0**k)) for k in range(across + 1)])
         self.show_ticks("left", [(k, number(10.0**k)) for k in range(up + 1)])
-        self.limit_name.setPos(self._limit - 0.01 * across, up + 0.55)
+
+    def _make_room(self) -> None:
+        """Keep two lines of text free above the bars: the limit's name stands above that of the 99th percentile."""
+        across, up = self._decades
+        line = self.limit_name.textItem.boundingRect().height() + NAME_MARGIN
+        share = min(2 * line / max(1.0, self.box.height()), MOST_FOR_NAMES)
+        top = (up + P99_ABOVE + 0.3 * share) / (1 - share)
+        self.box.setYRange(-0.3, top, padding=0)
+        self.limit_name.setPos(self._limit - 0.01 * across, top)
 
     def show_histogram(self, edges_us: Floats, counts: NDArray[np.int64], p99_us: float | None) -> None:
         """Draw ``counts`` (bins,) between ``edges_us`` (bins + 1,) and the 99th percentile [µs]."""
@@ -204,7 +217,7 @@ class LatenessPlot(Plot):
         if p99_us is not None:
             at = float(np.log10(max(p99_us, 1.0)))
             near = counts[np.abs((edges[:-1] + edges[1:]) / 2 - at) < 0.12 * self._decades[0]]
-            top = min(up + 0.1, float(np.log10(max(1, near.max(initial=1)))) + 0.3)
+            top = min(up + P99_ABOVE, float(np.log10(max(1, near.max(initial=1)))) + 0.3)
             self.p99_line.setData([at, at], [-0.3, top])
             self.p99_name.setPos(at, top)
             self.p99_name.setText(f"p99 {number(round(p99_us))}")

@@ -1,0 +1,42 @@
+"""The plots' names stand apart and inside, whatever is drawn."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QRectF
+from PySide6.QtWidgets import QApplication
+
+from study_app.gui.plots import LatenessPlot
+
+LIMIT_US = 2000.0
+
+
+def place(name: Any) -> QRectF:
+    return name.textItem.mapRectToScene(name.textItem.boundingRect())
+
+
+@pytest.mark.parametrize("size", [(320, 150), (420, 200), (900, 420)])
+@pytest.mark.parametrize("p99_us", [3.0, 66.0, 700.0, 2000.0, 9000.0])
+@pytest.mark.parametrize("decades", [4, 5, 6])
+def test_the_names_of_limit_and_p99_do_not_touch(
+    qtbot: Any, size: tuple[int, int], p99_us: float, decades: int
+) -> None:
+    plot = LatenessPlot(LIMIT_US)
+    qtbot.addWidget(plot)
+    plot.resize(900, 420)
+    plot.show()
+    qtbot.waitExposed(plot)
+    edges = np.logspace(0, decades, 10 * decades + 1)
+    plot.show_histogram(edges, np.full(10 * decades, 10_000), p99_us)
+    plot.resize(*size)
+    QApplication.processEvents()
+    limit, p99 = place(plot.limit_name), place(plot.p99_name)
+    assert plot.limit_name.isVisible()
+    assert plot.p99_name.isVisible()
+    assert not limit.intersects(p99)
+    inside = plot.box.mapRectToScene(plot.box.boundingRect()).adjusted(0, -1, 0, 1)
+    assert inside.top() <= limit.top() < limit.bottom() <= p99.top() + 1
+    assert p99.bottom() <= inside.bottom()
