@@ -254,7 +254,7 @@ def test_samples_that_were_dropped_are_known(study: Path) -> None:
 def test_lines_after_the_end_are_found(study: Path) -> None:
     path = study / SESSION / "journal.jsonl"
     last = journal.read(path)[-1]
-    append(json.dumps(last | {"n": last["n"] + 1, "event": "resumed"}).encode() + b"\n")(path)
+    append(json.dumps(last | {"n": last["n"] + 1, "event": "resumed", "by": "operator"}).encode() + b"\n")(path)
     assert "lines follow the session's end" in told(verify(study))
 
 
