@@ -178,7 +178,7 @@ class ParticipantWindow(QWidget):
         super().changeEvent(event)
         if event.type() != QEvent.Type.ActivationChange or not self._captures or self.tank is None:
             return
-        if self.isActiveWindow() and not self._capture.held:
+        if self.isActiveWindow() and self.isVisible() and not self._capture.held:
             self._capture.take(self.tank, self.tank.page.workspace_m)
         elif not self.isActiveWindow() and self._capture.held:
             self._capture.release()

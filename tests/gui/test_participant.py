@@ -60,8 +60,11 @@ class Opened:
 
 
 @pytest.fixture
-def opened(qtbot: Any) -> Opened:
-    return Opened(qtbot)
+def opened(qtbot: Any) -> Any:
+    made = Opened(qtbot)
+    yield made
+    made.window.may_close = True
+    made.window.close()
 
 
 @pytest.fixture
