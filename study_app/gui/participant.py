@@ -16,7 +16,6 @@ from PySide6.QtGui import (
     QPixmap,
     QResizeEvent,
     QScreen,
-    QWindow,
 )
 from PySide6.QtWidgets import QWidget
 
@@ -94,11 +93,8 @@ class ParticipantWindow(QWidget):
         self._capture.moved.connect(self.pointer)
         self._capture.pressed.connect(self.buttons)
         self._settling = QTimer(self)
-        self._settling.setSingleShot(True)
         self._settling.setInterval(SETTLING_MS)
         self._settling.timeout.connect(self._pause_if_left)
-        if isinstance(program := QGuiApplication.instance(), QGuiApplication):
-            program.focusWindowChanged.connect(self._focus_moved)
         self._escape = EscapeHold(self)
         self._escape.held.connect(self._stop_force)
         self._escape.tapped.connect(self._pause)
@@ -183,6 +179,7 @@ class ParticipantWindow(QWidget):
         elif not self.isActiveWindow() and self._capture.held:
             self._capture.release()
             self.tank.setCursor(Qt.CursorShape.BlankCursor)
+            self._settling.start()
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
         """Let the page fill the window."""
@@ -239,13 +236,12 @@ class ParticipantWindow(QWidget):
     def _may_leave_tank(self) -> bool:
         return self.tank is not None and self.tank.may_leave
 
-    def _focus_moved(self, _window: QWindow | None) -> None:
-        if self._captures and self.tank is not None:
-            self._settling.start()
-
     def _pause_if_left(self) -> None:
         """Pause where the pointer is the device and went to another program; the operator's window is none."""
-        if self.tank is not None and QGuiApplication.focusWindow() is None:
+        if self.tank is None or self._capture.held:
+            self._settling.stop()
+        elif QGuiApplication.focusWindow() is None:
+            self._settling.stop()
             self._pause()
 
     def _pause(self) -> None:
