@@ -23,6 +23,7 @@ try:
 
     from study_app.gui.beginning import Ready, check, measured, open_store
     from study_app.gui.choices import NewSession, draw_seed, resumed, study_results
+    from study_app.gui.collector import collecting_here
     from study_app.gui.ending import ended_from_outside
     from study_app.gui.home import HomeWindow
     from study_app.gui.icons import logo
@@ -58,7 +59,7 @@ def home(results: Path | None = None) -> int:
     """
     application = _application()
     visit = _Visit(HomeWindow(results if results is not None else Path("results")))
-    with ended_from_outside(visit.end_by_signal):
+    with collecting_here(), ended_from_outside(visit.end_by_signal):
         visit.window.show()
         visit.loop.exec()
     application.processEvents()
@@ -163,7 +164,7 @@ def _hold(chosen: NewSession, tell: Callable[[str], object] | None) -> int:
     live = LiveSession(chosen, LIGHT, tell)
     loop = QEventLoop()
     live.over.connect(loop.quit)
-    with ended_from_outside(live.end_by_signal):
+    with collecting_here(), ended_from_outside(live.end_by_signal):
         QTimer.singleShot(0, live.open)
         loop.exec()
     if live.error is not None:
