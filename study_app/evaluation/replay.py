@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from study_app.errors import StoreError
 from study_app.haptics.compiled import kernel
-from study_app.haptics.layout import LIMITER_FADE, LIMITER_STOP, STATUS_DEVICE_LOST
+from study_app.haptics.layout import LIMITER_FADE, LIMITER_STOP, SAMPLE, STATUS_DEVICE_LOST, records
 from study_app.haptics.pack import pack
 from study_app.haptics.safety import SCENE_FADE_S, START_FADE_S, begin_scene, new_safety
 from study_app.haptics.scene import Scene
@@ -65,6 +65,7 @@ def replay(session_folder: Path) -> Replayed:
         raise StoreError(f"{study.key} is not the key that {session.path} ran under: restore it from a copy")
     protocol = _whole(kept["protocol"], key)
     limit_n = float(kept["device"].get("force_limit_n", np.inf))
+    _again(records(SAMPLE, 0), Scene(), limit_n, None)  # loads the compiled code: no part of what a replay takes
     began = time.perf_counter()
     found = _Found()
     before: _Before | None = None
