@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import datetime
@@ -14,6 +15,7 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.schedule import PageStep, Schedule, build_schedule
 from study_app.session.resume import find_protocol, is_rehearsal, resume_at
 from study_app.store import journal, receipt
+from study_app.store.exclusions import exclusions
 from study_app.store.layout import StudyFolder, locate
 from study_app.store.opening import is_open
 from study_app.store.participants import participants
@@ -46,7 +48,7 @@ class BrokenFacts:
 
 @dataclass(frozen=True, slots=True)
 class SessionFacts:
-    """A session as a row shows it."""
+    """A session as a row shows it; ``excluded`` is why all of it is left out of the analysis, None where it is not."""
 
     participant: str
     session: int
@@ -59,6 +61,12 @@ class SessionFacts:
     simulated: bool
     pilot: bool
     folder: Path
+    excluded: str | None = None
+
+    @property
+    def kind(self) -> str:
+        """What it is where it is not a participant's: "simulated", "pilot", else nothing."""
+        return "simulated" if self.simulated else "pilot" if self.pilot else ""
 
     @property
     def needs_care(self) -> bool:
@@ -111,6 +119,7 @@ def sessions(results: Path, answers_of: dict[str, int]) -> tuple[SessionFacts, .
             rows = participants(StudyFolder(data.parent))
         except StoreError:
             continue  # not ours, or not readable: the commands say why when asked about that folder
+        excluded = _excluded(data.parent)
         found += [
             SessionFacts(
                 participant=row["participant"],
@@ -124,10 +133,18 @@ def sessions(results: Path, answers_of: dict[str, int]) -> tuple[SessionFacts, .
                 simulated=bool(row["simulated"]),
                 pilot=bool(row["pilot"]),
                 folder=StudyFolder(data.parent).session(row["participant"], int(row["session"])).path,
+                excluded=excluded.get((row["participant"], int(row["session"]))),
             )
             for row in rows
         ]
     return tuple(sorted(found, key=lambda session: (not session.needs_care, -session.started.timestamp())))
+
+
+def _excluded(study: Path) -> dict[tuple[str, int], str]:
+    """Return why whole sessions are left out; nothing where the list cannot be read, which the commands complain of."""
+    with contextlib.suppress(StoreError):
+        return {(one.participant, one.session): one.reason for one in exclusions(study) if one.trial is None}
+    return {}
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,12 +205,13 @@ def place_words(protocol: Protocol, schedule: Schedule, step: int) -> str:
 
 
 def held(found: Iterable[SessionFacts], study: str) -> str:
-    """Return how many sessions of a study there are: "4 sessions, 3 complete"."""
+    """Return how many sessions of a study there are: "4 sessions, 3 complete, 1 excluded"."""
     own = [session for session in found if session.study == study and not session.simulated and not session.pilot]
     if not own:
         return "no session yet"
     complete = sum(session.status == "completed" for session in own)
-    return f"{counted(len(own), 'session')}, {complete} complete"
+    excluded = sum(session.excluded is not None for session in own)
+    return f"{counted(len(own), 'session')}, {complete} complete" + (f", {excluded} excluded" if excluded else "")
 
 
 def counted(number: int, word: str) -> str:

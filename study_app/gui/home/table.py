@@ -44,6 +44,29 @@ def _columns(widget: QWidget) -> QGridLayout:
     return grid
 
 
+def _verdict(facts: SessionFacts) -> tuple[Tone, str, str]:
+    """Return what the chip says of a session's limits, or that it does not count at all."""
+    if facts.excluded is not None:
+        return "neutral", "cross", "Excluded"
+    return VALIDITY[None if facts.needs_care else facts.validity]
+
+
+def _study(facts: SessionFacts) -> QWidget:
+    """Return the study's name, and under it what the session is where it is no participant's."""
+    cell = QWidget()
+    column = QVBoxLayout(cell)
+    column.setContentsMargins(0, 0, 0, 0)
+    column.setSpacing(0)
+    column.addStretch()
+    name = Elided("label", "text2")
+    name.show_text(facts.study)
+    column.addWidget(name)
+    if facts.kind:
+        column.addWidget(label(facts.kind, "small", "text2"))
+    column.addStretch()
+    return cell
+
+
 class SessionLine(Themed, QWidget):
     """One session."""
 
@@ -54,19 +77,20 @@ class SessionLine(Themed, QWidget):
         who = Elided("body")
         who.setFont(font("label", weight=600, scale=1.08))
         who.show_text(facts.participant if facts.session == 1 else f"{facts.participant}, session {facts.session}")
-        kind = ", simulated" if facts.simulated else ", pilot" if facts.pilot else ""
-        study, when = Elided("label", "text2"), Elided("label", "text2")
-        study.show_text(facts.study + kind)
+        when = Elided("label", "text2")
         when.setFont(font("label", weight=400, tabular=True))
         when.show_text(started_words(facts.started, now))
         whole = f" of {facts.answers_of}" if facts.answers_of is not None else ""
         self.status = Chip(*STATUS.get(facts.status, ("neutral", "ring", facts.status.capitalize())), small=True)
-        self.validity = Chip(*VALIDITY[None if facts.needs_care else facts.validity], small=True)
+        self.validity = Chip(*_verdict(facts), small=True)
+        if facts.excluded is not None:
+            self.validity.setToolTip(f"Left out of the analysis: {facts.excluded}")
         self.answers = figures(f"{facts.answers}{whole}", "label")
         grid = _columns(self)
-        for column, cell in enumerate((who, study, when, self.status, self.validity, self.answers)):
+        for column, cell in enumerate((who, _study(facts), when, self.status, self.validity, self.answers)):
             grid.addWidget(cell, 0, column)
-        self.setAccessibleName(f"{facts.participant}, {facts.study}, {self.status.word}, {self.answers.text()} answers")
+        words = (facts.participant, facts.study, facts.kind, self.status.word, self.validity.word)
+        self.setAccessibleName(", ".join([*filter(None, words), f"{self.answers.text()} answers"]))
 
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
         """Paint the tint of a row that needs care, and the hairline under the row."""

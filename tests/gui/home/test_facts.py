@@ -19,6 +19,7 @@ from study_app.gui.home.facts import (
 from study_app.protocol.load import load, source_bytes
 from study_app.protocol.schedule import PageStep, build_schedule
 from study_app.session.resume import REHEARSED_SCREENS
+from study_app.store.exclusions import exclude
 from study_app.store.opening import open_alone
 from study_app.store.session import begin
 
@@ -157,6 +158,17 @@ def test_held_sessions_are_counted_with_their_ends(tmp_path):
     found = sessions(tmp_path, {})
     assert held(found, "demo") == "2 sessions, 1 complete"
     assert held(found, "rek2024") == "no session yet"
+
+
+def test_a_session_that_is_left_out_says_why(tmp_path):
+    for participant in ("P001", "P002"):
+        start(tmp_path, participant, "completed")
+    exclude(tmp_path / "demo", "P001", 1, by="AB", reason="fell asleep")
+    found = sessions(tmp_path, {})
+    assert {row.participant: row.excluded for row in found} == {"P001": "fell asleep", "P002": None}
+    assert held(found, "demo") == "2 sessions, 2 complete, 1 excluded"
+    (tmp_path / "demo" / "exclusions.csv").write_text("nonsense")
+    assert [row.excluded for row in sessions(tmp_path, {})] == [None, None]
 
 
 def test_a_folder_that_holds_something_else_is_passed_over(tmp_path):

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import pytest
-from PySide6.QtCore import QProcess, Qt
-from PySide6.QtWidgets import QApplication, QPushButton
+from PySide6.QtCore import QPoint, QProcess, Qt
+from PySide6.QtWidgets import QApplication, QLabel, QPushButton
 
 from study_app.gui.home import HomeWindow
 from study_app.gui.home.cards import BrokenCard, StudyCard
@@ -12,27 +12,32 @@ from study_app.gui.home.facts import study_facts
 from study_app.gui.home.rehearsal import RehearsalDialog, rehearsal_folder
 from study_app.gui.theme import DARK
 from study_app.protocol.load import load, source_bytes
+from study_app.store.exclusions import exclude
 from study_app.store.session import begin
 
 # The platform without a screen cannot limit or raise windows, and says so.
 
 
-@pytest.fixture
-def results(tmp_path):
-    folder = tmp_path / "results"
+def hold(folder, participant, *, simulated=False):
     with begin(
-        folder / "demo",
+        folder,
         load("demo"),
         source_bytes("demo"),
-        "P001",
+        participant,
         seed=1,
         operator="",
         language="en",
         device={"name": "mouse"},
         screens={},
-        simulated=False,
+        simulated=simulated,
     ) as store:
         store.finish("completed")
+
+
+@pytest.fixture
+def results(tmp_path):
+    folder = tmp_path / "results"
+    hold(folder / "demo", "P001")
     return folder
 
 
@@ -61,6 +66,35 @@ def test_sessions_are_listed_with_status_and_answers(home):
     assert line.answers.text() == "0 of 8"
     demo = next(card for card in study_cards(home) if card.facts.protocol.study.name == "demo")
     assert demo.held.text() == "1 session, 1 complete"
+
+
+def test_a_simulated_session_says_so_in_full_in_the_smallest_window(qtbot, tmp_path):
+    hold(tmp_path / "demo", "P001", simulated=True)
+    window = HomeWindow(tmp_path)
+    qtbot.addWidget(window)
+    window.resize(window.minimumSize())
+    window.show()
+    qtbot.waitUntil(lambda: bool(window.sessions.lines))
+    QApplication.processEvents()
+    line = window.sessions.lines[0]
+    (kind,) = [one for one in line.findChildren(QLabel) if one.text() == "simulated"]
+    for widget in (kind, *(one for one in line.findChildren(QLabel) if one.text() == "demo")):
+        assert widget.fontMetrics().horizontalAdvance(widget.text()) <= widget.width()
+        assert widget.height() >= widget.fontMetrics().height()
+        assert line.rect().contains(widget.geometry().translated(widget.parentWidget().mapTo(line, QPoint())))
+    assert "simulated" in line.accessibleName()
+
+
+def test_an_excluded_session_is_not_called_valid(qtbot, tmp_path):
+    hold(tmp_path / "demo", "P001")
+    hold(tmp_path / "demo", "P002")
+    exclude(tmp_path / "demo", "P001", 1, by="AB", reason="fell asleep")
+    window = HomeWindow(tmp_path)
+    qtbot.addWidget(window)
+    window.show_sessions()
+    said = {line.accessibleName().split(",")[0]: line.validity for line in window.sessions.lines}
+    assert (said["P001"].word, said["P002"].word) == ("Excluded", "Open")
+    assert "fell asleep" in said["P001"].toolTip()
 
 
 def test_an_empty_results_folder_says_so(qtbot, tmp_path):
