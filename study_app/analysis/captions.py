@@ -15,6 +15,9 @@ REASONS: Final = 5
 REASON_SIGNS: Final = 80
 """Of so many reasons for exclusions so much is told; the codebook of an export holds all."""
 
+FILES: Final = 3
+"""Of files that are not as recorded so many are named."""
+
 _NUMBERS: Final = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
 
 
@@ -75,6 +78,7 @@ def _sentences(study: Study, block: Block) -> list[str]:
         _unanswered(study, block),
         *gone,
         _invalid(study, block),
+        _doubtful(study),
     ]
 
 
@@ -165,6 +169,15 @@ def _invalid(study: Study, block: Block) -> str:
     if not invalid:
         return ""
     return f"{invalid} of {len(rows)} trials exceeded the protocol's limits of timing and are included."
+
+
+def _doubtful(study: Study) -> str:
+    if not study.doubts:
+        return ""
+    names = sorted({doubt.path.relative_to(study.folder).as_posix() for doubt in study.doubts})
+    more = f" and {len(names) - FILES} more" if len(names) > FILES else ""
+    files = "file is" if len(names) == 1 else "files are"
+    return f"{len(names)} {files} not as recorded, and used as found: {', '.join(names[:FILES])}{more}."
 
 
 def _counted_trials(study: Study, block: Block) -> pd.DataFrame:

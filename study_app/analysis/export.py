@@ -6,7 +6,7 @@ Settings are codes until the key was opened; then condition, liquid and delay (a
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
@@ -78,8 +78,10 @@ MEASURED: Final = (
 )
 
 
-def export(folder: Path, to: Path) -> tuple[Path, ...]:
+def export(folder: Path, to: Path, *, warn: Callable[[str], object] | None = None) -> tuple[Path, ...]:
     """Write responses, trials, aggregate and codebook of a study into the folder ``to``; return the files.
+
+    Files that are not as they were recorded are used as they are: ``warn`` is told of each, and the codebook names it.
 
     Raises
     ------
@@ -100,7 +102,9 @@ def export(folder: Path, to: Path) -> tuple[Path, ...]:
     files = {names[name]: csv_bytes(columns, rows) for name, (columns, rows) in tables.items()}
     described = {names[name]: [_described(column) for column in columns] for name, (columns, _) in tables.items()}
     codebook = json.dumps(_codebook(study, described), indent=2, ensure_ascii=False)
-    return write_files(Path(to), {**files, "codebook.json": f"{codebook}\n".encode()})
+    written = write_files(Path(to), {**files, "codebook.json": f"{codebook}\n".encode()})
+    study.tell_doubts(warn)
+    return written
 
 
 def _rows(study: Study, table: pd.DataFrame) -> Iterator[dict[str, Any]]:
@@ -169,6 +173,9 @@ def _codebook(study: Study, files: Mapping[str, Any]) -> dict[str, Any]:
         "missing": MISSING,
         "blinded": not study.revealed,
         "key_opened": list(blinding.reveals(study.folder)),
+        "doubts": [
+            {"file": doubt.path.relative_to(study.folder).as_posix(), "what": doubt.what} for doubt in study.doubts
+        ],
         "exclusions": [asdict(one) for one in study.exclusions],
         "blocks": [
             {

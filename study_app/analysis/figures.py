@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -88,10 +88,11 @@ def render(study: Study, block: Block, form: str) -> bytes:
     )
 
 
-def plot(folder: Path, to: Path) -> tuple[Path, ...]:
+def plot(folder: Path, to: Path, *, warn: Callable[[str], object] | None = None) -> tuple[Path, ...]:
     """Write every figure of a study as PNG, SVG and PDF, each with its caption as text, into the folder ``to``.
 
-    The same results give the same bytes. Returns the files written.
+    The same results give the same bytes. Returns the files written. Files that are not as they were recorded are used
+    as they are: ``warn`` is told of each, and the captions say how many.
 
     Raises
     ------
@@ -111,7 +112,9 @@ def plot(folder: Path, to: Path) -> tuple[Path, ...]:
             for form in style.FORMATS:
                 files[f"{name}.{form}"] = render(study, block, form)
             files[f"{name}.txt"] = f"{captions.caption(study, block)}\n".encode()
-    return write_files(Path(to), files)
+    written = write_files(Path(to), files)
+    study.tell_doubts(warn)
+    return written
 
 
 def _only(study: Study, kind: Kind) -> Block:

@@ -31,20 +31,21 @@ def table(path: Path, columns: tuple[Column, ...]) -> pd.DataFrame:
         text = path.read_bytes().decode("utf-8")
         rows = list(csv.reader(io.StringIO(text, newline=""), strict=True))
     except OSError as error:
-        raise unreadable(path, error) from error
+        why = error.strerror or type(error).__name__
+        raise AnalysisError(f"{path} cannot be read ({why}): {_again(path)}, or mend the permissions") from error
     except (UnicodeDecodeError, csv.Error) as error:
-        raise AnalysisError(f"{path} is damaged ({error}): restore it from a copy") from error
+        raise AnalysisError(f"{path} is damaged ({error}): {_again(path)}") from error
     names = header(columns)
     if not rows or tuple(rows[0]) != names:
         raise AnalysisError(
             f"{path} does not begin with the columns of this table: it was changed, or written by another version of "
-            f"the program (expected {', '.join(names[:4])} …, {len(names)} columns)"
+            f"the program (expected {', '.join(names[:4])} …, {len(names)} columns); {_again(path)}"
         )
     for number, row in enumerate(rows[1:], start=1):
         if len(row) != len(names):
             raise AnalysisError(
                 f"{path}, row {number}: {len(row)} cells instead of {len(names)}: the file was cut off or changed; "
-                "restore it from a copy"
+                f"{_again(path)}"
             )
     cells = zip(*rows[1:], strict=True) if len(rows) > 1 else ([] for _ in names)
     return pd.DataFrame(
@@ -77,6 +78,11 @@ def unreadable(path: Path, error: OSError) -> AnalysisError:
     return AnalysisError(f"{path} cannot be read ({why}): restore it from a copy, or mend the permissions")
 
 
+def _again(path: Path) -> str:
+    """Say how a session's table comes to be what it was."""
+    return f"make it again from the journal: liquid-study rebuild {path.parent}"
+
+
 def _typed(path: Path, column: Column, cells: Sequence[str]) -> pd.Series[Any]:
     parse = _PARSERS[column.kind]
     values = []
@@ -85,8 +91,7 @@ def _typed(path: Path, column: Column, cells: Sequence[str]) -> pd.Series[Any]:
             values.append(_cell(column, cell, parse))
         except ValueError as error:
             raise AnalysisError(
-                f"{path}, row {number}, column {column.name}: {cell!r} is not {_permitted(column)}; restore the file "
-                "from a copy"
+                f"{path}, row {number}, column {column.name}: {cell!r} is not {_permitted(column)}; {_again(path)}"
             ) from error
     return pd.Series(values, dtype=_TYPES[column.kind], name=column.name)
 

@@ -99,11 +99,13 @@ def _check_answers(session: Session) -> None:
         if (block, item) not in items or (block, code) not in codes:
             raise AnalysisError(
                 f"{path}, row {row}: the receipt knows no statement {item!r} on a setting {code!r} in block {block!r}: "
-                "the file was changed or belongs to another study; restore it from a copy"
+                "the file was changed or belongs to another study; make it again from the journal: "
+                f"liquid-study rebuild {session.folder.path}"
             )
     twice = session.responses[session.responses.duplicated(["trial", "attempt", "item"])]
     if len(twice):
         raise AnalysisError(
             f"{path}, row {twice.index[0] + 1}: the answer to {twice['item'].iloc[0]!r} in trial "
-            f"{twice['trial'].iloc[0]} stands there twice; restore the file from a copy"
+            f"{twice['trial'].iloc[0]} stands there twice; make the table again from the journal: liquid-study rebuild "
+            f"{session.folder.path}"
         )

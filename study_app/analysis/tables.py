@@ -8,7 +8,7 @@ apart by their ``phase``.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -21,8 +21,10 @@ from study_app.analysis.questions import Block, Kind, Setting, settings_of
 from study_app.analysis.sessions import Session, read_session
 from study_app.errors import AnalysisError
 from study_app.store import blinding
+from study_app.store.doubts import Doubt, doubts
 from study_app.store.exclusions import Exclusion, exclusions
 from study_app.store.layout import StudyFolder
+from study_app.store.open_session import Place
 
 COMPLETED: Final = "completed"
 _TRIAL: Final = ["participant", "session", "trial"]
@@ -35,7 +37,8 @@ class Study:
     ``responses`` and ``trials`` have the columns of ``store.columns``, with ``session_status``, ``excluded``,
     ``exclusion_reason`` and ``counted`` added; ``participants`` has a row a session, with the last three. ``blocks``
     are the main blocks that ask something; ``settings`` says what every (block, code) stands for, and is empty while
-    the key is sealed; ``exclusions`` is what was decided to leave out.
+    the key is sealed; ``exclusions`` is what was decided to leave out; ``doubts`` are files that are not as they were
+    recorded, and are used as they are.
     """
 
     folder: Path
@@ -48,6 +51,7 @@ class Study:
     trials: pd.DataFrame
     participants: pd.DataFrame
     exclusions: tuple[Exclusion, ...]
+    doubts: tuple[Doubt, ...] = ()
 
     @property
     def people(self) -> tuple[str, ...]:
@@ -83,6 +87,13 @@ class Study:
     def revealed(self) -> bool:
         """Whether the key was opened, so that settings have names."""
         return bool(self.settings)
+
+    def tell_doubts(self, warn: Callable[[str], object] | None) -> None:
+        """Say a line of every file that is not as it was recorded."""
+        if warn is None:
+            return
+        for doubt in self.doubts:
+            warn(f"warning: {doubt}; used here as it is")
 
     def blocks_of(self, kind: Kind) -> tuple[Block, ...]:
         """Return the blocks that compare liquids, or delays."""
@@ -147,6 +158,7 @@ def load_study(folder: Path) -> Study:
         trials=_with_counted(with_excluded(trials, listed), last),
         participants=_sessions(with_excluded(pd.DataFrame([session.facts for session in records]), listed)),
         exclusions=listed,
+        doubts=tuple(doubt for one in records for doubt in doubts(Place(place, one.folder, one.study))),
     )
 
 

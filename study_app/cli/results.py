@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import click
@@ -16,7 +17,7 @@ def export(results: Path, to: Path) -> None:
     """Write the tidy tables of all participants, with a codebook."""
     from study_app.analysis.export import export as export_study
 
-    for written in export_study(results, to):
+    for written in export_study(results, to, warn=partial(click.echo, err=True)):
         click.echo(written)
 
 
@@ -27,7 +28,7 @@ def plot(results: Path, to: Path) -> None:
     """Draw the responses: by code until unblinded, by name after."""
     from study_app.analysis.figures import plot as plot_study
 
-    for written in plot_study(results, to):
+    for written in plot_study(results, to, warn=partial(click.echo, err=True)):
         click.echo(written)
 
 

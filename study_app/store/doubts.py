@@ -1,0 +1,101 @@
+"""Whether what an analysis reads of a session is what was recorded: its tables, its journal and its receipt.
+
+`verify` checks everything and takes its time; this looks at the few files behind every number, each time they are read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import zip_longest
+from pathlib import Path
+
+from study_app.errors import StoreError
+from study_app.store import journal
+from study_app.store.atomic import is_there
+from study_app.store.checksums import hashed, read_checksums
+from study_app.store.journal import Contents
+from study_app.store.open_session import Place, table_files
+from study_app.store.opening import is_open
+
+CHANGED = "has changed since the session ended (its checksum differs)"
+
+
+@dataclass(frozen=True, slots=True)
+class Doubt:
+    """A file that is not what was recorded, and what to do about it."""
+
+    path: Path
+    what: str
+    remedy: str
+
+    def __str__(self) -> str:
+        return f"{self.path} {self.what}: {self.remedy}"
+
+
+def doubts(place: Place) -> tuple[Doubt, ...]:
+    """Return what cannot be trusted of a session's journal, receipt and tables: one doubt a file at most.
+
+    A table is compared with what the journal gives, unless the journal itself is doubtful; all of them, once the
+    session has ended, with their checksums. A session that is open in a program is not judged: its tables follow.
+    """
+    folder = place.folder
+    if is_open(folder.path):
+        return ()
+    restore = f"restore it from a copy; liquid-study verify {place.study_folder.path} checks everything"
+    if not is_there(folder.journal):
+        return (Doubt(folder.journal, "is missing, and nothing else proves the tables", restore),)
+    try:
+        contents = journal.scan(folder.journal)
+    except StoreError as error:
+        return (Doubt(folder.journal, f"cannot be read ({error})", restore),)
+    if contents.damage is not None:
+        return (Doubt(folder.journal, f"is damaged ({contents.damage.removeprefix(f'{folder.journal}, ')})", restore),)
+    listed, sealed = _listed(place, contents)
+    found = {doubt.path: doubt for doubt in sealed}
+    changed = {path: Doubt(path, CHANGED, restore) for path in _changed(place, listed)}
+    found |= {path: doubt for path, doubt in changed.items() if path in (folder.journal, folder.receipt)}
+    if folder.journal not in found:
+        found |= {doubt.path: doubt for doubt in _tables(place, contents, restore)}
+    return tuple((changed | found).values())
+
+
+def _listed(place: Place, contents: Contents) -> tuple[Mapping[str, str], tuple[Doubt, ...]]:
+    """Return the checksums made when the session had ended, and what is wrong with their list.
+
+    Where there is one the session had ended, whatever is left of its journal.
+    """
+    ended = bool(contents.lines) and contents.lines[-1]["event"] == "session_ended"
+    if not ended and not is_there(place.folder.checksums):
+        return {}, ()
+    try:
+        return read_checksums(place.folder), ()
+    except StoreError:
+        remedy = f"restore it from a copy, or let liquid-study rebuild {place.folder.path} make it from the files there"
+        return {}, (Doubt(place.folder.checksums, "is missing or no list of checksums", remedy),)
+
+
+def _changed(place: Place, listed: Mapping[str, str]) -> Iterator[Path]:
+    """Yield journal, receipt and tables that are not those the checksums are of; a missing one is said elsewhere."""
+    folder = place.folder
+    tables = (folder.table(place.study, name) for name in ("responses", "trials"))
+    for path in (folder.journal, folder.receipt, *tables):
+        name = path.relative_to(folder.path).as_posix()
+        if name in listed and is_there(path) and hashed(folder, name) != listed[name]:
+            yield path
+
+
+def _tables(place: Place, contents: Contents, restore: str) -> Iterator[Doubt]:
+    """Yield the tables that are not what the journal gives."""
+    try:
+        expected = table_files(place, contents.lines)
+    except (StoreError, KeyError) as error:
+        yield Doubt(place.folder.journal, f"gives no tables ({error})", restore)
+        return
+    for path, content in expected:
+        there = path.read_bytes() if is_there(path) else b""
+        if there != content:
+            pairs = zip_longest(there.split(b"\n"), content.split(b"\n"))
+            line = next(number for number, (ours, theirs) in enumerate(pairs, start=1) if ours != theirs)
+            what = f"is not what the journal gives, from line {line} on" if is_there(path) else "is missing"
+            yield Doubt(path, what, f"liquid-study rebuild {place.folder.path} makes it again from the journal")
