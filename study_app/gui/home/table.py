@@ -39,7 +39,7 @@ def _columns(widget: QWidget) -> QGridLayout:
     grid.setContentsMargins(MARGIN, 0, MARGIN, 0)
     grid.setHorizontalSpacing(8)
     for column, (_, width) in enumerate(COLUMNS):
-        grid.setColumnMinimumWidth(column, width if column in {3, 4} else width // 2)
+        grid.setColumnMinimumWidth(column, width if column in {3, 4, 5} else width // 2)
         grid.setColumnStretch(column, width)
     return grid
 
@@ -118,7 +118,9 @@ class SessionsCard(Card):
         self.where.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         grid.addWidget(self.where, 0, 2, 1, 4)
         for column, (name, _) in enumerate(COLUMNS):
-            grid.addWidget(label(name, "small", "text2"), 1, column)
+            word = Elided("small", "text2")
+            word.show_text(name)
+            grid.addWidget(word, 1, column)
         grid.setVerticalSpacing(10)
         self.column.addWidget(head)
         self.lines: list[SessionLine] = []
