@@ -99,12 +99,21 @@ def within_limits(measured: Mapping[str, Any], limits: Mapping[str, float]) -> b
 
     ``limits`` are those of the journal's first line, or ``Limits`` of a protocol as a mapping.
     """
-    judged = [
-        abs(measured[measure]) <= limits[limit]
+    judged = _judged(measured, limits)
+    return not beyond_limits(measured, limits) if judged else None
+
+
+def beyond_limits(measured: Mapping[str, Any], limits: Mapping[str, float]) -> tuple[tuple[str, float, float], ...]:
+    """Return which of a trial's measured columns break a limit: the column's name, its value and the limit."""
+    return tuple(one for one in _judged(measured, limits) if not abs(one[1]) <= one[2])
+
+
+def _judged(measured: Mapping[str, Any], limits: Mapping[str, float]) -> list[tuple[str, float, float]]:
+    return [
+        (measure, measured[measure], limits[limit])
         for measure, limit in _JUDGED
         if measured.get(measure) is not None and limit in limits
     ]
-    return all(judged) if judged else None
 
 
 def latest(rows: Iterable[Row]) -> list[Row]:

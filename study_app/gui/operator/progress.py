@@ -7,14 +7,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, TypeAlias
 
 from study_app.protocol.model import Protocol
 from study_app.protocol.schedule import PageStep, Schedule, Trial
-from study_app.store.tables import within_limits
+from study_app.store.tables import beyond_limits
 
 # A block of more trials than this is one row of the rail ("Delay settings 1 to 7"), so that a day's study fits it.
 ROWS_PER_BLOCK = 4
+
+Beyond: TypeAlias = tuple[str, float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,8 +33,8 @@ class SessionProgress:
     """What the journal of a session of ``protocol`` says so far.
 
     ``step`` indexes the schedule's steps (−1 before the first); ``durations_s`` holds the steps left behind;
-    ``answers`` counts the answered items of each trial, ``trials_done`` says of each trial whether nothing
-    measured in it broke the protocol's limits.
+    ``answers`` counts the answered items of each trial, ``trials_done`` says of each trial what was measured in it
+    that broke the protocol's limits: column, value and limit.
     """
 
     protocol: Protocol
@@ -42,7 +44,7 @@ class SessionProgress:
     durations_s: Mapping[int, float] = field(default_factory=dict)
     trial_since_s: float | None = None
     trial_lasted_s: float | None = None
-    trials_done: Mapping[int, bool] = field(default_factory=dict)
+    trials_done: Mapping[int, tuple[Beyond, ...]] = field(default_factory=dict)
     answers: Mapping[int, int] = field(default_factory=dict)
     notes: tuple[NoteLine, ...] = ()
     repeats: int = 0
@@ -69,7 +71,7 @@ class SessionProgress:
     @property
     def trials_within_limits(self) -> int:
         """How many finished trials kept the protocol's limits of lateness, gap and delay error."""
-        return sum(self.trials_done.values())
+        return sum(not beyond for beyond in self.trials_done.values())
 
     def after(self, event: str, at_s: float, fields: Mapping[str, Any]) -> SessionProgress:
         """Return the progress once ``event`` is on disk; events that say nothing about progress only count as saved."""
@@ -109,7 +111,7 @@ def _without(progress: SessionProgress, number: int) -> SessionProgress:
     return replace(
         progress,
         answers={trial: count for trial, count in progress.answers.items() if trial != number},
-        trials_done={trial: within for trial, within in progress.trials_done.items() if trial != number},
+        trials_done={trial: beyond for trial, beyond in progress.trials_done.items() if trial != number},
     )
 
 
@@ -118,8 +120,8 @@ def _trial_ended(progress: SessionProgress, at_s: float, fields: Mapping[str, An
     progress = replace(progress, trial_lasted_s=lasted)
     if fields["outcome"] not in {"complete", "timeout"}:
         return progress
-    within = within_limits(fields, progress.protocol.limits.model_dump())
-    return replace(progress, trials_done={**progress.trials_done, fields["trial"]: within is not False})
+    beyond = beyond_limits(fields, progress.protocol.limits.model_dump())
+    return replace(progress, trials_done={**progress.trials_done, fields["trial"]: beyond})
 
 
 def _responses(progress: SessionProgress, _at_s: float, fields: Mapping[str, Any]) -> SessionProgress:

@@ -114,6 +114,7 @@ class Rail(Card):
         self._scroll.setWidget(self._steps)
         self._counts_column = QVBoxLayout()
         self._counts_column.setSpacing(8)
+        self.beyond = label("", "small", "warn", wraps=True)
         self._lay_out()
 
     def _lay_out(self) -> None:
@@ -135,6 +136,7 @@ class Rail(Card):
         self.column.addWidget(Rule())
         self.column.addSpacing(6)
         self.column.addLayout(self._counts_column)
+        self.column.addWidget(self.beyond)
 
     def narrow(self, yes: bool) -> None:
         """Take less room in a small window."""
@@ -148,6 +150,7 @@ class Rail(Card):
         self._show_time(view)
         self._show_steps(view.steps)
         self._show_counts(view.counts)
+        self._show_beyond(view.beyond)
 
     def _show_heading(self, text: str) -> None:
         if text == self.heading.text():
@@ -207,3 +210,9 @@ class Rail(Card):
         for (name, value), (word, number) in zip(self.counts, counts, strict=True):
             name.setText(word)
             value.setText(number)
+
+    def _show_beyond(self, beyond: tuple[str, ...]) -> None:
+        """Show which limit the newest trial out of limits broke; the tip tells all of them."""
+        self.beyond.setVisible(bool(beyond))
+        self.beyond.setText(f"{beyond[0]}." if beyond else "")
+        self.beyond.setToolTip("\n".join(beyond) if len(beyond) > 1 else "")

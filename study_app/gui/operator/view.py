@@ -17,6 +17,14 @@ State = Literal["preparing", "running", "paused", "force off", "trouble", "ended
 Verdict = Literal["ok", "late", "open"]
 StepState = Literal["done", "now", "open"]
 
+MEASURES = {
+    "lateness_p99_ms": "servo lateness, p99,",
+    "worst_gap_ms": "longest gap of the servo",
+    "delay_error_p95_ms": "delay error, p95,",
+    "worst_frame_gap_ms": "longest gap between frames",
+}
+"""What is judged in a trial, as the operator's window calls it."""
+
 THIN_SPACE = "\u2009"
 NOTES_SHOWN = 3
 
@@ -71,7 +79,8 @@ class OperatorView:
     """Everything on the operator's window except the two plots' points.
 
     ``trial`` is the number of the trial under way or answered. ``waits`` says that the trouble is a disk that takes
-    nothing: the session goes on when it does again.
+    nothing: the session goes on when it does again. ``beyond`` says of each trial out of limits which it broke, the
+    newest first.
     """
 
     study: str
@@ -98,6 +107,7 @@ class OperatorView:
     over: bool
     trial: int | None = None
     waits: bool = False
+    beyond: tuple[str, ...] = ()
 
     @property
     def share(self) -> float:
@@ -180,6 +190,7 @@ def operator_view(
         over=state == "ended",
         trial=None if trial is None else trial.number,
         waits=waits,
+        beyond=_beyond(session, progress),
     )
 
 
@@ -303,6 +314,17 @@ def _counts(session: Session, progress: SessionProgress) -> tuple[tuple[str, str
         ("Answers on disk", f"{sum(progress.answers.values())} of {session.answers_of}"),
         ("Trials within limits", f"{progress.trials_within_limits} of {len(progress.trials_done)}"),
         ("Marks, repeats", f"{progress.marks}, {progress.repeats}"),
+    )
+
+
+def _beyond(session: Session, progress: SessionProgress) -> tuple[str, ...]:
+    """Return a sentence for every finished trial that broke a limit, the newest first."""
+    labels = {trial.number: trial.label(session.protocol, session.language) for trial in progress.schedule.trials}
+    return tuple(
+        f"{labels[number]} out of limits: "
+        + "; ".join(f"{MEASURES[measure]} {value:.3g} ms, limit {limit:g} ms" for measure, value, limit in beyond)
+        for number, beyond in reversed(tuple(progress.trials_done.items()))
+        if beyond
     )
 
 

@@ -47,7 +47,7 @@ def test_a_trial_beyond_a_limit_is_done_but_not_within_limits(told):
     told.answer(1)
     told.start(2)
     told.end(2, lateness_p99_ms=limit * 1.1)
-    assert told.progress.trials_done == {1: True, 2: False}
+    assert told.progress.trials_done == {1: (), 2: (("lateness_p99_ms", limit * 1.1, limit),)}
     assert told.progress.trials_within_limits == 1
 
 
@@ -56,10 +56,10 @@ def test_a_picture_that_came_too_early_is_judged_as_in_the_trials_table(told):
     told.start(1)
     told.end(1, delay_error_p95_ms=-40.0)
     assert within_limits({"delay_error_p95_ms": -40.0}, told.protocol.limits.model_dump()) is False
-    assert told.progress.trials_done == {1: False}
+    assert told.progress.trials_done == {1: (("delay_error_p95_ms", -40.0, 25.0),)}
     told.start(2)
     told.end(2)
-    assert told.progress.trials_done == {1: False, 2: True}
+    assert told.progress.trials_within_limits == 1
 
 
 def test_a_repeat_takes_back_the_trials_answers(told):

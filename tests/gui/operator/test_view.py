@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 
-from study_app.gui.operator.view import duration_words, grouped, minutes
+from study_app.gui.operator.view import MEASURES, duration_words, grouped, minutes
+from study_app.store.columns import TRIALS, header
+from study_app.store.tables import beyond_limits
 
 SECRETS = ("thin", "thick", "prompt", "200")
 
@@ -146,6 +148,27 @@ def test_counts_are_of_what_is_on_disk(told):
     assert counts["Answers on disk"] == "2 of 8"
     assert counts["Trials within limits"] == "1 of 1"
     assert counts["Marks, repeats"] == "1, 0"
+
+
+def test_a_trial_out_of_limits_says_which_and_by_how_much_the_newest_first(told):
+    told.welcome()
+    told.start(1)
+    told.end(1, lateness_p99_ms=1.0, worst_gap_ms=31.25)
+    told.start(2)
+    told.end(2, lateness_p99_ms=1.0)
+    told.start(3)
+    told.end(3, delay_error_p95_ms=27.211752, worst_frame_gap_ms=300.0)
+    assert told.view().beyond == (
+        "Delay setting 1 out of limits: delay error, p95, 27.2 ms, limit 25 ms; longest gap between frames 300 ms, "
+        "limit 250 ms",
+        "Liquid setting 1 out of limits: longest gap of the servo 31.2 ms, limit 20 ms",
+    )
+
+
+def test_every_limit_of_a_trial_has_a_name_for_the_operator(told):
+    bad = dict.fromkeys(header(TRIALS), 1000000000.0)
+    judged = {measure for measure, _, _ in beyond_limits(bad, told.protocol.limits.model_dump())}
+    assert judged == set(MEASURES)
 
 
 def test_tiles_judge_by_the_asked_rate_and_the_protocols_limit(told, health):
