@@ -12,7 +12,8 @@ from typing import Any, Self
 import numpy as np
 
 from study_app.devices.base import Device
-from study_app.devices.hand import HAND, HOLD, ORDER, move_hand, post
+from study_app.devices.hand import HAND, move_hand
+from study_app.devices.hand_orders import HandOrders
 from study_app.haptics.cfunctions import READ, READ_LOST, READ_NEW, READ_NOTHING_NEW, WRITE, c_function, record_at
 from study_app.haptics.layout import READING, records
 from study_app.haptics.plant import HANDLE, let_go, measure, move, push
@@ -35,7 +36,7 @@ _reading_at = record_at(READING)
 _LONGEST_STEP_S = 0.05  # a loop that stood still for longer must not spend longer still on catching up
 
 
-class SimulatedDevice(Device):
+class SimulatedDevice(HandOrders, Device):
     """A handle that somebody moves; ``name``, hand and numbers come from the subclass.
 
     Parameters
@@ -48,44 +49,18 @@ class SimulatedDevice(Device):
     name = ""
 
     def __init__(self, handle: Any, workspace_m: tuple[float, float, float], force_limit_n: float) -> None:
-        self.workspace_m = workspace_m
-        self.force_limit_n = force_limit_n
         self._memory = records(SIMULATED, 1)
-        self._state = self._memory[0]
+        super().__init__(self._memory[0], workspace_m)
+        self.force_limit_n = force_limit_n
         self._state.handle = handle
         self._state.handle.stop_m = workspace_m
-        self._order = records(ORDER, 1)
         self.context = int(self._memory.ctypes.data)
         self.read, self.write = _functions()
         self.hold(0.0, 0.0, 0.0)
 
-    def press(self, buttons: int) -> None:
-        """Hold down exactly these buttons: button 1 is bit 0."""
-        self._state.buttons = buttons
-
-    def release(self) -> None:
-        """Let go of every button."""
-        self._state.buttons = 0
-
-    def hold(self, x_m: float, y_m: float, z_m: float) -> None:
-        """Hold the handle at a place at once [m, hand frame]."""
-        self._post(HOLD, target_m=self._inside(x_m, y_m, z_m))
-
     def unplug(self) -> None:
         """Answer no more, as a device whose cable was pulled."""
         self._state.unplugged = 1
-
-    @property
-    def aim_m(self) -> tuple[float, float, float]:
-        """Where the hand (or the pointer) means to be now [m, hand frame]."""
-        x, y, z = self._state.hand.aim_m
-        return float(x), float(y), float(z)
-
-    @property
-    def moving(self) -> bool:
-        """Whether the last order is still being carried out."""
-        hand = self._state.hand
-        return bool(hand.moving) or bool(hand.serial != hand.taken)
 
     def open(self) -> None:
         """Plug it in."""
@@ -118,18 +93,6 @@ class SimulatedDevice(Device):
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
-
-    def _inside(self, x_m: float, y_m: float, z_m: float) -> tuple[float, float, float]:
-        """Return the nearest place the handle can reach."""
-        x, y, z = (min(max(v, -half), half) for v, half in zip((x_m, y_m, z_m), self.workspace_m, strict=True))
-        return x, y, z
-
-    def _post(self, kind: int, **fields: Any) -> None:
-        order = self._order[0]
-        order.kind = kind
-        for name, value in fields.items():
-            setattr(order, name, value)
-        post(self._state.hand, order)
 
 
 @cache
