@@ -32,7 +32,7 @@ MECHANISM = np.dtype(
         ("cos", np.float64, (3,)),  # of the arms' azimuths
         ("sin", np.float64, (3,)),
         ("rad_per_count", np.float64),
-        ("zero_rad", np.float64, (3,)),  # an arm's theta where its encoder counts 0
+        ("zero_rad", np.float64),  # an arm's theta where its encoder counts 0
         ("units_per_nm", np.float64),  # motor units for an arm torque of one newton metre
     ],
     align=True,
@@ -46,12 +46,11 @@ START_M: Final = (0.0, 0.0, 0.12)
 """Where `forward` finds every pose of the workspace from."""
 
 _STEPS = 30
+_LEAST_ROD_M = 1e-6  # what is seen of a rod that lies across its arm
 _ENOUGH_M = 1e-12  # a step so small ends Newton's method: its error is then of the order of rounding
 
 
-def new_mechanism(
-    geometry: Geometry, units_per_nm: float, arm_offset_rad: tuple[float, float, float] = (0.0, 0.0, 0.0)
-) -> Any:
+def new_mechanism(geometry: Geometry, units_per_nm: float, arm_offset_rad: float = 0.0) -> Any:
     """Return the record of a Falcon: published measures, and what calibration found of this one."""
     mechanism = records(MECHANISM, 1)[0]
     mechanism.arm_m, mechanism.rod_m, mechanism.ends_m = geometry.arm_m, geometry.rod_m, geometry.ends_m
@@ -60,7 +59,7 @@ def new_mechanism(
     mechanism.cos = [math.cos(azimuth) for azimuth in geometry.azimuths_rad]
     mechanism.sin = [math.sin(azimuth) for azimuth in geometry.azimuths_rad]
     mechanism.rad_per_count = geometry.rad_per_count
-    mechanism.zero_rad = [geometry.zero_rad + offset for offset in arm_offset_rad]
+    mechanism.zero_rad = geometry.zero_rad + arm_offset_rad
     mechanism.units_per_nm = units_per_nm
     return mechanism
 
@@ -69,7 +68,7 @@ def new_mechanism(
 def angles(mechanism: Any, counts: Any, theta: Any) -> None:
     """Write into ``theta`` (3,) [rad] what ``counts`` (3,) of the encoders say."""
     for i in range(3):
-        theta[i] = counts[i] * mechanism.rad_per_count + mechanism.zero_rad[i]
+        theta[i] = counts[i] * mechanism.rad_per_count + mechanism.zero_rad
 
 
 @kernel
@@ -97,6 +96,9 @@ def forward(mechanism: Any, theta: Any, position_m: Any) -> int:
 
     Returns ``REACHED``; or ``OUTSIDE``, and the position is as it was.
     """
+    for i in range(3):
+        if not abs(theta[i]) < math.pi:
+            return OUTSIDE
     x, y, z, status = _newton(mechanism, theta, position_m[0], position_m[1], position_m[2])
     if status != REACHED:
         x, y, z, status = _newton(mechanism, theta, START_M[0], START_M[1], START_M[2])
@@ -117,6 +119,8 @@ def _newton(mechanism: Any, theta: Any, x: float, y: float, z: float) -> tuple[f
         (c0x, c0y, c0z), (c1x, c1y, c1z) = _cross(x1, y1, z1, x2, y2, z2), _cross(x2, y2, z2, x0, y0, z0)
         c2x, c2y, c2z = _cross(x0, y0, z0, x1, y1, z1)
         determinant = x0 * c0x + y0 * c0y + z0 * c0z
+        if determinant == 0.0:
+            break
         dx = (g0 * c0x + g1 * c1x + g2 * c2x) / determinant
         dy = (g0 * c0y + g1 * c1y + g2 * c2y) / determinant
         dz = (g0 * c0z + g1 * c1z + g2 * c2z) / determinant
@@ -143,13 +147,18 @@ def jacobian(mechanism: Any, theta: Any, position_m: Any, rates: Any) -> None:
 
 @kernel
 def torques(rates: Any, force_n: Any, torque_nm: Any) -> None:
-    """Write into ``torque_nm`` (3,) [N m] the arm torques that push with ``force_n`` (3,) [N]: ``J^T tau = F``."""
+    """Write into ``torque_nm`` (3,) [N m] the arm torques that push with ``force_n`` (3,) [N]: ``J^T tau = F``.
+
+    None at a singular pose, which the mechanism's stops keep it from.
+    """
     r0, r1, r2 = rates[0], rates[1], rates[2]
     x, y, z = force_n[0], force_n[1], force_n[2]
     c0 = _cross(r1[0], r1[1], r1[2], r2[0], r2[1], r2[2])
     c1 = _cross(r2[0], r2[1], r2[2], r0[0], r0[1], r0[2])
     c2 = _cross(r0[0], r0[1], r0[2], r1[0], r1[1], r1[2])
     determinant = r0[0] * c0[0] + r0[1] * c0[1] + r0[2] * c0[2]
+    if determinant == 0.0:
+        x, y, z, determinant = 0.0, 0.0, 0.0, 1.0
     torque_nm[0] = (x * c0[0] + y * c0[1] + z * c0[2]) / determinant
     torque_nm[1] = (x * c1[0] + y * c1[1] + z * c1[2]) / determinant
     torque_nm[2] = (x * c2[0] + y * c2[1] + z * c2[2]) / determinant
@@ -190,16 +199,21 @@ def _across(mechanism: Any, arm: int, p: Any) -> Any:
 
 @kernel
 def _constraint(mechanism: Any, arm: int, cos: float, sin: float, p: Any) -> Any:
-    """Return g of an arm whose angle has this cosine and sine, its slopes along x, y, z and along the angle."""
+    """Return g of an arm whose angle has this cosine and sine, its slopes along x, y, z and along the angle.
+
+    Farther aside than the rod is long there is no such arm: the slope along the angle is 0 then, which no pose has.
+    """
     u, v, w = _along(mechanism, arm, p), _across(mechanism, arm, p), p[2]
     a = mechanism.arm_m
-    rod = math.sqrt(max(mechanism.rod_m * mechanism.rod_m - v * v, 0.0))
+    square = mechanism.rod_m * mechanism.rod_m - v * v
+    rod = math.sqrt(max(square, _LEAST_ROD_M * _LEAST_ROD_M))
+    turn = 2.0 * a * (u * sin - w * cos) if square > 0.0 else 0.0
     length = mechanism.ends_m + rod
     du, dw = u - a * cos, w - a * sin
     along_u, along_v, along_w = 2.0 * du, 2.0 * length * v / rod, 2.0 * dw
     along_x = along_u * mechanism.cos[arm] - along_v * mechanism.sin[arm]
     along_y = along_u * mechanism.sin[arm] + along_v * mechanism.cos[arm]
-    return du * du + dw * dw - length * length, along_x, along_y, along_w, 2.0 * a * (u * sin - w * cos)
+    return du * du + dw * dw - length * length, along_x, along_y, along_w, turn
 
 
 @kernel
