@@ -166,7 +166,7 @@ TRIALS: tuple[Column, ...] = (
     _measure("force_peak_n", "Largest magnitude of the force sent to the device.", "N"),
     *(_count(f"limiter_{name}", f"Turns of the servo in which {_LIMITERS[name]}.") for name in LIMITER_NAMES),
     _count("frames", "Frames shown to the participant."),
-    _count("frames_late", "Frames shown later than the protocol's limit allows."),
+    _count("frames_late", "Frames whose delay was more than the limit over the one asked for."),
     Column("delay_error_mean_ms", "number", "Visual delay, achieved less requested: mean.", "ms", may_miss=True),
     Column(
         "delay_error_p95_ms", "number", "Visual delay, achieved less requested: 95th percentile.", "ms", may_miss=True

@@ -20,14 +20,17 @@ LOWEST_US, LEAST_HIGHEST_US = 1.0, 1000.0
 
 @dataclass(frozen=True, slots=True)
 class Vitals:
-    """Figures of the tiles; a rate or percentile is None while too little has been measured."""
+    """Figures of the tiles; a rate or percentile is None while too little has been measured.
+
+    ``refreshes_missed`` are those of the participant's screen, out of so many, that brought no new frame of the tank.
+    """
 
     rate_hz: float | None = None
     lateness_p99_s: float | None = None
     overruns: int = 0
     ticks: int = 0
-    frames: int = 0
-    frames_late: int = 0
+    refreshes: int = 0
+    refreshes_missed: int = 0
     frame_rate_hz: float | None = None
 
 
@@ -55,7 +58,8 @@ class ServoHealth:
         self._frame_gaps_ns = np.zeros(240, np.int64)
         self._last_frame_ns = 0
         self._frames = 0
-        self._frames_late = 0
+        self._refreshes = 0
+        self._missed = 0
         rows = round(TRACE_WINDOW_S / TRACE_STEP_S) + 2
         self._path = np.full((rows, 4), np.nan)  # t [s], x, y, z [m]
         self._path_rows = 0
@@ -78,16 +82,21 @@ class ServoHealth:
         self._path_rows += 1
 
     def frame(self, painted_ns: int) -> None:
-        """Take the time at which a frame of the tank was painted; a gap over 1.5 refreshes is a late frame."""
+        """Take the time at which a frame of the tank was painted; the screen missed every refresh in between.
+
+        Whether what a frame shows is late is another matter: the trial's row has that (``frames_late``).
+        """
         if self._last_frame_ns:
             gap = painted_ns - self._last_frame_ns
             self._frame_gaps_ns[self._frames % len(self._frame_gaps_ns)] = gap
             self._frames += 1
-            self._frames_late += gap > 1.5e9 / self.refresh_hz
+            refreshes = max(1, round(gap * 1e-9 * self.refresh_hz))
+            self._refreshes += refreshes
+            self._missed += refreshes - 1
         self._last_frame_ns = painted_ns
 
     def frames_rest(self) -> None:
-        """Say that the tank is not shown now, so that the gap until it is shown again is no late frame."""
+        """Say that the tank is not shown now, so that the gap until it is shown again misses no refresh."""
         self._last_frame_ns = 0
 
     def vitals(self) -> Vitals:
@@ -98,8 +107,8 @@ class ServoHealth:
             lateness_p99_s=float(np.percentile(self._kept(), 99)) * 1e-9 if self._latenesses else None,
             overruns=self.overruns,
             ticks=self._ticks,
-            frames=self._frames,
-            frames_late=self._frames_late,
+            refreshes=self._refreshes,
+            refreshes_missed=self._missed,
             frame_rate_hz=1e9 / float(np.median(gaps)) if len(gaps) else None,
         )
 

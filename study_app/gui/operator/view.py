@@ -356,11 +356,11 @@ def _tiles(vitals: Vitals, rate_hz: float, limit_s: float) -> tuple[Tile, ...]:
             f"of {grouped(vitals.ticks)} ticks",
         ),
         Tile(
-            "Screen frames late",
-            grouped(vitals.frames_late),
+            "Refreshes missed",
+            grouped(vitals.refreshes_missed),
             "",
-            "open" if vitals.frames == 0 else _verdict(vitals.frames_late <= 0.01 * vitals.frames),
-            f"of {grouped(vitals.frames)}{screen}",
+            "open" if vitals.refreshes == 0 else _verdict(vitals.refreshes_missed <= 0.01 * vitals.refreshes),
+            f"of {grouped(vitals.refreshes)}{screen}",
         ),
     )
 

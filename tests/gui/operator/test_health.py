@@ -55,24 +55,24 @@ def test_the_histogram_counts_every_tick_kept_once():
     assert edges[-1] >= 80_000.0 * 0.99
 
 
-def test_a_frame_is_late_from_one_and_a_half_refreshes_on():
+def test_a_refresh_is_missed_from_a_gap_of_one_and_a_half_on():
     health = ServoHealth(1000.0, refresh_hz=60.0)
     at = 1
-    for gap_ms in (16, 17, 24, 26, 16):
+    for gap_ms in (16, 17, 24, 26, 51, 2):
         health.frame(at)
         at += gap_ms * 1_000_000
     health.frame(at)
     vitals = health.vitals()
-    assert (vitals.frames, vitals.frames_late) == (5, 1)
+    assert (vitals.refreshes, vitals.refreshes_missed) == (6 + 1 + 2, 1 + 2)
 
 
-def test_a_page_between_two_tanks_is_no_late_frame():
+def test_a_page_between_two_tanks_misses_no_refresh():
     health = ServoHealth(1000.0)
     health.frame(1)
     health.frames_rest()
     health.frame(60_000_000_000)
     health.frame(60_016_666_667)
-    assert health.vitals().frames_late == 0
+    assert health.vitals().refreshes_missed == 0
 
 
 def test_the_trace_is_in_order_and_no_longer_than_its_window():
