@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -53,7 +54,7 @@ def resume_at(protocol: Protocol, schedule: Schedule, lines: Iterable[Line]) -> 
 
 def is_rehearsal(session_receipt: Mapping[str, Any]) -> bool:
     """Return whether a session's receipt says that its participant was simulated, and so its screen."""
-    return dict(session_receipt["screens"]) == REHEARSED_SCREENS
+    return bool(session_receipt.get("screens") == REHEARSED_SCREENS)
 
 
 def find_protocol(start: Line, candidates: Iterable[str] | None = None) -> str:
@@ -70,7 +71,10 @@ def find_protocol(start: Line, candidates: Iterable[str] | None = None) -> str:
     """
     own = sorted(path.stem for path in Path("protocols").glob("*.toml"))
     names = dict.fromkeys((*own, *shipped()) if candidates is None else candidates)
-    sources = {name: source_bytes(name) for name in names}
+    sources: dict[str, bytes] = {}
+    for name in names:
+        with contextlib.suppress(ProtocolError):  # a file that cannot be read is no study's
+            sources[name] = source_bytes(name)
     for name, source in sources.items():
         if protocol_hash(source) == start["protocol_hash"]:
             return name

@@ -14,7 +14,7 @@ from study_app.protocol.schedule import PageStep, Trial, build_schedule
 from study_app.session.commands import ShowPage, StartTrial, Write
 from study_app.session.events import Begin
 from study_app.session.machine import advance, open_session
-from study_app.session.resume import find_protocol, resume_at
+from study_app.session.resume import REHEARSED_SCREENS, find_protocol, is_rehearsal, resume_at
 from study_app.session.state import Phase, SessionState
 from tests.session import small
 
@@ -141,3 +141,22 @@ def test_the_protocol_is_found_by_its_hash_then_by_its_study(tmp_path: Path) -> 
     assert find_protocol(exact | {"protocol_hash": "0"}, ["rek2024", "demo"]) == "demo"
     with pytest.raises(SessionError, match="--protocol"):
         find_protocol({"study": "gone", "protocol_hash": "0"}, ["demo"])
+
+
+def test_a_protocol_at_hand_that_cannot_be_read_is_passed_over(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    own = tmp_path / "protocols"
+    (own / "a_folder.toml").mkdir(parents=True)
+    (own / "latin.toml").write_bytes(b"\xff\xfe")
+    (own / "broken.toml").write_bytes(b"[study")
+    (own / "mine.toml").write_bytes(source_bytes("demo") + b"\n# changed\n")
+    monkeypatch.chdir(tmp_path)
+    assert find_protocol({"study": "demo", "protocol_hash": protocol_hash((own / "mine.toml").read_bytes())}) == "mine"
+    assert find_protocol({"study": "demo", "protocol_hash": "0"}) in ("mine", "demo")
+    with pytest.raises(SessionError, match="--protocol"):
+        find_protocol({"study": "gone", "protocol_hash": "0"})
+
+
+def test_a_receipt_without_screens_is_of_no_rehearsal() -> None:
+    assert is_rehearsal({"screens": dict(REHEARSED_SCREENS)})
+    assert not is_rehearsal({"screens": {}})
+    assert not is_rehearsal({})
