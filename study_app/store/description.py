@@ -71,10 +71,26 @@ def described_study(folder: StudyFolder) -> str | None:
 
 
 def check_study(folder: StudyFolder, study: str) -> None:
-    """Refuse a folder that holds another study."""
+    """Refuse a folder that holds another study, or studies in folders of their own, or that lies within one.
+
+    Raises
+    ------
+    StoreError
+        Says what the folder is, and which one to use.
+    """
     described = described_study(folder)
-    if described is not None and described != study:
-        raise StoreError(f"{folder.path} holds the study {described!r}, not {study!r}: use another results folder")
+    if described is not None:
+        if described != study:
+            raise StoreError(f"{folder.path} holds the study {described!r}, not {study!r}: use another results folder")
+        return
+    for above in folder.path.absolute().parents:
+        if is_there(StudyFolder(above).key):
+            raise StoreError(f"{folder.path} lies within {above}, which is a study's folder: use one outside of it")
+    if within := sorted(path.name for path in folder.path.glob("*") if is_there(StudyFolder(path).key)):
+        raise StoreError(
+            f"{folder.path} holds folders of studies ({', '.join(within[:3])}{' ...' if within[3:] else ''}): use one "
+            f"of these or a new one beside them, such as {folder.path / study}"
+        )
 
 
 def _read(path: Path) -> bytes:

@@ -8,6 +8,7 @@ import pytest
 
 from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
+from study_app.store.blinding import open_or_draw_key
 from study_app.store.description import check_study, described_study, description_bytes, write_description
 from study_app.store.exclusions import exclude
 from study_app.store.layout import StudyFolder
@@ -88,3 +89,18 @@ def test_a_description_that_cannot_be_read_is_named(tmp_path: Path, protocol: Pr
     for attempt in (lambda: check_study(folder, "brackish"), lambda: write_description(folder, protocol.study)):
         with pytest.raises(StoreError, match=r"dataset_description\.json cannot be read \(Is a directory\)"):
             attempt()
+
+
+def test_no_study_is_begun_around_or_within_others(tmp_path: Path, protocol: Protocol) -> None:
+    (tmp_path / "dataset_description.json").write_text("{}")  # of a project, which may well hold results
+    results = StudyFolder(tmp_path / "results")
+    study = StudyFolder(results.path / "brackish")
+    study.data.mkdir(parents=True)
+    open_or_draw_key(study.path, protocol)
+    check_study(study, "brackish")
+    check_study(StudyFolder(results.path / "other"), "other")
+    with pytest.raises(StoreError, match=r"holds folders of studies \(brackish\).*results.brackish"):
+        check_study(results, "brackish")
+    for within in (study.data, study.path / "new" / "deep"):
+        with pytest.raises(StoreError, match="which is a study's folder"):
+            check_study(StudyFolder(within), "brackish")
