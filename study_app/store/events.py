@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
+from study_app.errors import StoreError
 from study_app.store.journal import Line
 
 
@@ -63,6 +65,18 @@ EVENTS: tuple[Event, ...] = (
 
 _OF_ALL = ("n", "event", "t_s", "at")
 _BY_NAME = {event.name: event for event in EVENTS}
+
+
+def check_fields(path: Path, lines: Sequence[Line]) -> None:
+    """Refuse a journal with a line that lacks a field of its event.
+
+    Raises
+    ------
+    StoreError
+        Names the line and what it lacks.
+    """
+    for lacking in lacking_fields(lines):
+        raise StoreError(f"{path}, {lacking}: it was changed; restore it from a copy")
 
 
 def unknown_events(lines: Sequence[Line]) -> Iterator[str]:

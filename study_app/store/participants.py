@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from study_app.errors import StoreError
 from study_app.store import journal, tables
 from study_app.store.atomic import is_there, write_file
-from study_app.store.columns import PARTICIPANTS
+from study_app.store.columns import PARTICIPANTS, header
+from study_app.store.events import check_fields
 from study_app.store.layout import SessionFolder, StudyFolder
 
 
@@ -20,8 +22,19 @@ def row_of(session: SessionFolder) -> list[tables.Row]:
     contents = journal.scan(session.journal)
     if not contents.lines:
         return []
-    damaged = {} if contents.damage is None else {"status": "damaged"}
-    return [tables.participant(contents.lines) | damaged]
+    try:
+        check_fields(session.journal, contents.lines)
+        row = tables.participant(contents.lines)
+    except StoreError:  # one session that cannot be read must not stop the others
+        return [_damaged(session, contents.lines[0])]
+    return [row if contents.damage is None else row | {"status": "damaged"}]
+
+
+def _damaged(session: SessionFolder, start: journal.Line) -> tables.Row:
+    """Return the row of a session whose journal gives none: what its folder and its first line tell."""
+    known = {name: start.get(name) for name in ("study", "simulated", "pilot", "device", "language")}
+    which = {"participant": session.participant, "session": session.number, "session_started_at": start.get("at")}
+    return {**dict.fromkeys(header(PARTICIPANTS)), **known, **which, "status": "damaged"}
 
 
 def write_participants(folder: StudyFolder, study: str) -> None:

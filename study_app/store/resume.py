@@ -21,6 +21,7 @@ from study_app.store.atomic import is_there, sweep
 from study_app.store.blinding import open_or_draw_key, same_conditions
 from study_app.store.checksums import sha256
 from study_app.store.description import write_description
+from study_app.store.events import check_fields
 from study_app.store.journal import Journal, Line, SessionClock
 from study_app.store.layout import SessionFolder, locate
 from study_app.store.open_session import Place, SessionStore
@@ -70,6 +71,7 @@ def reopen(
     opening = open_alone(folder.path)
     try:
         contents = journal.whole(folder.journal)
+        check_fields(folder.journal, contents.lines)
         start = _unfinished(folder, contents.lines)
         place = Place(study_folder, folder, start["study"])
         first = receipt.read(folder.receipt)

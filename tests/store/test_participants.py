@@ -2,14 +2,19 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from study_app.store import participants
+from study_app.errors import StoreError
+from study_app.store import journal, participants
 from study_app.store.layout import StudyFolder
+from study_app.store.rebuild import rebuild
 from study_app.store.session import SessionStore
+from study_app.store.verify import verify
 
 
 def table(folder: Path) -> list[dict[str, str]]:
@@ -52,6 +57,42 @@ def test_a_damaged_journal_stops_nobody_and_is_marked(
     store.folder.journal.write_bytes(b"\n".join(lines))
     start("P002").finish("completed")
     assert [row["status"] for row in table(tmp_path / "study")] == ["damaged", "completed"]
+
+
+def without_field(name: str) -> Callable[[list[dict[str, Any]]], None]:
+    return lambda lines: lines[0].pop(name)
+
+
+def beginning_late(lines: list[dict[str, Any]]) -> None:
+    lines[0]["event"] = "session_resumed"
+
+
+def about_a_trial_that_never_started(lines: list[dict[str, Any]]) -> None:
+    next(line for line in lines if line["event"] == "trial_ended")["trial"] = 99
+
+
+@pytest.mark.parametrize(
+    "damage", [without_field("pilot"), without_field("participant"), beginning_late, about_a_trial_that_never_started]
+)
+def test_a_journal_that_gives_no_row_stops_no_other_session_and_is_marked(
+    tmp_path: Path,
+    start: Callable[..., SessionStore],
+    attend: Callable[[SessionStore], None],
+    damage: Callable[[list[dict[str, Any]]], None],
+) -> None:
+    store = start("P001")
+    attend(store)
+    store.finish("completed")
+    lines = journal.read(store.folder.journal)
+    damage(lines)
+    store.folder.journal.write_text("".join(json.dumps(line) + "\n" for line in lines), encoding="utf-8")
+    start("P002").finish("completed")
+    first, second = table(tmp_path / "study")
+    assert (first["participant"], first["session"], first["status"]) == ("P001", "1", "damaged")
+    assert (second["participant"], second["status"]) == ("P002", "completed")
+    assert not verify(tmp_path / "study").sound
+    with pytest.raises(StoreError):
+        rebuild(store.folder.path)
 
 
 def test_a_claimed_folder_without_a_journal_has_no_row(tmp_path: Path, start: Callable[..., SessionStore]) -> None:
