@@ -12,7 +12,7 @@ import base64
 import hashlib
 import json
 import secrets
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
@@ -125,6 +125,10 @@ def reveal(folder: Path, by: str, reason: str) -> Codes:
         if not text.strip():
             raise StoreError(f"--{name} is empty: opening the key is recorded with a name and a reason")
     study = StudyFolder(folder)
+    if not is_there(study.key) and not study.sessions():
+        raise StoreError(
+            f"{folder} is no study's folder (it has no {study.key.name}): name one such as results/rek2024"
+        )
     key = _verified_key(study)
     record = {
         "at": datetime.now().astimezone().isoformat(timespec="seconds"),
@@ -157,20 +161,30 @@ def revealed_key(folder: Path) -> Key | None:
 
 def reveals(folder: Path) -> tuple[dict[str, str], ...]:
     """Return the recorded reveals, first to last: ``at``, ``by``, ``reason``, ``key_hash``."""
+    return tuple(record for _, record in _reveal_lines(folder) if record is not None)
+
+
+def unreadable_reveals(folder: Path) -> tuple[int, ...]:
+    """Return the numbers of the lines that record no reveal: torn, of one that never returned, or changed since."""
+    return tuple(number for number, record in _reveal_lines(folder) if record is None)
+
+
+def _reveal_lines(folder: Path) -> Iterator[tuple[int, dict[str, str] | None]]:
+    """Yield number and record of every line that is not empty."""
+    path = StudyFolder(folder).reveals
     try:
-        content = StudyFolder(folder).reveals.read_bytes()
+        content = path.read_bytes()
     except FileNotFoundError:
-        return ()
+        return
     except OSError as error:
-        raise cannot_read(StudyFolder(folder).reveals, error) from error
-    found: list[dict[str, str]] = []
-    for line in content.split(b"\n"):
+        raise cannot_read(path, error) from error
+    for number, line in enumerate(content.split(b"\n"), start=1):
         try:
             record = json.loads(line)
-        except ValueError:  # a torn line, of a reveal that never returned
-            continue
-        found.append(record)
-    return tuple(found)
+        except ValueError:
+            record = None
+        if line:
+            yield number, record if isinstance(record, dict) else None
 
 
 def _seal(protocol: Protocol, drawn: str, random: Callable[[], float]) -> bytes:

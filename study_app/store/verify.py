@@ -138,6 +138,8 @@ def _exclusions(study: StudyFolder, journals: Journals, found: Gathered) -> None
 
 def _reveals(study: StudyFolder, key: Key | None, found: Gathered) -> None:
     with found.reading(study.reveals):
+        for line in blinding.unreadable_reveals(study.path):
+            found.warning(study.reveals, f"line {line} records no reveal: it was torn by a power cut, or changed")
         for number, record in enumerate(blinding.reveals(study.path), start=1):
             if lacking := [name for name in ("at", "by", "reason", "key_hash") if not record.get(name)]:
                 found.error(study.reveals, f"reveal {number} lacks {', '.join(lacking)}")

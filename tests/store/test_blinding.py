@@ -15,8 +15,9 @@ from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
 from study_app.protocol.schedule import stream
 from study_app.store import blinding
-from study_app.store.blinding import open_or_draw_key, reveal, revealed, revealed_key, reveals
+from study_app.store.blinding import open_or_draw_key, reveal, revealed, revealed_key, reveals, unreadable_reveals
 from study_app.store.session import SessionStore
+from study_app.store.verify import verify
 
 
 def names_in(folder: Path) -> list[str]:
@@ -248,7 +249,26 @@ def test_a_torn_reveal_reveals_nothing(tmp_path: Path, protocol: Protocol) -> No
     assert revealed(tmp_path) is None
 
 
+@pytest.mark.parametrize("line", [b"5", b"null", b'"by AB"', b"[1]", b"xat: 2026"])
+def test_a_line_that_is_no_reveal_is_told_and_the_others_count(
+    start: Callable[..., SessionStore], tmp_path: Path, line: bytes
+) -> None:
+    start("P001").finish("completed")
+    folder = tmp_path / "study"
+    path = folder / "blinding" / "reveals.jsonl"
+    path.write_bytes(line + b"\n")
+    assert revealed(folder) is None
+    reveal(folder, "AB", "done")
+    assert unreadable_reveals(folder) == (1,)
+    assert [one["by"] for one in reveals(folder)] == ["AB"]
+    findings = verify(folder)
+    assert [str(one) for one in findings.warnings] == [
+        "blinding/reveals.jsonl: line 1 records no reveal: it was torn by a power cut, or changed"
+    ]
+    assert findings.sound
+
+
 def test_a_folder_without_a_key_is_named(tmp_path: Path) -> None:
-    with pytest.raises(StoreError, match=r"key\.sealed cannot be read \(No such file or directory\)"):
+    with pytest.raises(StoreError, match=r"is no study's folder \(it has no key\.sealed\): name one"):
         reveal(tmp_path, "AB", "analysis")
     assert names_in(tmp_path) == []
