@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import csv
 import io
 from dataclasses import dataclass
@@ -91,17 +92,24 @@ def exclusions(folder: Path) -> tuple[Exclusion, ...]:
     """
     path = StudyFolder(folder).exclusions
     try:
-        text = path.read_bytes().decode("utf-8")
+        text = without_mark(path.read_bytes()).decode("utf-8")
+        names, *rows = list(csv.reader(io.StringIO(text, newline=""))) or [[]]
     except FileNotFoundError:
         return ()
     except OSError as error:
         raise cannot_read(path, error) from error
     except UnicodeDecodeError as error:
         raise StoreError(f"{path} is no UTF-8: save it as CSV in UTF-8") from error
-    names, *rows = list(csv.reader(io.StringIO(text, newline=""))) or [[]]
+    except csv.Error as error:
+        raise StoreError(f"{path} is no CSV ({error}): save it as CSV in UTF-8, with commas") from error
     if tuple(names) != header(EXCLUSIONS):
         raise StoreError(f"{path}: its columns must be {', '.join(header(EXCLUSIONS))}, found {', '.join(names)}")
     return tuple(_exclusion(path, number, row) for number, row in enumerate(rows, start=2))
+
+
+def without_mark(content: bytes) -> bytes:
+    """Return a file without the byte order mark that spreadsheets put before what they save as UTF-8."""
+    return content.removeprefix(codecs.BOM_UTF8)
 
 
 def exclusion_bytes(rows: tuple[Exclusion, ...]) -> bytes:

@@ -118,21 +118,15 @@ def _exclusions(study: StudyFolder, journals: Journals, found: Gathered) -> None
         rows = exclusions.exclusions(study.path)
         if not is_there(study.exclusions):
             return
-        for problem in cells.problems(study.exclusions.read_bytes(), EXCLUSIONS):
+        for problem in cells.problems(exclusions.without_mark(study.exclusions.read_bytes()), EXCLUSIONS):
             found.error(study.exclusions, problem)
         trials = {
             (place.folder.participant, place.folder.number): {line.get("trial") for line in lines}
             for place, lines in journals
         }
         for row in rows:
-            if (
-                row.trial not in trials.get((row.participant, row.session), set()) | {None}
-                or (
-                    row.participant,
-                    row.session,
-                )
-                not in trials
-            ):
+            known = trials.get((row.participant, row.session))
+            if known is None or row.trial not in known | {None}:
                 found.error(study.exclusions, f"there is no {exclusions.named(row)}")
 
 

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import codecs
 import csv
 import io
 import subprocess
@@ -16,6 +17,7 @@ from study_app.errors import StoreError
 from study_app.store.exclusions import Exclusion, exclude, exclusions
 from study_app.store.opening import is_open
 from study_app.store.session import SessionStore
+from study_app.store.verify import verify
 
 FullDisk = Callable[[int], AbstractContextManager[None]]
 
@@ -118,6 +120,7 @@ def test_a_full_disk_leaves_the_list_as_it_was(folder: Path, files_up_to: FullDi
         (b"", "its columns must be participant, session, trial, rule_or_person, reason, excluded_at, found "),
         (b"participant,why\n", "found participant, why"),
         (b"\xff", "is no UTF-8"),
+        (b"x" * 200_000, "is no CSV (field larger than field limit"),
         (
             b"participant,session,trial,rule_or_person,reason,excluded_at\nP007,one,1,AB,x,y\n",
             "row 2: 'P007,one,1,AB,x,y'",
@@ -133,6 +136,18 @@ def test_a_list_that_makes_no_sense_is_named(folder: Path, content: bytes, sente
     with pytest.raises(StoreError):
         exclude(folder, "P007", 1, by="AB", reason="tired")
     assert (folder / "exclusions.csv").read_bytes() == content
+
+
+def test_a_list_that_a_spreadsheet_saved_is_read(folder: Path) -> None:
+    exclude(folder, "P007", 1, trial=2, by="AB", reason="tired")
+    path = folder / "exclusions.csv"
+    decided = exclusions(folder)
+    path.write_bytes(codecs.BOM_UTF8 + path.read_bytes().replace(b"\n", b"\r\n"))
+    assert exclusions(folder) == decided
+    assert [one for one in verify(folder).errors if one.place == "exclusions.csv"] == []
+    exclude(folder, "P007", 1, by="AB", reason="withdrew")
+    assert exclusions(folder)[0] == decided[0]
+    assert not path.read_bytes().startswith(codecs.BOM_UTF8)
 
 
 EXCLUDER = """
