@@ -7,6 +7,7 @@ time waits for the program, handing over waits instead, and nothing is lost.
 
 from __future__ import annotations
 
+import contextlib
 import threading
 from array import array
 from collections import deque
@@ -17,7 +18,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
-from study_app.store.atomic import cause
+from study_app.store.atomic import cause, sync_folder
 from study_app.store.journal import Line
 
 if TYPE_CHECKING:
@@ -197,7 +198,7 @@ class Recorder:
         file: SamplesFile | None = None
         shown: Written | None = None
         try:
-            self._folder.mkdir(exist_ok=True)
+            self._make_folder()
             file = self._files.SamplesFile(samples_path, facts, begin.rate_hz)
             for group in coming.groups(file.group_rows):
                 file.write(group)
@@ -206,12 +207,20 @@ class Recorder:
             shown = self._files.write_frames(frames_path, frames, facts)
             return Recorded(begin.trial, begin.attempt, file.finish(end.dropped), shown, end.dropped)
         except OSError as error:
-            if file is not None:
-                file.abandon()
-            if shown is not None:
-                shown.path.unlink(missing_ok=True)
+            with contextlib.suppress(OSError):  # what cannot be taken away either is named by a check of the folder
+                if file is not None:
+                    file.abandon()
+            with contextlib.suppress(OSError):
+                if shown is not None:
+                    shown.path.unlink(missing_ok=True)
             coming.skip()
             return Lost(begin.trial, begin.attempt, cause(error))
+
+    def _make_folder(self) -> None:
+        """Create the folder, where it is missing, so that no power cut takes it with all that was journalled."""
+        if not self._folder.is_dir():
+            self._folder.mkdir()
+            sync_folder(self._folder.parent)
 
     def _next(self) -> Any:
         """Wait for the next thing in the queue; None when it is closed and empty."""

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import errno
+import os
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
@@ -169,6 +171,43 @@ def test_a_full_disk_loses_a_recording_with_its_reason_and_the_next_is_kept(
         "trial-002.parquet",
         "trial-002_frames.parquet",
     ]
+
+
+def test_the_folder_is_on_the_disk_before_its_first_file(
+    tmp_path: Path, recorder: Recorder, samples_of: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    flushed: list[tuple[Path, list[str]]] = []
+    monkeypatch.setattr(
+        "study_app.store.recorder.sync_folder",
+        lambda path: flushed.append((path, [one.name for one in (path / "recordings").iterdir()])),
+    )
+    record(recorder, samples_of(200), trial=1)
+    record(recorder, samples_of(200), trial=2)
+    recorder.close()
+    assert flushed == [(tmp_path, [])]
+
+
+def test_what_cannot_even_be_taken_away_loses_one_recording_and_not_the_next(
+    recorder: Recorder, samples_of: Make
+) -> None:
+    class Stuck(SamplesFile):
+        def finish(self, dropped: int = 0) -> recording.Written:
+            raise OSError(errno.EROFS, os.strerror(errno.EROFS))
+
+        def abandon(self) -> None:
+            super().abandon()
+            raise OSError(errno.EROFS, os.strerror(errno.EROFS))
+
+    recorder._files = SimpleNamespace(SamplesFile=Stuck, write_frames=recording.write_frames)  # type: ignore[assignment]
+    record(recorder, samples_of(200), trial=1)
+    with recorder._changed:
+        assert recorder._changed.wait_for(lambda: recorder._kept, 20)
+    recorder._files = recording
+    record(recorder, samples_of(200), trial=2)
+    recorder.close()
+    lost, kept = recorder.kept()
+    assert lost == Lost(1, 1, os.strerror(errno.EROFS))
+    assert isinstance(kept, Recorded)
 
 
 def test_a_folder_that_cannot_be_made_loses_every_recording(tmp_path: Path, samples_of: Make) -> None:
