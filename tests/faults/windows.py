@@ -10,6 +10,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.gui.operator import OperatorWindow
+from study_app.gui.pages.questionnaire import QuestionnaireWidget
 from study_app.gui.participant import ParticipantWindow
 from study_app.session.pages import EndPage, QuestionnairePage, TextPage
 
@@ -19,6 +20,21 @@ W = TypeVar("W", bound=QWidget)
 def window(kind: type[W]) -> W | None:
     """Return the window of that kind that is shown."""
     return next((one for one in QApplication.topLevelWidgets() if isinstance(one, kind) and one.isVisible()), None)
+
+
+def answer(participant: ParticipantWindow, page: QuestionnairePage) -> None:
+    """Answer every statement, each other one with a click and those between with a digit, and confirm."""
+    widget = participant.widget
+    assert isinstance(widget, QuestionnaireWidget)
+    points = len(page.labels)
+    for number, row in enumerate(widget.rows):
+        if not row.isVisible():  # on the next part of the page
+            QTest.keyClick(participant.focusWidget(), Qt.Key.Key_Return)
+        if number % 2:
+            QTest.mouseClick(row.cells[number % points], Qt.MouseButton.LeftButton)
+        else:
+            QTest.keyClick(row, Qt.Key(Qt.Key.Key_1 + number % points))
+    QTest.keyClick(widget, Qt.Key.Key_Return)
 
 
 class Person(QObject):
@@ -48,8 +64,6 @@ class Person(QObject):
             QTest.keyClick(participant.widget, Qt.Key.Key_Return)
         elif isinstance(page, QuestionnairePage) and page is not self._answered:
             self._answered = page
-            for number in range(len(page.items)):
-                QTest.keyClick(participant.focusWidget(), Qt.Key(Qt.Key.Key_1 + number))
-            QTest.keyClick(participant.focusWidget(), Qt.Key.Key_Return)
+            answer(participant, page)
         elif isinstance(page, EndPage):
             QTest.mouseClick(operator.buttons.close_session, Qt.MouseButton.LeftButton)
