@@ -193,3 +193,10 @@ def test_a_design_names_no_condition():
     for name in ("honey", "light_oil", "delay_125"):
         assert name not in text
     assert text.splitlines() == [line.rstrip() for line in text.splitlines()]
+
+
+def test_the_shipped_study_of_physical_liquids_is_even_after_six_and_after_twelve():
+    for participants in (6, 12):
+        (block,) = balance(load("physical_liquids"), numbered(participants), 1).blocks
+        assert block.evenness.balanced
+        assert block.evenness.longest_run == 1
