@@ -1,10 +1,15 @@
 """The commands: what they print, and the one line and exit code a user gets for bad input."""
 
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
+
+from study_app.cli import commands
+from study_app.evaluation import replay
 
 
 def liquid_study(*words: str, cwd: Path) -> subprocess.CompletedProcess[str]:
@@ -89,3 +94,32 @@ def test_simulate_names_the_unknown_parameter(tmp_path: Path) -> None:
         liquid_study("simulate", *words, "--set", "densitee_kg_m3=1", cwd=tmp_path), "densitee_kg_m3", "density_kg_m3"
     )
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_replay_that_compared_nothing_does_not_say_that_all_is_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is printed of a replay's findings, and the exit code."""
+
+    def replayed(
+        count: int, lasted_s: float, took_s: float, differences: tuple[str, ...], uncompared: tuple[str, ...]
+    ) -> tuple[int, str]:
+        found = replay.Replayed(count, lasted_s, took_s, differences, uncompared)
+        monkeypatch.setattr(replay, "replay", lambda _: found)
+        done = CliRunner().invoke(commands, ["replay", "ses-01"])
+        return done.exit_code, done.output
+
+    assert replayed(0, 0.0, 0.0, (), ()) == (0, "the session has no recordings: there was no force to compare\n")
+    same = "1 recording, 20.0 s, 10 times as fast as it ran: every force compared is the same\n"
+    assert replayed(1, 20.0, 2.0, (), ()) == (0, same)
+    differ = "trial 1 differs\ntrial 2 has a gap\n2 recordings, 20.0 s, 10 times as fast as they ran: forces differ\n"
+    assert replayed(2, 20.0, 2.0, ("trial 1 differs",), ("trial 2 has a gap",)) == (3, differ)
+
+
+def test_verify_ends_with_a_verdict_and_its_exit_code(tmp_path: Path) -> None:
+    study = tmp_path / "study"
+    shutil.copytree(Path(__file__).parents[1] / "results" / "sample-rek2024", study)
+    verified = liquid_study("verify", "study", cwd=tmp_path)
+    assert (verified.returncode, verified.stdout.splitlines()[-1]) == (0, "12 sessions: sound")
+    table = study / "data" / "study-rek2024_description-participants_data.csv"
+    table.write_bytes(table.read_bytes() + b"\n")
+    verified = liquid_study("verify", "study", cwd=tmp_path)
+    assert (verified.returncode, verified.stdout.splitlines()[-1]) == (3, "12 sessions: not sound")

@@ -104,7 +104,8 @@ def verify(folder: Path) -> None:
     ):
         for finding in findings:
             click.echo(f"{kind}: {finding}")
-    click.echo(f"{found.sessions} sessions: {'sound' if found.sound else 'not sound'}")
+    many = "1 session" if found.sessions == 1 else f"{found.sessions} sessions"
+    click.echo(f"{many}: {'sound' if found.sound else 'not sound'}")
     if not found.sound:
         click.get_current_context().exit(EXIT_FOUND)
 
@@ -118,10 +119,12 @@ def replay(session: Path) -> None:
     found = replay_session(session)
     for sentence in (*found.differences, *found.uncompared):
         click.echo(sentence)
+    if not found.recordings:
+        click.echo("the session has no recordings: there was no force to compare")
+        return
     pace = found.lasted_s / found.took_s if found.took_s else 0.0
     verdict = "forces differ" if found.differences else "every force compared is the same"
-    click.echo(
-        f"{found.recordings} recordings, {found.lasted_s:.1f} s, {pace:.0f} times as fast as they ran: {verdict}"
-    )
+    many, ran = ("1 recording", "it") if found.recordings == 1 else (f"{found.recordings} recordings", "they")
+    click.echo(f"{many}, {found.lasted_s:.1f} s, {pace:.0f} times as fast as {ran} ran: {verdict}")
     if found.differences:
         click.get_current_context().exit(EXIT_FOUND)
