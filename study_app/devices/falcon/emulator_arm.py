@@ -1,0 +1,130 @@
+"""The emulated Falcon's three arms: angles from a pose, and the force that torques make there.
+
+Made otherwise than ``kinematics`` on purpose, so that a mistake in either shows. An arm's angle is the one at which its
+rod, drawn as a vector in space, is as long as it is, found by search; and the force follows from virtual work,
+``F . dp = sum tau_i dtheta_i``, with the angles' changes taken by moving the grip a little.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from study_app.devices.falcon.geometry import Geometry
+from study_app.haptics.compiled import kernel
+
+ARMS = np.dtype(
+    [
+        ("arm_m", np.float64),
+        ("rod_m", np.float64),
+        ("ends_m", np.float64),
+        ("base_m", np.float64),
+        ("platform_m", np.float64),
+        ("aside_m", np.float64),
+        ("along", np.float64, (3, 3)),  # unit vectors: out from the middle along each arm's plane
+        ("across", np.float64, (3, 3)),  # and across it
+        ("rad_per_count", np.float64),
+        ("zero_rad", np.float64, (3,)),  # where each encoder counts 0
+        ("units_per_nm", np.float64),  # motor units that make an arm torque of 1 N m; a positive unit pulls inward
+        ("centre_m", np.float64),  # the hand's origin, in front of the base
+        ("angle_rad", np.float64, (3,)),  # as last found
+    ],
+    align=True,
+)
+
+_STEP_M = 2e-5  # of the differences: truncated at 1e-7 of a derivative, rounded at 1e-8
+_ENOUGH_RAD = 1e-14
+_SECANTS = 12
+_HALVINGS = 60
+
+
+def set_arms(arms: Any, geometry: Geometry, units_per_nm: float, arm_offset_rad: tuple[float, float, float]) -> None:
+    """Build the arms of a Falcon that was assembled with these offsets of its encoders' zeros [rad]."""
+    arms.arm_m, arms.rod_m, arms.ends_m = geometry.arm_m, geometry.rod_m, geometry.ends_m
+    arms.base_m, arms.platform_m, arms.aside_m = geometry.base_m, geometry.platform_m, geometry.aside_m
+    arms.rad_per_count, arms.units_per_nm = geometry.rad_per_count, units_per_nm
+    arms.zero_rad = [geometry.zero_rad + offset for offset in arm_offset_rad]
+    arms.centre_m = geometry.centre_m
+    arms.along = [(math.cos(phi), math.sin(phi), 0.0) for phi in geometry.azimuths_rad]
+    arms.across = [(-math.sin(phi), math.cos(phi), 0.0) for phi in geometry.azimuths_rad]
+
+
+@kernel
+def bend(arms: Any, hand_m: Any) -> None:
+    """Find the arms' angles for the grip at ``hand_m`` (3,) [m, hand frame]."""
+    x, y, z = hand_m[0], hand_m[1], hand_m[2] + arms.centre_m
+    for i in range(3):
+        arms.angle_rad[i] = _angle(arms, i, x, y, z, arms.angle_rad[i])
+
+
+@kernel
+def count(arms: Any, arm: int) -> int:
+    """Return the encoder's count from its zero, for the angle as last found."""
+    counted: int = math.floor((arms.angle_rad[arm] - arms.zero_rad[arm]) / arms.rad_per_count + 0.5)
+    return counted
+
+
+@kernel
+def push_of(arms: Any, torque: Any, hand_m: Any, axis: int) -> float:
+    """Return the force along ``axis`` [N] of motor torques (3,) [units], the grip at ``hand_m`` where it was bent."""
+    x, y, z = hand_m[0], hand_m[1], hand_m[2] + arms.centre_m
+    dx = _STEP_M if axis == 0 else 0.0
+    dy = _STEP_M if axis == 1 else 0.0
+    dz = _STEP_M if axis == 2 else 0.0
+    force = 0.0
+    for i in range(3):
+        near = arms.angle_rad[i]
+        after = _angle(arms, i, x + dx, y + dy, z + dz, near)
+        before = _angle(arms, i, x - dx, y - dy, z - dz, near)
+        arm_nm = -torque[i] / arms.units_per_nm
+        force += arm_nm * (after - before) / (2.0 * _STEP_M)
+    return force
+
+
+@kernel
+def _stretch(arms: Any, arm: int, angle: float, x: float, y: float, z: float) -> float:
+    """Return by how much the rod of ``arm`` would be too long, were the arm at ``angle`` and the grip at (x, y, z)."""
+    ax, ay = arms.along[arm, 0], arms.along[arm, 1]
+    cx, cy = arms.across[arm, 0], arms.across[arm, 1]
+    out = arms.base_m + arms.arm_m * math.cos(angle)
+    link_x = x + arms.platform_m * ax + arms.aside_m * cx - out * ax
+    link_y = y + arms.platform_m * ay + arms.aside_m * cy - out * ay
+    link_z = z - arms.arm_m * math.sin(angle)
+    aside = link_x * cx + link_y * cy
+    flat_x, flat_y = link_x - aside * cx, link_y - aside * cy
+    flat = math.sqrt(flat_x * flat_x + flat_y * flat_y + link_z * link_z)
+    kept = 1.0 - arms.ends_m / flat  # the end links lie in the arm's plane, in line with what is seen of the rod there
+    rod_x, rod_y, rod_z = kept * flat_x + aside * cx, kept * flat_y + aside * cy, kept * link_z
+    stretch: float = math.sqrt(rod_x * rod_x + rod_y * rod_y + rod_z * rod_z) - arms.rod_m
+    return stretch
+
+
+@kernel
+def _angle(arms: Any, arm: int, x: float, y: float, z: float, near: float) -> float:
+    """Return the angle of ``arm``, its elbow outside; out of reach, the one that points there."""
+    ax, ay = arms.along[arm, 0], arms.along[arm, 1]
+    toward = math.atan2(z, x * ax + y * ay + arms.platform_m - arms.base_m)
+    # The nearer the arm points to the platform the shorter the rod: one such angle on either side, outside is below.
+    before, at = near + 1e-4, near
+    f_before, f_at = _stretch(arms, arm, before, x, y, z), _stretch(arms, arm, at, x, y, z)
+    for _ in range(_SECANTS):
+        if f_at == f_before:
+            break
+        step = f_at * (at - before) / (f_at - f_before)
+        before, f_before = at, f_at
+        at -= step
+        f_at = _stretch(arms, arm, at, x, y, z)
+        if abs(step) < _ENOUGH_RAD or f_at == 0.0:
+            break
+    if toward - math.pi < at < toward and abs(f_at) < 1e-13:
+        return at
+    low, high = toward - math.pi, toward
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        if _stretch(arms, arm, middle, x, y, z) > 0.0:
+            low = middle
+        else:
+            high = middle
+    return 0.5 * (low + high)
