@@ -1,14 +1,20 @@
 """How this package compiles: one decorator, and one cache that no edit can leave stale.
 
 numba keys its on-disk cache on the file of the outermost function alone, so a change in a function it calls would go
-unseen. The cache therefore lives in a folder named after a digest of every source file that may hold kernels.
+unseen. The cache therefore lives in a folder named after a digest of every source file that may hold kernels; those of
+other sources go when they are old.
 """
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import os
+import re
+import secrets
+import shutil
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -18,6 +24,12 @@ from numba.core.options import DefaultOptions
 
 _PACKAGE = Path(__file__).resolve().parent.parent
 _KERNEL_FOLDERS = ("haptics", "devices", "evaluation")
+
+KEPT_FOLDERS = 8  # of caches so many stay however old they are
+UNUSED_S = 86_400.0  # no program that runs since less than a day loses its cache
+SWEPT_AT_ONCE = 8  # what removing may take of a start
+_DIGEST = re.compile(r"[0-9a-f]{16}")
+_HALF_REMOVED = re.compile(r"\.[0-9a-f]{16}\.[0-9a-f]{8}\.gone")
 
 _OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
 # numba's own name for it, which its stubs do not know; without it ticks are slower, and just as right.
@@ -47,9 +59,39 @@ def _use_own_cache() -> None:
     folder = Path(os.environ.get("NUMBA_CACHE_DIR") or _user_cache()) / _digest_of_sources()
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        os.utime(folder)
     except OSError:
         return  # numba then falls back to its own places; slower, never wrong within one run
     vars(numba.config)["CACHE_DIR"] = str(folder)
+    sweep_caches(folder)
+
+
+def sweep_caches(own: Path) -> None:
+    """Remove caches beside ``own`` that no program used for a day, but for the newest.
+
+    A cache says by its time of change when a program last began with it. It is renamed before it is removed, so that of
+    two programs that sweep at once each removes what it renamed. A program that begins with it meanwhile gets it back,
+    and numba makes anew what is missing. What cannot be removed stays.
+    """
+    with contextlib.suppress(OSError):
+        beside = [path for path in own.parent.iterdir() if path != own and path.is_dir()]
+        for left in (path for path in beside if _HALF_REMOVED.fullmatch(path.name)):
+            shutil.rmtree(left, ignore_errors=True)
+        caches = sorted((path.stat().st_mtime, path) for path in beside if _DIGEST.fullmatch(path.name))
+        for used_at, path in caches[: max(0, len(caches) + 1 - KEPT_FOLDERS)][:SWEPT_AT_ONCE]:
+            if time.time() - used_at > UNUSED_S:
+                _remove_cache(path, used_at)
+
+
+def _remove_cache(path: Path, used_at: float) -> None:
+    """Remove a cache, unless a program has begun with it since ``used_at`` [s since 1970]."""
+    gone = path.with_name(f".{path.name}.{secrets.token_hex(4)}.gone")
+    with contextlib.suppress(OSError):
+        path.rename(gone)
+        if gone.stat().st_mtime != used_at:
+            gone.rename(path)
+        else:
+            shutil.rmtree(gone)
 
 
 _use_own_cache()
