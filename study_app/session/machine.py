@@ -47,7 +47,7 @@ Move: TypeAlias = Callable[[SessionState, Any], tuple[SessionState, tuple[Comman
 
 TRANSITIONS: dict[tuple[Phase, type[Event]], Move] = {
     # phase           event           what happens              next phase
-    (Phase.OPENING, Begin): moves.begin,  # → reading, task
+    (Phase.OPENING, Begin): moves.begin,  # → reading, task; paused before a trial of a session that goes on
     (Phase.READING, Continue): moves.read_on,  # → reading, task, complete
     (Phase.TASK, TaskDone): moves.end_task,  # → answering; reading, task, complete without a questionnaire
     (Phase.ANSWERING, ItemShown): moves.show_item,  # stays

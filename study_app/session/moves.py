@@ -35,6 +35,7 @@ from study_app.session.events import (
     Submitted,
     TaskDone,
 )
+from study_app.session.resume import FIRST
 from study_app.session.state import Answer, Hold, Phase, SessionState
 
 END_SHOWN_S = 0.1  # a closed ring is seen for so long before the next page
@@ -44,8 +45,12 @@ Result: TypeAlias = tuple[SessionState, Commands]
 
 
 def begin(state: SessionState, _event: Begin) -> Result:
-    """Go to the first step, or to where an interrupted session goes on."""
-    return _enter(state, state.plan.start.step)
+    """Go to the first step, or to where an interrupted session goes on; a trial waits there until somebody is ready."""
+    entered, done = _enter(state, state.plan.start.step)
+    if state.plan.start == FIRST or entered.phase is not Phase.TASK:
+        return entered, done
+    waiting = replace(entered, phase=Phase.PAUSED, interrupted=Phase.TASK, attempt=entered.attempt - 1)
+    return waiting, (Write("paused", {"by": "program"}), WriteTables(), _show(waiting))
 
 
 def read_on(state: SessionState, _event: Continue) -> Result:

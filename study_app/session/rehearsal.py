@@ -28,8 +28,8 @@ from study_app.protocol.answers import rate, rater
 from study_app.protocol.load import parse, source_bytes
 from study_app.protocol.model import Protocol, Reach
 from study_app.protocol.schedule import Schedule, build_schedule, stream
-from study_app.session.events import Begin, Chosen, Continue, Event, ItemShown, Submitted
-from study_app.session.pages import Page, QuestionnairePage, TaskPage, TextPage
+from study_app.session.events import Begin, Chosen, Continue, Event, ItemShown, ResumeAsked, Submitted
+from study_app.session.pages import Page, PausePage, QuestionnairePage, TaskPage, TextPage
 from study_app.session.ports import Ports
 from study_app.session.resume import FIRST, REHEARSED_SCREENS, Start, find_protocol, resume_at
 from study_app.session.runner import Runner
@@ -224,6 +224,8 @@ class _Rehearsal:
     def run(self) -> None:
         """Go from the first page to the last."""
         self._post(Begin(self._now_s()))
+        if isinstance(self._page, PausePage):  # before the trial that a resumed session goes on with
+            self._post(ResumeAsked(self._now_s(), "participant"))
         while not self._runner.finished:
             match self._page:
                 case TextPage() as page:

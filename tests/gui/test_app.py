@@ -24,7 +24,7 @@ from study_app.gui.operator import OperatorWindow
 from study_app.gui.participant import ParticipantWindow
 from study_app.gui.theme import PARTICIPANT
 from study_app.protocol.load import source_bytes
-from study_app.session.pages import EndPage, QuestionnairePage, TaskPage, TextPage
+from study_app.session.pages import EndPage, PausePage, QuestionnairePage, TaskPage, TextPage
 from study_app.store.open_session import SessionStore
 
 # The platform without a screen cannot limit or raise windows, and says so.
@@ -280,7 +280,13 @@ def stopped(short_demo, results, monkeypatch):
 
 def test_a_session_that_stopped_goes_on_where_it_was_to_its_end(stopped, results):
     before = events(results)
-    person = Person()
+    met = []
+
+    def be_ready(participant):
+        met.append(participant.page)
+        QTest.keyClick(participant.widget, Qt.Key.Key_Return)
+
+    person = Person(be_ready)
     folder = results / "data" / "sub-P001" / "ses-01"
     assert app.resume(folder, protocol=stopped, windowed=True, operator="BB") == 0
     person.deleteLater()
@@ -288,6 +294,13 @@ def test_a_session_that_stopped_goes_on_where_it_was_to_its_end(stopped, results
     assert told[: len(before)] == before
     (resumed,) = [line for line in told if line["event"] == "session_resumed"]
     assert resumed["operator"] == "BB"
+    assert met == [PausePage(force_off=False)]
+    assert [line["event"] for line in told[len(before) :]][:4] == [
+        "session_resumed",
+        "paused",
+        "resumed",
+        "trial_started",
+    ]
     assert resumed["gap_s"] >= 0
     attempts = [(line["trial"], line["attempt"]) for line in told if line["event"] == "trial_started"]
     assert attempts == [(1, 1), (2, 1), (2, 2), (3, 1), (4, 1)]

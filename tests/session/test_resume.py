@@ -11,9 +11,10 @@ from study_app.errors import SessionError
 from study_app.protocol.load import protocol_hash, source_bytes
 from study_app.protocol.model import Protocol
 from study_app.protocol.schedule import PageStep, Trial, build_schedule
-from study_app.session.commands import ShowPage, StartTrial, Write
-from study_app.session.events import Begin
+from study_app.session.commands import FadeIn, ShowPage, StartTrial, Write
+from study_app.session.events import Begin, ResumeAsked
 from study_app.session.machine import advance, open_session
+from study_app.session.pages import PausePage
 from study_app.session.resume import REHEARSED_SCREENS, find_protocol, is_rehearsal, resume_at
 from study_app.session.state import Phase, SessionState
 from tests.session import small
@@ -44,13 +45,37 @@ def told(until: int) -> tuple[SessionState, list[dict[str, Any]]]:
 LINES = len(told(-1)[1])
 
 
-def begun(resume: str, lines: list[dict[str, Any]]) -> tuple[SessionState, tuple[Any, ...]]:
+def opened_again(resume: str, lines: list[dict[str, Any]]) -> tuple[SessionState, tuple[Any, ...]]:
     """Resume and begin; return the state and the commands."""
     plan = small.opened().plan
     protocol = study(resume)
     start = resume_at(protocol, plan.schedule, lines)
     state = open_session(protocol, plan.schedule, plan.key, "en", start)
     return advance(state, Begin(100.0))
+
+
+def begun(resume: str, lines: list[dict[str, Any]]) -> tuple[SessionState, tuple[Any, ...]]:
+    """Resume, begin, and be ready where a trial waits for that; return the state and the commands since."""
+    state, commands = opened_again(resume, lines)
+    return advance(state, ResumeAsked(101.0, "participant")) if state.phase is Phase.PAUSED else (state, commands)
+
+
+@pytest.mark.parametrize("resume", ["trial", "block"])
+@pytest.mark.parametrize("count", range(1, LINES + 1))
+def test_no_trial_begins_before_somebody_is_ready_for_it(count: int, resume: str) -> None:
+    _, lines = told(count)
+    state, commands = opened_again(resume, lines)
+    assert not any(isinstance(command, StartTrial | FadeIn) for command in commands)
+    assert isinstance(commands[-1], ShowPage)
+    if isinstance(state.step, Trial):
+        assert commands[-1] == ShowPage(PausePage(force_off=False))
+        assert commands[0] == Write("paused", {"by": "program"})
+        state, commands = begun(resume, lines)
+        (start,) = [command for command in commands if isinstance(command, StartTrial)]
+        assert (start.trial, start.attempt, state.attempt) == (state.trial.number, state.attempt, start.attempt)
+        assert start.attempt >= 1
+    else:
+        assert state.phase in {Phase.READING, Phase.COMPLETE}
 
 
 @pytest.mark.parametrize("count", range(1, LINES + 1))
