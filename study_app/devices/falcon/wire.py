@@ -60,3 +60,8 @@ ERROR_TIMEOUT, ERROR_OVERFLOW, ERROR_PIPE, ERROR_NOT_SUPPORTED = -7, -8, -9, -12
 def quiet_packet(flags: int = 0) -> bytes:
     """Return the packet that asks for no torque, with these lights and homing flags."""
     return bytes([START, *([ZERO] * 12), ZERO + flags, ZERO, STOP])
+
+
+def milliseconds(seconds: float) -> int:
+    """Return a time-out for C: never 0, which would mean for ever."""
+    return max(1, round(seconds * 1000.0))
