@@ -1,5 +1,6 @@
 """The commands: what they print, and the one line and exit code a user gets for bad input."""
 
+import os
 import shutil
 import subprocess
 import sys
@@ -10,6 +11,7 @@ from click.testing import CliRunner
 
 from study_app.cli import commands
 from study_app.evaluation import replay
+from study_app.protocol.load import source_bytes
 
 
 def liquid_study(*words: str, cwd: Path) -> subprocess.CompletedProcess[str]:
@@ -62,6 +64,20 @@ def test_check_far_from_the_checkout_tells_the_study_in_words(tmp_path: Path) ->
     assert finished.returncode == 0, finished.stderr
     assert "62" in finished.stdout
     assert "8 N" in finished.stdout
+
+
+def test_a_letter_that_the_console_lacks_stops_no_command(tmp_path: Path) -> None:
+    text = source_bytes("demo").decode().replace('title = "A first look"', 'title = "Łódź"', 1)
+    (tmp_path / "lodz.toml").write_text(text, encoding="utf-8")
+    told = subprocess.run(
+        [sys.executable, "-m", "study_app", "check", "lodz.toml"],
+        cwd=tmp_path,
+        capture_output=True,
+        check=False,
+        env={**os.environ, "PYTHONIOENCODING": "cp1252"},
+    )
+    assert (told.returncode, told.stderr) == (0, b"")
+    assert told.stdout.startswith(b"\\u0141\xf3d\\u017a (demo, version ")
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ Each command imports what it needs when it runs, so that ``--help`` loads neithe
 
 from __future__ import annotations
 
+import io
 import sys
 
 import click
@@ -39,6 +40,8 @@ for module in (running, results, model):
 
 def main() -> None:
     """Run a command; turn what the user can mend into one line and exit code 2."""
+    if isinstance(sys.stdout, io.TextIOWrapper):  # a pipe or an old console may lack a letter of a study's title
+        sys.stdout.reconfigure(errors="backslashreplace")
     try:
         code = commands.main(standalone_mode=False)
     except click.UsageError as error:
