@@ -1,0 +1,256 @@
+"""From a Falcon that was just switched on to one that answers: ping, speed, upload with its echo, first reply.
+
+What each step waits for is read as a stream, whatever packets the bridge makes of it. A step that fails ends the
+attempt; the next one begins with the bridge opened anew, which is how it succeeds for those who have a Falcon.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from statistics import median
+from typing import Final
+
+import numpy as np
+
+from study_app.devices.falcon import wire
+from study_app.devices.falcon.failures import UsbFailure
+from study_app.devices.falcon.firmware import Firmware, check
+from study_app.devices.falcon.packets import PARSER, STATUS, feed, strip
+from study_app.devices.falcon.transport import Transport
+from study_app.errors import DeviceError
+from study_app.haptics.layout import records
+
+ATTEMPTS: Final = 10
+PINGS: Final = 20
+PROBES: Final = 10
+ROUND_TRIPS: Final = 50
+
+_PING_S: Final = 0.25
+_STEP_S: Final = 1.0
+_PROBE_S: Final = 0.05
+_BETWEEN_ATTEMPTS_S: Final = 0.2
+
+PORT_ADVICE: Final = (
+    "unplug cable and mains adapter for ten seconds, and use another port: of the machine itself on Linux and Windows, "
+    "of a hub with its own power on macOS"
+)
+_ADVICE: Final = {
+    "ping": "check that its mains adapter is plugged in, then " + PORT_ADVICE,
+    "autobaud": PORT_ADVICE,
+    "echo": PORT_ADVICE,
+    "start": "check that the file is a Falcon's firmware, then " + PORT_ADVICE,
+}
+
+
+class BootFailure(DeviceError):
+    """The firmware could not be loaded.
+
+    ``step`` is where the last attempt ended: "ping", "autobaud", "echo" or "start"; ``attempt`` its number; ``reason``
+    what was seen there.
+    """
+
+    def __init__(self, step: str, attempt: int, reason: str) -> None:
+        self.step = step
+        self.attempt = attempt
+        self.reason = reason
+        attempts = "1 attempt" if attempt == 1 else f"{attempt} attempts"
+        super().__init__(f"the Falcon's firmware could not be loaded in {attempts}: {reason}; {_ADVICE[step]}")
+
+
+class _Ended(Exception):
+    """A step of an attempt did not come to its end."""
+
+    def __init__(self, step: str, reason: str) -> None:
+        self.step = step
+        self.reason = reason
+        super().__init__(reason)
+
+
+class _Line:
+    """The bytes that come over a bridge, without its status, and the packets in them.
+
+    It reads one USB packet at a time: a longer read does not end with a full packet, such as the echo of a chunk, but
+    waits for the bridge's timer.
+    """
+
+    def __init__(self, transport: Transport) -> None:
+        self._transport = transport
+        self._memory = np.zeros(wire.USB_PACKET, np.uint8)
+        self._parser, self._status = records(PARSER, 1), records(STATUS, 1)
+
+    def until(self, complete: Callable[[bytes], bool], timeout_s: float, came: bytes = b"") -> bytes:
+        """Return ``came`` and what came after it, until that is complete or the time is out."""
+        ends_s = self._transport.now_s() + timeout_s
+        while not complete(came) and (left_s := ends_s - self._transport.now_s()) > 0.0:
+            came += self._memory[: self._read(left_s)].tobytes()
+        return came
+
+    def answers(self, timeout_s: float) -> bool:
+        """Send a quiet packet; return whether a packet came back in time."""
+        try:
+            self._transport.write(wire.quiet_packet(wire.FLAG_HOMING), timeout_s)
+        except UsbFailure as failure:
+            if failure.kind == "timeout":
+                return False
+            raise
+        ends_s = self._transport.now_s() + timeout_s
+        while (left_s := ends_s - self._transport.now_s()) > 0.0:
+            if feed(self._parser[0], self._memory, self._read(left_s), self._status[0]) > 0:
+                return True
+        return False
+
+    def _read(self, timeout_s: float) -> int:
+        raw = self._transport.read(wire.USB_PACKET, timeout_s)
+        self._memory[: len(raw)] = np.frombuffer(raw, np.uint8)
+        return int(strip(self._memory, len(raw), self._memory))
+
+
+def configure(transport: Transport) -> None:
+    """Set the bridge as a Falcon that runs needs it, and forget what is in it."""
+    _purge(transport)
+    transport.control(wire.REQUEST_LATENCY, wire.LATENCY_RUN_MS)
+    _set_line(transport, wire.BAUD_1500000)
+    _purge(transport)
+
+
+def set_event_character(transport: Transport, on: bool) -> None:
+    """Let the bridge send what it has as soon as a packet's last byte is in, or only when its timer runs out."""
+    transport.control(wire.REQUEST_EVENT_CHARACTER, wire.STOP | (wire.EVENT_ENABLED if on else 0))
+
+
+def is_running(transport: Transport) -> bool:
+    """Return whether the Falcon has its firmware: whether it answers a quiet packet. The bridge must be configured."""
+    for _ in range(PROBES):
+        if _Line(transport).answers(_PROBE_S):
+            return True
+        _purge(transport)
+    return False
+
+
+def measure_round_trip(transport: Transport) -> float:
+    """Return the median time from a packet to its reply [s]; one that stays without counts as 50 ms."""
+    return median(_round_trip_s(transport) for _ in range(ROUND_TRIPS))
+
+
+def _round_trip_s(transport: Transport) -> float:
+    began_s = transport.now_s()
+    if _Line(transport).answers(_PROBE_S):
+        return transport.now_s() - began_s
+    _purge(transport)  # its reply must not count as the next one's
+    return _PROBE_S
+
+
+def boot(
+    transport: Transport, firmware: bytes, *, attempts: int = ATTEMPTS, tell: Callable[[str], object] | None = None
+) -> Firmware:
+    """Load ``firmware`` and see it run; return what it is.
+
+    Parameters
+    ----------
+    transport : the Falcon's bridge; each attempt but the first opens it anew
+    firmware : the bytes of its file
+    attempts : how many there are at most
+    tell : is given a line about each attempt that failed
+
+    Raises
+    ------
+    BootFailure
+        None of the attempts succeeded.
+    DeviceError
+        The bytes are no firmware, or the bridge failed.
+    """
+    found = check(firmware)
+    for attempt in range(1, attempts + 1):
+        try:
+            _attempt(transport, firmware)
+        except _Ended as ended:
+            if attempt == attempts:
+                raise BootFailure(ended.step, attempt, ended.reason) from None
+            if tell is not None:
+                tell(f"Loading the firmware, attempt {attempt} of {attempts}: {ended.reason}; trying again.")
+            transport.reopen()
+            transport.pause(_BETWEEN_ATTEMPTS_S)
+        else:
+            break
+    return found
+
+
+def _attempt(transport: Transport, firmware: bytes) -> None:
+    _ping(transport)
+    _time(transport)
+    _upload(transport, firmware)
+    configure(transport)
+    if not is_running(transport):
+        raise _Ended("start", "the firmware went over, but the Falcon does not answer")
+
+
+def _ping(transport: Transport) -> None:
+    """Reset the processor by an edge of DTR, and call until its loader answers."""
+    _purge(transport)
+    set_event_character(transport, on=False)
+    transport.control(wire.REQUEST_LATENCY, wire.LATENCY_BOOT_MS)
+    _set_line(transport, wire.BAUD_9600)
+    for level in (wire.RTS_LOW, wire.DTR_LOW, wire.DTR_HIGH):
+        transport.control(wire.REQUEST_MODEM, level)
+    line = _Line(transport)
+    came = b""
+    for _ in range(PINGS):
+        _send(transport, wire.PING, "ping")
+        came = line.until(lambda data: wire.PONG in data, _PING_S, came)
+        if wire.PONG in came:
+            return
+    heard = f"answers with {came[:8].hex(' ')}" if came else "does not answer"
+    raise _Ended("ping", f"its boot loader {heard}")
+
+
+def _time(transport: Transport) -> None:
+    """Let the loader find the speed of the upload by the bits of an 'A'."""
+    transport.control(wire.REQUEST_MODEM, wire.DTR_LOW)
+    transport.control(wire.REQUEST_BAUD, wire.BAUD_142857)
+    _purge(transport)
+    _send(transport, wire.AUTOBAUD, "autobaud")
+    came = _Line(transport).until(lambda data: data.endswith(wire.AUTOBAUD), _STEP_S)
+    if not came.endswith(wire.AUTOBAUD):
+        heard = f"answers with {came[:8].hex(' ')}" if came else "does not answer"
+        raise _Ended("autobaud", f"its boot loader {heard} to the byte that tells it the speed")
+
+
+def _upload(transport: Transport, firmware: bytes) -> None:
+    """Send the firmware in pieces, and hear each come back as it went."""
+    line = _Line(transport)
+    for at in range(0, len(firmware), wire.CHUNK):
+        chunk = firmware[at : at + wire.CHUNK]
+        _send(transport, chunk, "echo")
+        _expect_echo(line, chunk, at)
+
+
+def _expect_echo(line: _Line, chunk: bytes, at: int) -> None:
+    echo = line.until(lambda data: len(data) >= len(chunk), _STEP_S)
+    for number, (sent, heard) in enumerate(zip(chunk, echo, strict=False), at):
+        if heard != sent:
+            raise _Ended("echo", f"byte {number} of the firmware came back as {heard:02x}, not {sent:02x}")
+    if len(echo) < len(chunk):
+        raise _Ended("echo", f"nothing came back from byte {at + len(echo)} of the firmware on")
+    if len(echo) > len(chunk):
+        raise _Ended("echo", f"more came back than byte {at + len(chunk) - 1} of the firmware")
+
+
+def _send(transport: Transport, data: bytes, step: str) -> None:
+    try:
+        transport.write(data, _STEP_S)
+    except UsbFailure as failure:
+        if failure.kind != "timeout":
+            raise
+        raise _Ended(step, "the bridge does not take the bytes") from failure
+
+
+def _set_line(transport: Transport, divisor: int) -> None:
+    transport.control(wire.REQUEST_BAUD, divisor)
+    transport.control(wire.REQUEST_LINE, wire.LINE_8N1)
+    transport.control(wire.REQUEST_FLOW, 0)
+
+
+def _purge(transport: Transport) -> None:
+    """Forget what waits in the bridge, both ways."""
+    transport.control(wire.REQUEST_RESET, wire.PURGE_RX)
+    transport.control(wire.REQUEST_RESET, wire.PURGE_TX)
