@@ -157,6 +157,10 @@ class Emulator(HandOrders):
         """Let emulated time pass, hand and handle move."""
         _pause(self._state, round(seconds * 1e9))
 
+    def look(self) -> None:
+        """Let it come up to the present of its clock: hear what has arrived, move for a while at most."""
+        _look(self._state)
+
     # What it is and does.
 
     def power(self, on: bool) -> None:
@@ -411,6 +415,12 @@ def _pause(e: Any, lasting_ns: int) -> None:
     end_ns = ftdi.end_of(e.bridge, lasting_ns)
     _advance(e, end_ns)
     live(e, end_ns, max(lasting_ns, LONGEST_NS))
+
+
+@kernel
+def _look(e: Any) -> None:
+    _begin(e)
+    live(e, e.bridge.now_ns, LONGEST_NS)
 
 
 @kernel

@@ -94,7 +94,8 @@ def _check(code: int) -> None:
     if code == wire.ERROR_NOT_SUPPORTED:
         raise NotImplementedError("Operation not supported or unimplemented on this platform")
     number, words = _ERRORS[code]
-    raise usb.core.USBError(words, code, number)
+    kind = usb.core.USBTimeoutError if code == wire.ERROR_TIMEOUT else usb.core.USBError
+    raise kind(words, code, number)
 
 
 class EmulatedBackend(usb.backend.IBackend):  # type: ignore[misc]
@@ -211,7 +212,10 @@ class EmulatedBackend(usb.backend.IBackend):  # type: ignore[misc]
 
     def detach_kernel_driver(self, dev_handle: _Handle, intf: int) -> None:
         """Take it from the kernel's own driver."""
-        self._reach(dev_handle).faults.off("kernel_driver")
+        faults = self._reach(dev_handle).faults
+        if faults.is_on("kernel_driver_stays"):
+            _check(wire.ERROR_ACCESS)
+        faults.off("kernel_driver")
 
     def bulk_write(self, dev_handle: _Handle, ep: int, intf: int, data: Any, timeout: int) -> int:
         """Transfer bytes out."""

@@ -21,6 +21,7 @@ SWITCHES: Final = (
     "not_supported",  # cannot be opened: another driver has it
     "busy",  # cannot be claimed: another program has it
     "kernel_driver",  # cannot be claimed until the kernel's driver is detached
+    "kernel_driver_stays",  # which it does not let happen
     "frozen",  # encoders stand still, homing too
     "never_homes",  # no arm finds its index
     "forgets",  # the origin of the encoders is lost when the homing flag drops

@@ -57,6 +57,7 @@ _word_at = record_at(WORD)
 
 USB_NS: Final = 30_000  # a transfer takes so long by itself, in the emulator's own time
 ENDLESS_NS: Final = 3_600_000_000_000
+_BACK_NS: Final = 1_000_000_000  # a clock so far behind is another one, or the same begun anew
 _STATUS = (0x01, 0x60)  # modem status, line status: ready and empty
 _EIGHTHS = (0, 4, 2, 1)  # of a divisor, by its two highest bits
 
@@ -73,7 +74,7 @@ def begin(bridge: Any) -> int:
         bridge.now_ns += USB_NS
         return 0
     told = _word_at(bridge.clock).value
-    if bridge.joined == 0 or told < bridge.now_ns - ENDLESS_NS // 3600:
+    if bridge.joined == 0 or told < bridge.now_ns - _BACK_NS:
         bridge.joined = 1
         return int(told - bridge.now_ns)
     bridge.now_ns = max(bridge.now_ns, told)

@@ -1,0 +1,192 @@
+"""The emulated boot loader: what it takes, and its silence about everything else."""
+
+import struct
+
+import numba
+import pytest
+
+if numba.config.DISABLE_JIT:
+    pytest.skip("emulators are C functions", allow_module_level=True)
+
+from study_app.devices.falcon import wire
+from tests.devices.falcon.emulated import exchanged, still, stripped
+
+
+def words(*values):
+    return struct.pack(f"<{len(values)}H", *values)
+
+
+def stream(blocks=(300, 7, 1), key=wire.BOOT_KEY):
+    """Return a boot stream as a linker makes it: zeros and counted blocks."""
+    body = b"".join(words(size, 0x003F, 0x8000, *((31 * k) & 0xFFFF for k in range(size))) for size in blocks)
+    return words(key, *[0] * 8, 0x003F, 0x8002) + body + words(0)
+
+
+def armed(**options):
+    """Return a Falcon that was reset by DTR at 9600 baud."""
+    emulator = still(**options)
+    emulator.control(wire.REQUEST_LATENCY, wire.LATENCY_BOOT_MS)
+    emulator.control(wire.REQUEST_BAUD, wire.BAUD_9600)
+    for request in (wire.RTS_LOW, wire.DTR_LOW, wire.DTR_HIGH):
+        emulator.control(wire.REQUEST_MODEM, request)
+    return emulator
+
+
+def said(emulator, data, seconds=0.1):
+    """Send bytes; return all that comes back meanwhile."""
+    emulator.write(data, 1000)
+    emulator.pause(seconds)
+    heard = b""
+    while len(status := emulator.read(512, 100)[1]) > 2:
+        heard += stripped(status)
+    return heard
+
+
+def timed(emulator):
+    """Take it to the loader: ping, then 'A' at the next speed."""
+    assert said(emulator, wire.PING) == wire.PONG
+    emulator.control(wire.REQUEST_MODEM, wire.DTR_LOW)
+    emulator.control(wire.REQUEST_BAUD, wire.BAUD_142857)
+    assert said(emulator, wire.AUTOBAUD) == wire.AUTOBAUD
+    return emulator
+
+
+def upload(emulator, data):
+    """Send a stream in chunks; return its echo."""
+    return b"".join(said(emulator, data[k : k + 62], 0.005) for k in range(0, len(data), 62))
+
+
+def runs(emulator):
+    emulator.control(wire.REQUEST_BAUD, wire.BAUD_1500000)
+    emulator.control(wire.REQUEST_LATENCY, wire.LATENCY_RUN_MS)
+    return len(exchanged(emulator)) == 16
+
+
+def test_a_stream_is_echoed_and_runs_after_its_last_word():
+    emulator = timed(armed())
+    data = stream()
+    assert upload(emulator, data[:-2]) == data[:-2]
+    assert not emulator.running
+    assert said(emulator, data[-2:]) == data[-2:]
+    assert emulator.running
+    assert emulator.loaded == len(data)
+    assert runs(emulator)
+
+
+def test_uploading_takes_as_long_as_the_bits_do():
+    emulator = timed(armed())
+    data = stream((4000,))
+    began_ns = emulator.now_ns
+    echo = b""
+    for k in range(0, len(data), 62):
+        emulator.write(data[k : k + 62], 1000)
+        chunk = b""
+        while len(chunk) < len(data[k : k + 62]):
+            chunk += stripped(emulator.read(64, 1000)[1])
+        echo += chunk
+    assert echo == data
+    wire_s = len(data) * 10 / (3e6 / 21)
+    assert wire_s < (emulator.now_ns - began_ns) * 1e-9 < 1.2 * wire_s
+
+
+def test_before_its_reset_it_hears_no_ping():
+    emulator = still()
+    assert said(emulator, wire.PING) == b""
+
+
+@pytest.mark.parametrize("divisor", [wire.BAUD_142857, wire.BAUD_1500000])
+def test_a_ping_at_another_speed_is_not_understood(divisor):
+    emulator = armed()
+    emulator.control(wire.REQUEST_BAUD, divisor)
+    assert said(emulator, wire.PING) == b""
+
+
+def test_an_edge_of_dtr_at_another_speed_resets_nothing():
+    emulator = still()
+    emulator.control(wire.REQUEST_BAUD, wire.BAUD_142857)
+    emulator.control(wire.REQUEST_MODEM, wire.DTR_HIGH)
+    emulator.control(wire.REQUEST_BAUD, wire.BAUD_9600)
+    assert said(emulator, wire.PING) == b""
+
+
+def test_a_ping_is_found_among_other_bytes_and_may_be_ignored_at_first():
+    emulator = armed()
+    emulator.faults.ignore_pings(2)
+    assert said(emulator, wire.PING) == b""
+    assert said(emulator, b"\x0a\x0a\x43" + wire.PING) == b""
+    assert said(emulator, b"\xff\x0a" + wire.PING) == wire.PONG
+
+
+@pytest.mark.parametrize(("fault", "pong"), [("leading_zero", b"\0" + wire.PONG), ("glued", wire.PONG + b"\x00\x0d")])
+def test_answers_to_a_ping_come_in_variants(fault, pong):
+    emulator = armed()
+    emulator.faults.on(fault)
+    assert said(emulator, wire.PING) == pong
+
+
+def test_the_echo_of_a_may_have_a_byte_before_it():
+    emulator = armed()
+    emulator.faults.on("echo_prefix")
+    said(emulator, wire.PING)
+    emulator.control(wire.REQUEST_BAUD, wire.BAUD_142857)
+    assert said(emulator, wire.AUTOBAUD) == b"\x13A"
+
+
+def test_a_byte_may_be_echoed_wrongly():
+    emulator = timed(armed())
+    emulator.faults.once("echo")
+    data = stream()
+    echo = upload(emulator, data)
+    assert [k for k, (a, b) in enumerate(zip(data, echo, strict=True)) if a != b] == [0]
+    assert emulator.faults.happened("echo") == 1
+
+
+def test_a_wrong_key_is_met_with_silence_until_it_is_reset():
+    emulator = timed(armed())
+    wrong = stream(key=0x08AB)
+    assert upload(emulator, wrong) == wrong[:2]
+    assert said(emulator, wire.AUTOBAUD) == b""
+    emulator.control(wire.REQUEST_BAUD, wire.BAUD_9600)
+    emulator.control(wire.REQUEST_MODEM, wire.DTR_HIGH)
+    timed(emulator)
+    assert upload(emulator, stream()) == stream()
+    assert runs(emulator)
+
+
+def test_what_follows_the_stream_does_no_harm():
+    emulator = timed(armed())
+    upload(emulator, stream() + b"\r\n")
+    assert runs(emulator)
+
+
+def test_the_program_outlives_the_cable_but_not_the_power():
+    emulator = timed(armed())
+    upload(emulator, stream())
+    emulator.faults.on("unplugged")
+    emulator.faults.off("unplugged")
+    assert runs(emulator)
+    emulator.power(False)
+    assert not emulator.running
+    assert exchanged(emulator) == b""
+    assert said(emulator, wire.PING) == b""
+    emulator.power(True)
+    assert exchanged(emulator) == b""
+
+
+def test_without_power_nothing_can_be_reset():
+    emulator = still()
+    emulator.power(False)
+    emulator.control(wire.REQUEST_MODEM, wire.DTR_HIGH)
+    emulator.power(True)
+    assert said(emulator, wire.PING) == b""
+
+
+def test_a_reset_makes_the_arms_limp():
+    emulator = still(running=True)
+    emulator.control(wire.REQUEST_BAUD, wire.BAUD_1500000)
+    exchanged(emulator, (500, 500, 500))
+    assert emulator.torques == (500, 500, 500)
+    emulator.control(wire.REQUEST_BAUD, wire.BAUD_9600)
+    emulator.control(wire.REQUEST_MODEM, wire.DTR_HIGH)
+    assert emulator.torques == (0, 0, 0)
+    assert emulator.force_n == (0.0, 0.0, 0.0)

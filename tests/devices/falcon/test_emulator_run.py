@@ -1,0 +1,409 @@
+"""The emulated Falcon at work: packets, homing, torques that push, and everything that can go wrong."""
+
+from random import Random
+
+import numba
+import numpy as np
+import pytest
+
+if numba.config.DISABLE_JIT:
+    pytest.skip("emulators are C functions", allow_module_level=True)
+
+from study_app.devices.falcon import wire
+from study_app.devices.falcon.emulator_faults import CHANCES, SWITCHES
+from study_app.errors import DeviceError
+from tests.devices.falcon.emulated import (
+    HOMING,
+    at_work,
+    counts_in,
+    exchanged,
+    home,
+    packet,
+    status_in,
+    still,
+    stripped,
+)
+from tests.devices.falcon.test_emulator_arm import closed_form
+
+
+def true_counts(emulator, place=None):
+    """Return the counts (3,) at a place, by the law of cosines."""
+    g = emulator.geometry
+    angles = closed_form(g.name, emulator.position_m if place is None else place)
+    return [round((angle - g.zero_rad) / g.rad_per_count) for angle in angles]
+
+
+def replies_to(emulator, turns):
+    return [exchanged(emulator, flags=HOMING, patience=3) for _ in range(turns)]
+
+
+# packets
+
+
+def test_a_packet_is_answered_with_encoders_and_buttons():
+    emulator = at_work()
+    emulator.press(0b1010)
+    reply = exchanged(emulator)
+    assert (len(reply), reply[:1], reply[15:]) == (16, b"<", b">")
+    assert counts_in(reply) == [0, 0, 0]
+    assert status_in(reply) == (0b1010, 0)
+    emulator.release()
+    assert status_in(exchanged(emulator)) == (0, 0)
+
+
+@pytest.mark.parametrize("torques", [(1, -1, 4095), (-4095, 0, 15), (0x0FF, -0x100, 0x123)])
+def test_it_stores_torques_and_lights(torques):
+    emulator = at_work()
+    exchanged(emulator, torques, wire.FLAG_RED | wire.FLAG_BLUE)
+    assert emulator.torques == torques
+    assert emulator.lights == wire.FLAG_RED | wire.FLAG_BLUE
+    assert emulator.highest_torque == emulator.highest_unhomed_torque == max(map(abs, torques))
+    assert emulator.excessive == 0
+
+
+def test_torques_beyond_the_range_are_counted_and_cut_off():
+    emulator = at_work()
+    exchanged(emulator, (-4095, -4095, -4095))
+    most = emulator.force_n[2]
+    exchanged(emulator, (-4096, -30000, -5000))
+    assert emulator.excessive == 1
+    assert emulator.highest_torque == 30000
+    assert emulator.force_n[2] == pytest.approx(most, rel=1e-3)
+
+
+def test_what_is_no_packet_is_not_answered_and_the_next_one_is():
+    emulator = at_work()
+    wrong = packet((5, 5, 5))
+    for broken in (wrong[1:], wrong[:9], wrong[:15] + b"?", wrong[:3] + b"\x20" + wrong[4:], b"<<<<", bytes(7)):
+        emulator.write(broken, 10)
+        emulator.pause(1e-3)
+        assert emulator.torques == (0, 0, 0)
+    assert emulator.packets == 0
+    heard = b"".join(exchanged(emulator, patience=2) for _ in range(3))
+    assert len(heard) >= 32
+    assert emulator.refused > 40
+
+
+def test_at_another_speed_it_hears_nothing():
+    emulator = at_work()
+    emulator.control(wire.REQUEST_BAUD, wire.BAUD_142857)
+    assert exchanged(emulator) == b""
+    assert emulator.packets == 0
+
+
+def test_the_last_torque_stays_when_packets_stop():
+    emulator = at_work()
+    exchanged(emulator, (-300, -300, -300))
+    emulator.pause(1.0)
+    assert emulator.torques == (-300, -300, -300)
+    assert emulator.position_m[2] == pytest.approx(emulator.force_n[2] / 500, abs=3e-4)
+
+
+# homing
+
+
+def test_homing_finds_the_true_origin_with_a_jump_and_the_hand_comes_back():
+    emulator = at_work()
+    homed, jumped, deepest, furthest = 0, 0, 0.0, 0.0
+    before = np.zeros(3)
+    for _ in range(1500):
+        reply = exchanged(emulator, flags=HOMING)
+        z = emulator.position_m[2] + emulator.geometry.centre_m
+        deepest, furthest = min(deepest or z, z), max(furthest, z)
+        now = status_in(reply)[1]
+        assert now & homed == homed
+        jump = np.abs(np.array(counts_in(reply)) - before).max()
+        if now != homed:
+            jumped = max(jumped, jump)
+            assert furthest > 0.170
+        else:
+            assert jump < 30
+        homed, before = now, np.array(counts_in(reply))
+        emulator.pause(1.5e-3)
+    assert homed == 0b111
+    assert jumped > 100
+    assert deepest < 0.091
+    assert emulator.position_m == pytest.approx((0, 0, 0), abs=1e-3)
+    assert counts_in(exchanged(emulator, flags=HOMING)) == pytest.approx(true_counts(emulator), abs=1)
+
+
+def test_without_the_flag_nothing_homes_and_dropping_it_ends_being_homed():
+    emulator = at_work()
+    for _ in range(200):
+        exchanged(emulator)
+        emulator.pause(2e-3)
+    assert emulator.homed == 0
+    assert emulator.position_m == (0, 0, 0)
+    home(emulator)
+    assert emulator.homed == 0b111
+    assert status_in(exchanged(emulator)) == (0, 0)
+    assert counts_in(exchanged(emulator)) == pytest.approx(true_counts(emulator), abs=1)
+
+
+def test_it_may_forget_its_origin_with_the_flag():
+    emulator = at_work()
+    home(emulator)
+    emulator.faults.on("forgets")
+    assert np.abs(counts_in(exchanged(emulator))).max() <= 1
+
+
+def test_orders_come_before_homing_and_homing_waits_for_them():
+    emulator = at_work()
+    emulator.reach_to(0.03, 0.0, 0.0, duration_s=0.2)
+    exchanged(emulator, flags=HOMING)
+    for _ in range(60):
+        exchanged(emulator, flags=HOMING)
+        emulator.pause(2e-3)
+    assert emulator.position_m[2] == pytest.approx(0, abs=1e-3)
+    home(emulator)
+    assert emulator.homed == 0b111
+    emulator.claimed()
+    for _ in range(100):
+        exchanged(emulator, flags=HOMING)
+        emulator.pause(2e-3)
+    assert emulator.position_m[2] > 0.01
+    emulator.hold(0.0, 0.02, 0.0)
+    home(emulator, 1.0)
+    assert emulator.position_m == pytest.approx((0, 0.02, 0), abs=1e-3)
+
+
+def test_pulled_out_far_enough_for_any_gate_by_whoever_claims_it_anew():
+    emulator = at_work()
+    home(emulator)
+    emulator.claimed()
+    furthest = 0.0
+    for _ in range(600):
+        exchanged(emulator, flags=HOMING)
+        emulator.pause(2e-3)
+        furthest = max(furthest, emulator.position_m[2] + emulator.geometry.centre_m)
+    assert furthest > 0.170
+
+
+@pytest.mark.parametrize("fault", ["never_homes", "frozen"])
+def test_it_may_never_home(fault):
+    emulator = at_work()
+    emulator.faults.on(fault)
+    home(emulator)
+    assert emulator.homed == 0
+    emulator.faults.off(fault)
+    emulator.claimed()
+    home(emulator)
+    assert emulator.homed == 0b111
+
+
+def test_power_off_ends_torque_and_homing_and_the_arms_count_from_where_they_are():
+    emulator = at_work()
+    home(emulator)
+    exchanged(emulator, (100, 100, 100), HOMING)
+    emulator.power(False)
+    assert (emulator.torques, emulator.homed, emulator.lights) == ((0, 0, 0), 0, 0)
+    assert exchanged(emulator) == b""
+
+
+# the hand and the force
+
+
+PLACES = [(0.0, 0.0, 0.0), (0.045, 0.025, 0.025), (-0.045, 0.02, -0.025), (0.03, -0.03, 0.02), (-0.02, 0.0, -0.03)]
+
+
+@pytest.mark.parametrize("place", PLACES)
+def test_torques_push_the_handle_against_the_hand_as_virtual_work_says(place):
+    """The reference: the same small step taken by the law of cosines, here in plain Python."""
+    emulator = at_work()
+    emulator.hold(*place)
+    for _ in range(400):
+        exchanged(emulator, torques := (-400, 250, -600))
+        emulator.pause(1e-3)
+    at = np.array(emulator.position_m)
+    name, step_m = emulator.geometry.name, 1e-5
+    for axis in range(3):
+        step = np.eye(3)[axis] * step_m
+        turns = np.subtract(closed_form(name, at + step), closed_form(name, at - step)) / (2 * step_m)
+        force = float(np.dot(-np.array(torques) / 6616.0, turns))
+        assert emulator.force_n[axis] == pytest.approx(force, abs=2e-4)
+        assert (at[axis] - place[axis]) * 500 == pytest.approx(force, abs=0.11)  # spring of the hand, Coulomb friction
+
+
+def test_encoders_say_where_the_handle_is():
+    emulator = at_work()
+    home(emulator)
+    for place in PLACES:
+        emulator.reach_to(*place, duration_s=0.1)
+        for _ in range(300):
+            reply = exchanged(emulator, flags=HOMING)
+        assert counts_in(reply) == pytest.approx(true_counts(emulator), abs=1)
+
+
+def test_a_weight_pulls_down_and_without_a_hand_it_falls_to_the_stop():
+    emulator = at_work()
+    emulator.weight_n = 1.0
+    emulator.pause(1.0)
+    assert emulator.position_m[1] == pytest.approx(-1 / 500, abs=2.5e-4)
+    emulator.held = False
+    emulator.pause(1.0)
+    assert emulator.position_m[1] == pytest.approx(-0.055)
+
+
+def test_more_units_per_newton_metre_are_less_force():
+    strong, weak = at_work(), at_work(units_per_nm=10_000.0)
+    for emulator in (strong, weak):
+        exchanged(emulator, (-500, -500, -500))
+    assert strong.force_n[2] == pytest.approx(weak.force_n[2] * 10_000 / 6616, rel=1e-3)
+
+
+def test_an_arm_assembled_off_its_zero_counts_from_there():
+    offset_rad = 0.02
+    plain, off = at_work(), at_work(arm_offset_rad=(offset_rad, 0.0, 0.0))
+    home(plain)
+    home(off)
+    difference = np.subtract(counts_in(exchanged(off, flags=HOMING)), counts_in(exchanged(plain, flags=HOMING)))
+    assert difference == pytest.approx([-offset_rad / plain.geometry.rad_per_count, 0, 0], abs=1.01)
+
+
+def test_who_was_not_looked_at_for_long_has_not_moved_for_long():
+    emulator = at_work()
+    clock = np.array([0], np.int64)
+    emulator.follow_clock(int(clock.ctypes.data))
+    exchanged(emulator)
+    emulator.weight_n, emulator.held = 0.3, False
+    clock[0] = 10 * 10**9
+    exchanged(emulator)
+    fallen_m = 0.5 * (0.3 - 0.1) / 0.2 * 0.05**2
+    assert emulator.position_m[1] == pytest.approx(-fallen_m, rel=0.15)
+
+
+def test_the_same_random_is_the_same_falcon_to_the_bit():
+    def run(seed):
+        emulator = at_work(random=Random(seed), tremor_m=5e-5)  # noqa: S311
+        emulator.faults.chance("drop", 0.2)
+        emulator.reach_to(0.03, 0.01, 0.0)
+        heard = [exchanged(emulator, (10 * k, 0, -k), HOMING, patience=2) for k in range(200)]
+        return heard, emulator.position_m
+
+    assert run(4) == run(4)
+    assert run(4) != run(5)
+
+
+# faults
+
+
+def test_a_dropped_reply_is_missing_but_its_torque_is_not():
+    emulator = at_work()
+    emulator.faults.once("drop", 2)
+    assert exchanged(emulator, (7, 8, 9), patience=3) == b""
+    assert emulator.torques == (7, 8, 9)
+    assert exchanged(emulator, patience=3) == b""
+    assert len(exchanged(emulator)) == 16
+    assert emulator.faults.happened("drop") == 2
+
+
+def test_a_truncated_reply_has_14_bytes_and_no_end():
+    emulator = at_work()
+    emulator.faults.once("truncate")
+    reply = exchanged(emulator, patience=3)
+    assert (len(reply), reply[:1]) == (14, b"<")
+    assert b">" not in reply
+
+
+def test_a_corrupt_reply_has_one_wrong_byte():
+    emulator = at_work()
+    good = exchanged(emulator)
+    for _ in range(40):
+        emulator.faults.once("corrupt")
+        emulator.write(packet(), 10)
+        emulator.pause(2e-3)
+        assert sum(a != b for a, b in zip(good, stripped(emulator.read(64, 20)[1]), strict=True)) == 1
+
+
+def test_a_duplicate_comes_twice():
+    emulator = at_work()
+    emulator.faults.once("duplicate")
+    emulator.write(packet(), 10)
+    emulator.pause(2e-3)
+    heard = stripped(emulator.read(512, 20)[1])
+    assert len(heard) == 32
+    assert heard[:16] == heard[16:]
+
+
+def test_a_delayed_reply_comes_late():
+    emulator = at_work()
+    emulator.faults.last(delay_s=0.007)
+    emulator.faults.once("delay")
+    emulator.write(packet(), 10)
+    sent_ns = emulator.now_ns
+    while not stripped(emulator.read(64, 20)[1]):
+        pass
+    assert emulator.now_ns - sent_ns == pytest.approx(7e6 + 2 * 16 * 6666 + 20_000, abs=1e5)
+
+
+def test_stalled_it_hears_nothing_for_a_while():
+    emulator = at_work()
+    emulator.faults.last(stall_s=0.05)
+    emulator.faults.once("stall")
+    assert exchanged(emulator, (5, 5, 5), patience=2) == b""
+    emulator.pause(0.02)
+    assert exchanged(emulator, (5, 5, 5), patience=2) == b""
+    assert emulator.torques == (0, 0, 0)
+    emulator.pause(0.04)
+    assert len(exchanged(emulator, (5, 5, 5))) == 16
+
+
+def test_frozen_encoders_say_the_same_wherever_the_handle_goes():
+    emulator = at_work()
+    home(emulator)
+    before = counts_in(exchanged(emulator, flags=HOMING))
+    emulator.faults.on("frozen")
+    emulator.hold(0.03, 0.02, 0.01)
+    emulator.pause(0.5)
+    assert counts_in(exchanged(emulator, flags=HOMING)) == before
+
+
+@pytest.mark.parametrize("name", ["drop", "truncate", "stall"])
+def test_chances_come_true_as_often_as_they_should(name):
+    emulator = at_work()
+    emulator.faults.last(stall_s=0.0)
+    emulator.faults.chance(name, 0.1)
+    whole = sum(len(reply) == 16 for reply in replies_to(emulator, 3000))
+    happened = emulator.faults.happened(name)
+    assert happened == pytest.approx(300, abs=60)
+    assert whole <= 3000 - happened * 0.9
+    emulator.faults.chance(name, 0.0)
+    assert all(len(reply) == 16 for reply in replies_to(emulator, 50)[1:])
+
+
+@pytest.mark.parametrize("name", SWITCHES)
+def test_a_switch_is_off_until_it_is_switched_on(name):
+    faults = still().faults
+    assert not faults.is_on(name)
+    faults.take(name.replace("_", "-"))
+    assert faults.is_on(name)
+    faults.off(name)
+    assert not faults.is_on(name)
+
+
+@pytest.mark.parametrize("name", CHANCES)
+def test_a_fault_can_be_named_with_its_chance(name):
+    emulator = still()
+    emulator.take(f"{name}=0.25")
+    assert emulator._state.faults.chance[CHANCES.index(name)] == 0.25
+
+
+def test_the_power_can_be_taken_by_name():
+    emulator = still(running=True)
+    emulator.take("power-off")
+    assert not emulator.powered
+
+
+@pytest.mark.parametrize(
+    ("word", "message"),
+    [
+        ("dropp=0.1", "choose one of: drop, truncate"),
+        ("drop=1.5", "must be 0 to 1, not 1.5"),
+        ("drop", "not known; choose of: drop=CHANCE"),
+        ("frozen=1", "does not come by chance"),
+        ("", "not known"),
+    ],
+)
+def test_a_fault_that_is_none_is_refused(word, message):
+    with pytest.raises(DeviceError, match=message):
+        still().take(word)
