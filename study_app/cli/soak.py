@@ -1,0 +1,53 @@
+"""The command that runs the servo for hours."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from pathlib import Path
+from types import FrameType
+
+import click
+
+from study_app.cli.words import EXIT_FOUND
+
+
+@click.command()
+@click.option("--hours", type=float, required=True, metavar="H", help="How long; 0.01 is 36 seconds.")
+@click.option("--virtual", is_flag=True, help="In virtual time: a day in minutes.")
+@click.option("--protocol", default="rek2024", show_default=True, metavar="FILE", help="Whose liquids are felt.")
+@click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True)
+@click.option("--to", type=click.Path(path_type=Path), metavar="DIR", help="Folder to write the report into, too.")
+@click.pass_context
+def soak(context: click.Context, hours: float, protocol: str, seed: int, to: Path | None, *, virtual: bool) -> None:
+    """Run the servo with a restless hand and every fault there is; say what drifted, leaked or broke.
+
+    Ctrl+C ends it with the report so far.
+    """
+    from study_app.evaluation.soak import soak as soak_servo
+    from study_app.evaluation.soaked import make_folder
+    from study_app.protocol.load import load_scenes
+
+    scenes = load_scenes(protocol)
+    if to is not None:
+        make_folder(to)
+    ending = threading.Event()
+    heard: list[int] = []
+
+    def end(number: int, _frame: FrameType | None) -> None:
+        heard.append(number)
+        ending.set()
+
+    before = {number: signal.signal(number, end) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        found = soak_servo(scenes, hours, virtual=virtual, seed=seed, ending=ending, tell=click.echo)
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+    click.echo(("" if found.ticks == 0 else "\n") + found.text())
+    for written in found.write(to) if to is not None else ():
+        click.echo(written)
+    if found.findings:
+        context.exit(EXIT_FOUND)
+    if heard:
+        context.exit(128 + heard[0])

@@ -1,0 +1,214 @@
+"""A device that goes wrong on purpose: another device's readings, now and then broken in a way that hardware knows.
+
+It draws what goes wrong, when and for how long from numbers of its own, inside the servo's loop; so the same seed on a
+virtual clock goes wrong at the same readings again. What it did is counted in its memory, to be compared with what
+telemetry has of it, and so is every force that was written: the last witness before the hand.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from typing import Any, Final
+
+import numpy as np
+
+from study_app.haptics.cfunctions import (
+    READ,
+    READ_LOST,
+    READ_NOTHING_NEW,
+    WRITE,
+    Driver,
+    c_function,
+    call_at,
+    record_at,
+)
+from study_app.haptics.clock import VIRTUAL, Clock
+from study_app.haptics.compiled import kernel
+from study_app.haptics.layout import BUTTON_STOP, READING, records
+from study_app.haptics.pace import random
+
+NON_FINITE, GLITCH, SILENCE, JUMP, BUTTON, LOST, LOST_AT_WRITE = range(7)
+KINDS: Final = ("non_finite", "glitch", "silence", "clock_jump", "stop_button", "lost", "lost_at_write")
+NONE: Final = -1
+
+GLITCH_M: Final = 0.1  # in a millisecond: 100 m/s
+SHORTEST_JUMP_NS: Final = 1_000_000
+LONGEST_JUMP_NS: Final = 2_000_000_000
+
+FAULTS = np.dtype(
+    [
+        # the device that is read and written, and the clock that may jump (0: none)
+        ("device", np.intp),
+        ("read", np.intp),
+        ("write", np.intp),
+        ("clock", np.intp),
+        # what may go wrong; written by the host
+        ("share", np.float64, (len(KINDS),)),  # of the faults that are of a kind; all 0: nothing goes wrong
+        ("least", np.int64, (len(KINDS),)),  # readings that one lasts
+        ("most", np.int64, (len(KINDS),)),
+        ("gap", np.int64, (2,)),  # fewest and most sound readings between two
+        # where it is
+        ("random", np.uint64),
+        ("kind", np.int64),  # of the fault under way or the next one
+        ("wait", np.int64),  # sound readings before it
+        ("left", np.int64),  # readings it still lasts
+        ("choice", np.int64),  # drawn for the whole of it: axis, and which number that is none
+        ("losing", np.int64),  # 1: the next write says that the device is lost
+        # what was done
+        ("reads", np.int64),
+        ("injected", np.int64, (len(KINDS),)),  # readings
+        ("episodes", np.int64, (len(KINDS),)),
+        ("jumped_ns", np.int64),
+        ("writes", np.int64),
+        ("not_finite", np.int64),  # forces written that are no numbers
+        ("most_n", np.float64),  # the greatest force written
+        ("last_n", np.float64, (3,)),
+    ],
+    align=True,
+)
+
+_faults_at = record_at(FAULTS)
+_reading_at = record_at(READING)
+_virtual_at = record_at(VIRTUAL)
+_inner_read, _inner_write = call_at(READ), call_at(WRITE)
+
+
+class FaultyDevice:
+    """A device between the servo and ``inner``, which it breaks; both must live as long as the servo turns.
+
+    Parameters
+    ----------
+    inner : the device that is felt with, opened
+    clock : the servo's clock; one that runs by itself never jumps
+    seed : of what goes wrong and when
+    """
+
+    def __init__(self, inner: Driver, clock: Clock, seed: int) -> None:
+        self.name = inner.name
+        self.force_limit_n = inner.force_limit_n
+        self.jumps = not clock.runs
+        self._kept = (inner, clock)
+        self._memory = records(FAULTS, 1)
+        self.state = self._memory[0]
+        self.state.device, self.state.read, self.state.write = inner.context, inner.read.address, inner.write.address
+        self.state.clock = clock.context if self.jumps else 0
+        self.state.random = 0x9E3779B97F4A7C15 ^ (seed + 1)
+        self.state.kind = NONE
+        self.context = int(self._memory.ctypes.data)
+        self.read, self.write = _functions()
+
+    def allow(self, faults: dict[int, tuple[float, int, int]], gap: tuple[int, int]) -> None:
+        """Let these kinds of faults happen from the next one on: share of all, fewest and most readings of each.
+
+        ``gap`` are the fewest and the most sound readings between two. A clock that runs by itself does not jump.
+        """
+        state = self.state
+        state.share = 0.0
+        for kind, (share, least, most) in faults.items():
+            state.share[kind], state.least[kind], state.most[kind] = share, least, most
+        if not self.jumps:
+            state.share[JUMP] = 0.0
+        state.gap = gap
+        state.kind = NONE
+
+
+@cache
+def _functions() -> tuple[Any, Any]:
+    return c_function(READ, _read), c_function(WRITE, _write)
+
+
+@kernel
+def _due(faults: Any) -> int:
+    """Return the kind of fault this reading has, or NONE."""
+    kind: int = faults.kind  # read once: the host may allow other faults meanwhile
+    if kind == NONE:
+        kind = _draw(faults)
+    if kind == NONE:
+        return NONE
+    if faults.wait > 0:
+        faults.wait -= 1
+        return NONE
+    faults.left -= 1
+    faults.injected[kind] += 1
+    if faults.left <= 0:
+        faults.episodes[kind] += 1
+        faults.kind = NONE
+    return kind
+
+
+@kernel
+def _draw(faults: Any) -> int:
+    """Draw the next fault and when it begins; return its kind, or NONE."""
+    total = 0.0
+    for share in faults.share:
+        total += share
+    if total <= 0.0:
+        return NONE
+    place = total * random(faults)
+    kind = 0
+    while kind < len(KINDS) - 1 and place >= faults.share[kind]:
+        place -= faults.share[kind]
+        kind += 1
+    faults.wait = _between(faults, faults.gap[0], faults.gap[1])
+    faults.left = _between(faults, faults.least[kind], faults.most[kind])
+    faults.choice = _between(faults, 0, 8)
+    faults.kind = kind
+    return kind
+
+
+@kernel
+def _between(faults: Any, least: int, most: int) -> int:
+    return least + int(random(faults) * (most - least + 1))
+
+
+@kernel
+def _no_number(choice: int) -> float:
+    """Return something that is no place a hand can be at."""
+    if choice < 3:
+        return math.nan
+    return math.inf if choice < 6 else -math.inf
+
+
+def _read(context: int, now_ns: int, reading: int) -> int:
+    faults = _faults_at(context)
+    faults.reads += 1
+    kind = _due(faults)
+    if kind == LOST:
+        return READ_LOST
+    if kind == SILENCE:
+        return READ_NOTHING_NEW
+    answer: int = _inner_read(faults.read, faults.device, now_ns, reading)
+    out = _reading_at(reading)
+    axis = faults.choice % 3
+    if kind == NON_FINITE:
+        out.position_m[axis] = _no_number(faults.choice)
+    elif kind == GLITCH:
+        out.position_m[axis] += math.copysign(GLITCH_M, out.position_m[axis])
+    elif kind == BUTTON:
+        out.buttons |= BUTTON_STOP
+    elif kind == LOST_AT_WRITE:
+        faults.losing = 1
+    elif kind == JUMP:
+        jump_ns = _between(faults, SHORTEST_JUMP_NS, LONGEST_JUMP_NS)
+        _virtual_at(faults.clock).now_ns += jump_ns
+        faults.jumped_ns += jump_ns
+    return answer
+
+
+def _write(context: int, fx: float, fy: float, fz: float) -> int:
+    faults = _faults_at(context)
+    faults.writes += 1
+    size_n = math.sqrt(fx * fx + fy * fy + fz * fz)
+    if math.isfinite(size_n):
+        faults.most_n = max(faults.most_n, size_n)
+    else:
+        faults.not_finite += 1
+    faults.last_n[0] = fx
+    faults.last_n[1] = fy
+    faults.last_n[2] = fz
+    answer: int = _inner_write(faults.write, faults.device, fx, fy, fz)
+    if faults.losing != 0:
+        faults.losing = 0
+        return READ_LOST
+    return answer
