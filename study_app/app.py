@@ -39,7 +39,7 @@ from study_app.protocol.schedule import build_schedule
 from study_app.session.preflight import Check, checks, refused
 from study_app.session.resume import FIRST, is_rehearsal, resume_at
 from study_app.store import receipt
-from study_app.store.layout import locate
+from study_app.store.layout import locate, refuse_never_begun
 
 if TYPE_CHECKING:
     from study_app.gui.bridge import SessionBridge
@@ -73,6 +73,7 @@ def run(
     session: int = 1,
     seed: int | None = None,
     device: str = "mouse",
+    firmware: Path | None = None,
     language: str | None = None,
     operator: str = "",
     windowed: bool = False,
@@ -90,6 +91,7 @@ def run(
     participant, session, operator : who, for the how-manieth time, and who runs it
     seed : default: drawn, shown and recorded
     device, language : default: the mouse, the protocol's first language
+    firmware : file of a Falcon's program, where it needs one
     windowed, screen : where the participant's window opens; screens count from 1
     results : the study's folder; default ``results/<study>``, of a pilot ``results/<study>-pilot``
     pilot : to try it out: in a window with a frame, apart from the data and marked
@@ -117,6 +119,7 @@ def run(
         ),
         pilot=pilot,
         recordings=recordings,
+        firmware=firmware,
     )
     check(chosen, study)
     return _hold(chosen, tell)
@@ -127,6 +130,7 @@ def resume(
     *,
     protocol: str | None = None,
     device: str | None = None,
+    firmware: Path | None = None,
     operator: str = "",
     windowed: bool = False,
     screen: int | None = None,
@@ -140,7 +144,7 @@ def resume(
     ----------
     protocol : file or name of its protocol; default: looked for among those at hand
     device : default: the one it began with
-    operator, windowed, screen, tell : as for ``run``
+    firmware, operator, windowed, screen, tell : as for ``run``
 
     Raises
     ------
@@ -148,12 +152,22 @@ def resume(
         It cannot go on (finished, of a changed protocol, open elsewhere); or device or servo failed while it ran.
     """
     folder = Path(session_folder)
-    if is_rehearsal(receipt.read(locate(folder)[1].receipt)):
+    session = locate(folder)[1]
+    refuse_never_begun(session)
+    if is_rehearsal(receipt.read(session.receipt)):
         from study_app.session import rehearsal  # noqa: PLC0415 - the compiler: only once it is needed
 
         rehearsal.resume(folder, protocol=protocol)
         return 0
-    chosen = resumed(folder, protocol=protocol, operator=operator, device=device, windowed=windowed, screen=screen)
+    chosen = resumed(
+        folder,
+        protocol=protocol,
+        operator=operator,
+        device=device,
+        windowed=windowed,
+        screen=screen,
+        firmware=firmware,
+    )
     check(chosen, load(chosen.source))
     return _hold(chosen, tell)
 
@@ -180,6 +194,7 @@ class LiveSession(QObject):
 
     over = Signal()
     _ready = Signal(object)
+    _said = Signal(str)
 
     def __init__(self, chosen: NewSession, theme: Theme, tell: Callable[[str], object] | None = None) -> None:
         super().__init__()
@@ -195,6 +210,7 @@ class LiveSession(QObject):
         self._closed = False
         self._working = False
         self._ready.connect(self._begin, Qt.ConnectionType.QueuedConnection)
+        self._said.connect(self._say, Qt.ConnectionType.QueuedConnection)
 
     def open(self) -> None:
         """Show the note, and make device and servo ready beside it."""
@@ -219,7 +235,8 @@ class LiveSession(QObject):
         """Compile, open, start and measure, in a thread of its own; whatever comes of it goes to ``_begin``."""
         machine: Machine | None = None
         try:
-            machine = open_machine(self.chosen, load(self.chosen.source))
+            study = load(self.chosen.source)
+            machine = open_machine(self.chosen, study, tell=self._said.emit, cancelled=lambda: self._closed)
             made: object = Ready(machine, measured(machine, self.chosen))
         except Exception as error:  # noqa: BLE001 - handed over, not swallowed: a thread has nobody to raise it to
             if machine is not None:
@@ -265,6 +282,13 @@ class LiveSession(QObject):
         self.bridge.done.connect(self._finished)
         self._close_note()
         self.bridge.start()
+
+    def _say(self, line: str) -> None:
+        """Tell what the device asks for while it is being opened."""
+        if self._tell is not None:
+            self._tell(line)
+        if self.note is not None:
+            self.note.say(line)
 
     def _pass_checks(self, found: tuple[Check, ...]) -> None:
         """Tell what the pre-flight found; refuse the session if it must not begin."""

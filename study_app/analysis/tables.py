@@ -21,6 +21,7 @@ from study_app.analysis.questions import Block, Kind, Setting, settings_of
 from study_app.analysis.sessions import Session, read_session
 from study_app.errors import AnalysisError
 from study_app.store import blinding
+from study_app.store.abandoned import never_begun
 from study_app.store.doubts import Doubt, doubts
 from study_app.store.exclusions import Exclusion, exclusions
 from study_app.store.layout import StudyFolder
@@ -135,7 +136,7 @@ def load_study(folder: Path) -> Study:
         The key was opened, and is now missing or changed; or ``exclusions.csv`` cannot be read.
     """
     place = StudyFolder(Path(folder))
-    sessions = place.sessions()
+    sessions = [session for session in place.sessions() if not never_begun(session.path)]
     if not sessions:
         raise AnalysisError(_no_sessions(place.path))
     key = blinding.revealed_key(place.path)

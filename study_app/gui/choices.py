@@ -7,20 +7,21 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+from study_app.devices import is_simulated, kind_of
 from study_app.errors import StoreError
 from study_app.session.resume import find_protocol
-from study_app.store.layout import locate, study_folder
+from study_app.store.layout import locate, refuse_never_begun, study_folder
 from study_app.store.progress import progress
 
 MAX_SEED = 999_999
-SIMULATED_DEVICE = "scripted"
 
 
 @dataclass(frozen=True, slots=True)
 class NewSession:
     """What the operator chose; ``results`` is the study's folder, ``screen`` counts from 1 (None: the last).
 
-    ``resumes`` is the folder of the session that goes on, None for a new one.
+    ``resumes`` is the folder of the session that goes on, None for a new one; ``firmware`` the file of a Falcon's
+    program, where it needs one.
     """
 
     source: str
@@ -36,6 +37,7 @@ class NewSession:
     pilot: bool = False
     recordings: bool = True
     resumes: Path | None = None
+    firmware: Path | None = None
 
 
 def resumed(
@@ -47,6 +49,7 @@ def resumed(
     device: str | None = None,
     windowed: bool = False,
     screen: int | None = None,
+    firmware: Path | None = None,
 ) -> NewSession:
     """Return the choices to go on with the session in a folder: its own, and where its windows open now.
 
@@ -58,6 +61,7 @@ def resumed(
         No protocol at hand is of its study.
     """
     study, folder = locate(session_folder)
+    refuse_never_begun(folder)
     done = progress(session_folder)
     if done.ended is not None:
         raise StoreError(
@@ -78,6 +82,7 @@ def resumed(
         pilot=start["pilot"],
         recordings=bool(start.get("recordings")),
         resumes=session_folder,
+        firmware=firmware,
     )
 
 
@@ -88,5 +93,5 @@ def draw_seed() -> int:
 
 def study_results(results: Path, study: str, device: str, *, pilot: bool = False) -> Path:
     """Return a study's folder under ``results``; pilots and simulated hands are kept apart from participants' data."""
-    name = f"{study}-{device}" if device == SIMULATED_DEVICE else study
+    name = f"{study}-{kind_of(device)}" if is_simulated(device) else study
     return study_folder(results, name, pilot=pilot).path

@@ -26,10 +26,16 @@ from study_app.gui.home.facts import LANGUAGES, StudyFacts
 from study_app.gui.labels import label, set_ink
 from study_app.gui.theme import LIGHT, Theme, font
 from study_app.gui.themed import wear
+from study_app.store.abandoned import abandoned
 from study_app.store.description import check_study
 from study_app.store.layout import MAX_SESSION, StudyFolder, check_participant, check_unused, suggest_id
 
-DEVICE_WORDS = {"mouse": "Mouse (seen, not felt)", "scripted": "Scripted hand (moves by itself)"}
+DEVICE_WORDS = {
+    "mouse": "Mouse (seen, not felt)",
+    "falcon": "Novint Falcon",
+    "scripted": "Scripted hand (moves by itself)",
+    "falcon-emulated": "Emulated Falcon (moves by itself)",
+}
 
 
 class NewSessionDialog(QDialog):
@@ -226,7 +232,11 @@ class NewSessionDialog(QDialog):
     def _offer_ways(self) -> None:
         """Where the id is used, offer the ways to go on that need no thought; going on with its session is for home."""
         participant, folder = self.participant.text().strip(), StudyFolder(Path(self.results.text().strip() or "."))
-        held = [session.number for session in folder.sessions() if session.participant == participant]
+        held = [
+            session.number
+            for session in folder.sessions()
+            if session.participant == participant and not abandoned(session.path)
+        ]
         self._ways_row.setVisible(self.session.value() in held)
         if self.session.value() not in held:
             return

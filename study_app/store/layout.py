@@ -23,6 +23,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from study_app.errors import StoreError
+from study_app.store.abandoned import abandoned
 from study_app.store.atomic import is_there
 
 MAX_ID_LENGTH = 32
@@ -177,6 +178,8 @@ def check_participant(participant: str, *, pilot: bool = False) -> None:
 def check_unused(folder: StudyFolder, participant: str, number: int) -> None:
     """Refuse a session that exists, or an id that differs from a used one in nothing but capitals.
 
+    A session that was claimed by a program that is gone, and never begun, can be begun.
+
     Raises
     ------
     StoreError
@@ -190,8 +193,24 @@ def check_unused(folder: StudyFolder, participant: str, number: int) -> None:
                 f"participant id {participant!r} differs from the used {used!r} in capitals alone: use {used!r} with a "
                 "new session number, or another id"
             )
-    if is_there(folder.session(participant, number).path):
+    path = folder.session(participant, number).path
+    if is_there(path) and not abandoned(path):
         raise used_id(folder, participant, number)
+
+
+def refuse_never_begun(session: SessionFolder) -> None:
+    """Refuse to go on with a session that was claimed and never begun.
+
+    Raises
+    ------
+    StoreError
+        Says how it is begun.
+    """
+    if abandoned(session.path):
+        raise StoreError(
+            f"{session.path} was claimed, and its program was ended before the session began, so that nothing can go "
+            f"on: begin it as a new session of participant {session.participant}, number {session.number} (run)"
+        )
 
 
 def used_id(folder: StudyFolder, participant: str, number: int) -> StoreError:
@@ -204,6 +223,10 @@ def used_id(folder: StudyFolder, participant: str, number: int) -> StoreError:
 
 
 def suggest_id(folder: StudyFolder) -> str:
-    """Return the next free id: P001, P002 ..."""
-    numbers = [int(match[1]) for used in folder.ids() if (match := _NUMBERED.fullmatch(used.upper()))]
+    """Return the next free id: P001, P002 ...; those of sessions that were never begun are free again."""
+    numbers = [
+        int(match[1])
+        for session in folder.sessions()
+        if (match := _NUMBERED.fullmatch(session.participant.upper())) and not abandoned(session.path)
+    ]
     return f"P{max(numbers, default=0) + 1:03d}"

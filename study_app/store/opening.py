@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from study_app.errors import StoreError
-from study_app.store.atomic import cannot_write, sync_folder, write_file
+from study_app.store.atomic import cannot_write, create_folder, is_there, sync_folder, write_file
 
 _MARKER = re.compile(r"\.open-[0-9a-f]{8}\.json")
 _BOOT = Path("/proc/sys/kernel/random/boot_id")
@@ -61,6 +61,24 @@ def open_alone(folder: Path) -> Opening:
         opening.release()
         raise
     return opening
+
+
+def create_opened(folder: Path) -> Opening | None:
+    """Create ``folder``, open in this program from the first moment on; None where there is one that holds something.
+
+    Raises
+    ------
+    StoreError
+        It is not there and cannot be created.
+    """
+    opening = Opening(folder / f".open-{secrets.token_hex(4)}.json")
+    try:
+        created = create_folder(folder, {opening.marker.name: json.dumps(_this_program()).encode()})
+    except StoreError:
+        if is_there(folder):
+            return None
+        raise
+    return opening if created else None
 
 
 def markers(folder: Path) -> tuple[Path, ...]:

@@ -23,7 +23,7 @@ from study_app.store.checksums import sha256
 from study_app.store.description import write_description
 from study_app.store.events import check_fields
 from study_app.store.journal import Journal, Line, SessionClock
-from study_app.store.layout import SessionFolder, locate
+from study_app.store.layout import SessionFolder, locate, refuse_never_begun
 from study_app.store.open_session import Place, SessionStore
 from study_app.store.opening import open_alone
 from study_app.store.participants import write_participants
@@ -68,6 +68,7 @@ def reopen(
         torn tail nothing has changed then.
     """
     study_folder, folder = locate(session_folder)
+    refuse_never_begun(folder)
     opening = open_alone(folder.path)
     try:
         contents = journal.whole(folder.journal)

@@ -9,17 +9,19 @@ from pathlib import Path
 from typing import Any
 
 import study_app
+from study_app.errors import StoreError
 from study_app.protocol.load import protocol_hash
 from study_app.protocol.model import Protocol
 from study_app.protocol.schedule import stream
 from study_app.store import receipt
-from study_app.store.atomic import cannot_write, is_there, sync_folder
+from study_app.store.abandoned import take_over
+from study_app.store.atomic import beside, cannot_write, is_there, sync_folder
 from study_app.store.blinding import Key, open_or_draw_key
 from study_app.store.description import check_study, write_description
 from study_app.store.journal import Journal, SessionClock
 from study_app.store.layout import StudyFolder, check_participant, check_unused, used_id
 from study_app.store.open_session import Place, SessionStore
-from study_app.store.opening import open_alone
+from study_app.store.opening import Opening, create_opened
 from study_app.store.participants import write_participants
 from study_app.store.recorder import Recorder
 
@@ -45,8 +47,8 @@ def begin(
 ) -> SessionStore:
     """Claim a session in the study folder ``results`` and write everything that must be there before the first trial.
 
-    The folder is created exclusively: of two programs that want one id, one gets it. On any failure the claimed folder
-    is taken away again.
+    The folder is created exclusively: of two programs that want one id, one gets it. A folder that a program claimed
+    which was ended before it wrote a line is taken over. On any failure the claimed folder is taken away again.
 
     Parameters
     ----------
@@ -100,11 +102,11 @@ def begin(
         **surroundings(device, screens, clock),
         "protocol": receipt.without_conditions(protocol),
     }
-    _claim(place)
+    opening = _claim(place)
     try:
-        return _open(place, clock, key, first_receipt, started, protocol)
+        return _open(place, opening, clock, key, first_receipt, started, protocol)
     except BaseException:
-        _unclaim(place)
+        _unclaim(place, opening)
         raise
 
 
@@ -138,28 +140,50 @@ def _make_folder(path: Path) -> None:
         raise cannot_write(path, error) from error
 
 
-def _claim(place: Place) -> None:
-    """Create the session's folder, which must not exist."""
+def _claim(place: Place) -> Opening:
+    """Create the session's folder, which must not have been begun, open in this program from the first moment on."""
     path = place.folder.path
     try:
-        path.mkdir(parents=True)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        opening = create_opened(path) or take_over(path)
+    except OSError as error:
+        raise cannot_write(path, error) from error
+    except StoreError:
+        _take_away_empty(path.parent)
+        raise
+    if opening is None:
+        raise used_id(place.study_folder, place.folder.participant, place.folder.number)
+    return opening
+
+
+def _sync_above(path: Path) -> None:
+    """Let no power cut take the session's folder, or one above it."""
+    try:
         for above in (path.parent, path.parent.parent, path.parent.parent.parent):
             sync_folder(above)
-    except FileExistsError as error:
-        raise used_id(place.study_folder, place.folder.participant, place.folder.number) from error
     except OSError as error:
         raise cannot_write(path, error) from error
 
 
-def _unclaim(place: Place) -> None:
-    """Take the claimed folder away again, and the participant's if it holds nothing else."""
-    shutil.rmtree(place.folder.path, ignore_errors=True)
+def _unclaim(place: Place, opening: Opening) -> None:
+    """Take the claimed folder away again in one step, and the participant's if it holds nothing else."""
+    path = place.folder.path
+    away = beside(path)
     with contextlib.suppress(OSError):
-        place.folder.path.parent.rmdir()
+        path.rename(away)
+    shutil.rmtree(away if is_there(away) else path, ignore_errors=True)
+    opening.release()
+    _take_away_empty(path.parent)
+
+
+def _take_away_empty(folder: Path) -> None:
+    with contextlib.suppress(OSError):
+        folder.rmdir()
 
 
 def _open(
     place: Place,
+    opening: Opening,
     clock: SessionClock,
     key: Key,
     session_receipt: dict[str, Any],
@@ -167,13 +191,13 @@ def _open(
     protocol: Protocol,
 ) -> SessionStore:
     """Write receipt, first line, tables and description into the claimed folder."""
-    opening = open_alone(place.folder.path)
+    _sync_above(place.folder.path)
     recorder = make_recorder(place, started, clock)
     receipt.write(place.folder.receipt, session_receipt)
     journal = Journal.create(place.folder.journal, clock)
     store = SessionStore(place, journal, key, session_receipt, opening, recorder=recorder)
     with contextlib.ExitStack() as failing:
-        failing.callback(store.close)
+        failing.callback(journal.close)
         store.append("session_started", t_s=0.0, **started)
         store.write_tables()
         if store.behind is not None:

@@ -43,7 +43,10 @@ def check_session(place: Place, key_hash: str | None, found: Gathered) -> list[L
 
 def _journal(folder: SessionFolder, found: Gathered) -> list[Line]:
     if not is_there(folder.journal):
-        found.warning(folder.path, "was claimed, and its program was ended before it wrote a journal")
+        found.warning(
+            folder.path,
+            "was claimed, and its program was ended before it wrote a journal: begin it again, or delete it",
+        )
         return []
     try:
         contents = journal.scan(folder.journal)

@@ -118,3 +118,8 @@ def test_the_commands_say_nothing_where_there_is_nothing_to_say(
 ) -> None:
     finished = CliRunner().invoke(commands, [command, str(copy.path), "--to", str(tmp_path / "out")])
     assert (finished.exit_code, finished.stderr) == (0, "")
+
+
+def test_a_session_that_was_never_begun_stops_no_analysis(copy: StudyFolder, tmp_path: Path) -> None:
+    copy.session("P099", 1).path.mkdir(parents=True)
+    assert len(load_study(copy.path).participants) == 3

@@ -1,8 +1,9 @@
 """Kills rehearsed sessions at random moments and lets them be resumed: run as a program, once for all of them.
 
 Everything is loaded and compiled once; then each session is a fork that is killed with SIGKILL, and each going on
-another one (or a rebuilding, where only files that follow from the journal were missing). For every session it writes a
-line of JSON: the folder, after how long it was killed, what its journal held then, and how the going on ended.
+another one (a rebuilding, where only files that follow from the journal were missing, or the session's beginning, where
+it had not begun). For every session it writes a line of JSON: the folder, after how long it was killed, what its
+journal held then, and how the going on ended.
 """
 
 from __future__ import annotations
@@ -64,6 +65,8 @@ def main(protocol: str, folder: str, count: str, seed: str) -> None:
             resumed = forked(lambda place=place: rebuild(place))
         elif code == -signal.SIGKILL and "\n" in held:
             resumed = forked(lambda place=place: rehearsal.resume(place, protocol=protocol))
+        elif code == -signal.SIGKILL:
+            resumed = forked(lambda killed=killed: session(protocol, killed))
         became = {"folder": str(killed), "after_s": after_s, "code": code, "held": held, "resumed": resumed}
         sys.stdout.write(json.dumps(became) + "\n")
         sys.stdout.flush()

@@ -28,7 +28,9 @@ def dialog(qtbot, results):
 
 
 def use(results: Path, participant: str, session: int = 1) -> None:
-    (results / "rek2024" / "data" / f"sub-{participant}" / f"ses-{session:02d}").mkdir(parents=True)
+    folder = results / "rek2024" / "data" / f"sub-{participant}" / f"ses-{session:02d}"
+    folder.mkdir(parents=True)
+    (folder / "checksums.sha256").touch()  # something that comes after a session's beginning
 
 
 def files(folder: Path) -> list[Path]:

@@ -12,6 +12,7 @@ from study_app.store.layout import StudyFolder, check_participant, check_unused,
 def with_sessions(path: Path, *names: str) -> StudyFolder:
     for name in names:
         (path / "data" / name).mkdir(parents=True)
+        (path / "data" / name / "checksums.sha256").touch()  # something that comes after a session's beginning
     return StudyFolder(path)
 
 
