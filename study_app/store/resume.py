@@ -164,4 +164,7 @@ def _recordings_found(folder: SessionFolder, lines: list[Line]) -> Iterator[tupl
             felt = recording.Written(samples, facts["rows"], sha256(samples))
             yield event_of(Recorded(trial, attempt, felt, shown, facts["dropped"]))
         except StoreError:
+            if not is_there(samples):  # frames are put in their place first, and are no recording alone
+                with contextlib.suppress(OSError):
+                    frames.unlink(missing_ok=True)
             yield event_of(Lost(trial, attempt, "the program ended before it was whole"))

@@ -12,6 +12,7 @@ from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from study_app import __version__
@@ -22,8 +23,8 @@ from study_app.protocol.schedule import Trial, build_schedule
 from study_app.store import journal, receipt
 from study_app.store.opening import is_open
 from study_app.store.rebuild import rebuild
-from study_app.store.recorder import event_of
-from study_app.store.recording import read_samples
+from study_app.store.recorder import event_of, recording_files
+from study_app.store.recording import read_samples, write_frames
 from study_app.store.resume import reopen
 from study_app.store.session import SessionStore
 from study_app.store.verify import verify
@@ -347,7 +348,7 @@ def test_a_disk_without_space_for_the_line_changes_nothing_and_it_can_be_tried_a
 def test_recordings_without_a_line_are_taken_up_if_whole_and_lost_if_not(
     start: Callable[..., SessionStore], again: Again, samples_of: Callable[..., Any], protocol: Protocol
 ) -> None:
-    """The program was killed before the journal heard of the second, and while the third was half done."""
+    """The program was killed before the journal heard of the second, and between frames and samples of the third."""
     store = start(recordings=True)
     trials = build_schedule(protocol, "P007", 11).trials[:3]
     assert store.recorder is not None
@@ -364,11 +365,14 @@ def test_recordings_without_a_line_are_taken_up_if_whole_and_lost_if_not(
     store._opening.release()
     torn = store.folder.recordings / ".trial-003.parquet.0123abcd.tmp"
     torn.write_bytes(b"PAR1")
+    frames = recording_files(store.folder.recordings, 3, 1)[1]
+    write_frames(frames, np.zeros((2, 2), np.int64), {"trial": 3, "attempt": 1})
     table = store.folder.path / ".receipt.json.89abcdef.tmp"
     table.write_bytes(b"{")
 
     with again() as resumed:
         assert not torn.exists()
+        assert not frames.exists()
         assert not table.exists()
         told_of = [line for line in resumed.lines if line["event"] in ("recorded", "recording_lost")]
         assert [(line["event"], line["trial"]) for line in told_of] == [
