@@ -47,7 +47,7 @@ def test_a_view_becomes_texts(running):
     assert running.stop.word.text() == "Force is on"
 
 
-def test_the_limit_a_trial_broke_can_be_read_in_the_smallest_window(window, told, health):
+def test_the_limit_a_trial_broke_can_be_read_in_the_smallest_window(window, told, health, qtbot):
     told.welcome()
     told.start(1)
     window.show_view(told.view(health))
@@ -57,12 +57,11 @@ def test_the_limit_a_trial_broke_can_be_read_in_the_smallest_window(window, told
     told.end(2, delay_error_p95_ms=27.2)
     window.resize(window.minimumSize())
     window.show_view(told.view(health))
-    QApplication.processEvents()
     line = window.rail.beyond
     assert line.text() == "Liquid setting 2 out of limits: delay error, p95, 27.2 ms, limit 25 ms."
     assert "longest gap of the servo 31 ms" in line.toolTip()
-    assert line.height() >= line.heightForWidth(line.width())
-    assert window.rail.rect().contains(line.geometry())
+    qtbot.waitUntil(lambda: line.height() >= line.heightForWidth(line.width()))
+    qtbot.waitUntil(lambda: window.rail.rect().contains(line.geometry()))
 
 
 def test_stop_force_speaks_at_the_press_not_at_the_release(running, qtbot):
