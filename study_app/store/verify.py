@@ -104,13 +104,13 @@ def _description(study: StudyFolder, found: Gathered) -> None:
         found.error(study.description, "is not what this version writes for the study in the receipts")
 
 
-def _published(study: StudyFolder) -> list[Any]:
+def _published(study: StudyFolder) -> list[dict[str, Any]]:
     """Return the protocols of the receipts that can be read."""
     protocols = []
     for session in study.sessions():
         with contextlib.suppress(StoreError):  # said of the receipt already
             protocols.append(receipt.read(session.receipt).get("protocol"))
-    return protocols
+    return [protocol for protocol in protocols if isinstance(protocol, dict)]
 
 
 def _exclusions(study: StudyFolder, journals: Journals, found: Gathered) -> None:
@@ -143,7 +143,8 @@ def _reveals(study: StudyFolder, key: Key | None, found: Gathered) -> None:
 
 def _blinding(study: StudyFolder, key: Key | None, found: Gathered) -> None:
     """Say where a condition is told before the key was revealed, but not which."""
-    if key is None or blinding.reveals(study.path):
+    published = _published(study)
+    if key is None or blinding.reveals(study.path) or not published:
         return
-    for leak in find_leaks(study.path, certain_telltales(key.tables, _published(study)[:1])):
+    for leak in find_leaks(study.path, certain_telltales(key.tables, published[:1])):
         found.warning(study.path, f"{leak.place} tells a condition, though the key is sealed")

@@ -289,6 +289,19 @@ def test_a_condition_that_is_told_is_found_but_not_repeated(
     assert "tells a condition" not in warned(verify(study))
 
 
+def test_a_receipt_without_a_protocol_makes_no_word_of_the_study_a_telltale(study: Path) -> None:
+    """A liquid may be called as a column or a page is; that stands in every receipt's protocol."""
+    key = study / "blinding" / "key.sealed"
+    content = json.loads(base64.b64decode(key.read_bytes()))
+    content["tables"]["liquids"]["Settings"] = content["tables"]["liquids"].pop("mildew")
+    key.write_bytes(base64.encodebytes(json.dumps(content).encode()))
+    assert "tells a condition" not in warned(verify(study))
+    for participant in ("P007", "P008"):
+        of_receipt(protocol=...)(study / "data" / f"sub-{participant}" / "ses-01" / "receipt.json")
+        assert "lacks protocol" in told(verify(study))
+        assert "tells a condition" not in warned(verify(study))
+
+
 def test_a_key_of_another_study_under_the_reveals_is_found(study: Path) -> None:
     blinding.reveal(study, "AB", "done")
     replace(blinding.reveals(study)[0]["key_hash"], "0" * 64)(study / "blinding" / "reveals.jsonl")
