@@ -16,7 +16,7 @@ import numpy as np
 from study_app.devices.falcon import emulator_ftdi as ftdi
 from study_app.devices.falcon import wire
 from study_app.devices.falcon.bulk import BULK, BulkCalls
-from study_app.devices.falcon.emulator_arm import ARMS, bend, count, push_of, set_arms
+from study_app.devices.falcon.emulator_arm import ARMS, bend, count, set_arms, strain
 from study_app.devices.falcon.emulator_boot import LOADER, RUNNING, WAITING, load, reset
 from study_app.devices.falcon.emulator_faults import FAULTS, Faults, draw
 from study_app.devices.falcon.emulator_ftdi import BRIDGE, OUT_RING, byte_at
@@ -233,8 +233,9 @@ class Emulator(HandOrders):
     @property
     def force_n(self) -> tuple[float, float, float]:
         """The force of its motors on the hand, by virtual work [N]."""
-        x, y, z = (_push(self._state, axis) for axis in range(3))
-        return x, y, z
+        _strain(self._state)
+        x, y, z = self._state.arms.force_n
+        return float(x), float(y), float(z)
 
     @property
     def position_m(self) -> tuple[float, float, float]:
@@ -430,6 +431,5 @@ def _settle(e: Any) -> None:
 
 
 @kernel
-def _push(e: Any, axis: int) -> float:
-    from_motors: float = push_of(e.arms, e.run.acting, e.handle.position_m, axis)
-    return from_motors
+def _strain(e: Any) -> None:
+    strain(e.arms, e.run.acting, e.handle.position_m)

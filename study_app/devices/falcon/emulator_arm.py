@@ -30,11 +30,13 @@ ARMS = np.dtype(
         ("units_per_nm", np.float64),  # motor units that make an arm torque of 1 N m; a positive unit pulls inward
         ("centre_m", np.float64),  # the hand's origin, in front of the base
         ("angle_rad", np.float64, (3,)),  # as last found
+        ("force_n", np.float64, (3,)),  # of the motors on the grip, as last found
     ],
     align=True,
 )
 
-_STEP_M = 2e-5  # of the differences: truncated at 1e-7 of a derivative, rounded at 1e-8
+_STEP_M = 2e-5  # of the differences: truncated at 1e-7 of a derivative, rounded at 1e-11
+_STEP_RAD = 2e-4
 _ENOUGH_RAD = 1e-14
 _SECANTS = 12
 _HALVINGS = 60
@@ -67,20 +69,24 @@ def count(arms: Any, arm: int) -> int:
 
 
 @kernel
-def push_of(arms: Any, torque: Any, hand_m: Any, axis: int) -> float:
-    """Return the force along ``axis`` [N] of motor torques (3,) [units], the grip at ``hand_m`` where it was bent."""
+def strain(arms: Any, torque: Any, hand_m: Any) -> None:
+    """Put into ``arms.force_n`` what motor torques (3,) [units] make, the grip at ``hand_m`` where it was bent.
+
+    A step of the grip changes the rod's length, a turn of the arm must change it back: so many radians a metre.
+    """
     x, y, z = hand_m[0], hand_m[1], hand_m[2] + arms.centre_m
-    dx = _STEP_M if axis == 0 else 0.0
-    dy = _STEP_M if axis == 1 else 0.0
-    dz = _STEP_M if axis == 2 else 0.0
-    force = 0.0
+    d, turn = _STEP_M, _STEP_RAD
+    arms.force_n[0], arms.force_n[1], arms.force_n[2] = 0.0, 0.0, 0.0
     for i in range(3):
-        near = arms.angle_rad[i]
-        after = _angle(arms, i, x + dx, y + dy, z + dz, near)
-        before = _angle(arms, i, x - dx, y - dy, z - dz, near)
+        at = arms.angle_rad[i]
+        per_rad = (_stretch(arms, i, at + turn, x, y, z) - _stretch(arms, i, at - turn, x, y, z)) / (2.0 * turn)
+        if per_rad == 0.0:
+            continue
         arm_nm = -torque[i] / arms.units_per_nm
-        force += arm_nm * (after - before) / (2.0 * _STEP_M)
-    return force
+        share = -arm_nm / (per_rad * 2.0 * d)
+        arms.force_n[0] += share * (_stretch(arms, i, at, x + d, y, z) - _stretch(arms, i, at, x - d, y, z))
+        arms.force_n[1] += share * (_stretch(arms, i, at, x, y + d, z) - _stretch(arms, i, at, x, y - d, z))
+        arms.force_n[2] += share * (_stretch(arms, i, at, x, y, z + d) - _stretch(arms, i, at, x, y, z - d))
 
 
 @kernel

@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 
 from study_app.devices.falcon import wire
-from study_app.devices.falcon.emulator_arm import bend, count, push_of
+from study_app.devices.falcon.emulator_arm import bend, count, strain
 from study_app.devices.falcon.emulator_faults import (
     CORRUPT,
     DELAY,
@@ -214,12 +214,10 @@ def _load(e: Any) -> None:
     if e.run.acting[0] == 0.0 and e.run.acting[1] == 0.0 and e.run.acting[2] == 0.0:
         push(e.handle, 0.0, -e.weight_n, 0.0)
         return
-    at_m = e.handle.position_m
-    x = push_of(e.arms, e.run.acting, at_m, 0)
-    y = push_of(e.arms, e.run.acting, at_m, 1)
-    z = push_of(e.arms, e.run.acting, at_m, 2)
-    if math.isfinite(x + y + z):
-        push(e.handle, x, y - e.weight_n, z)
+    strain(e.arms, e.run.acting, e.handle.position_m)
+    force = e.arms.force_n
+    if math.isfinite(force[0] + force[1] + force[2]):
+        push(e.handle, force[0], force[1] - e.weight_n, force[2])
 
 
 @kernel
