@@ -27,7 +27,8 @@ READERS = 4  # files whose checksums are computed at the same time
 def check_session(place: Place, key_hash: str | None, found: Gathered) -> list[Line]:
     """Check one session and return its journal's lines, as far as they can be read."""
     folder = place.folder
-    for path in (*temporaries(folder.path), *temporaries(folder.recordings)):
+    half = () if is_open(folder.path) else (*temporaries(folder.path), *temporaries(folder.recordings))
+    for path in half:
         found.warning(path, "was left half-written by a program that was ended; rebuild takes it away")
     lines = _journal(folder, found)
     _receipt(folder, lines, key_hash, found)
@@ -201,6 +202,8 @@ def _recordings(folder: SessionFolder, lines: list[Line], hashes: Mapping[str, s
             if hashes[name] != digest:
                 found.error(folder.path / name, f"has changed since it was recorded ({which})")
             _facts(folder, line, kind, name, rows, found)
+    if is_open(folder.path):  # what is recorded is journalled with the next page
+        return
     ends = lines[-1]["event"] == "session_ended"
     if lines[0].get("recordings"):
         for trial, attempt in attempts(lines)[: None if ends else -1]:
@@ -208,7 +211,8 @@ def _recordings(folder: SessionFolder, lines: list[Line], hashes: Mapping[str, s
                 found.warning(folder.recordings, f"trial {trial}, attempt {attempt} has none, and no line says why")
     for name in sorted(hashes.keys() - told):
         if name.endswith(".parquet"):
-            found.warning(folder.path / name, "is in no line of the journal; resuming the session takes it up")
+            then = "" if ends else "; resuming the session takes it up"
+            found.warning(folder.path / name, f"is in no line of the journal{then}")
 
 
 def _facts(folder: SessionFolder, line: Line, kind: str, name: str, rows: int, found: Gathered) -> None:

@@ -221,6 +221,26 @@ def test_what_should_be_known_is_a_warning(study: Path, start: Callable[..., Ses
     assert told(findings) == ""
 
 
+def test_what_a_running_session_is_just_recording_is_not_said_to_be_left(
+    study: Path, start: Callable[..., SessionStore]
+) -> None:
+    told_of = {"block": "b", "phase": "main", "part": 1, "index": 1, "of": 1, "code": "L1"}
+    store = start("P009", recordings=True)
+    store.folder.recordings.mkdir()
+    for trial in (1, 2):
+        store.append("trial_started", trial=trial, attempt=1, **told_of)
+    (store.folder.recordings / ".trial-002.parquet.0123abcd.tmp").touch()
+    (store.folder.recordings / "trial-001.parquet").write_bytes(b"PAR1")
+    place = "data/sub-P009/ses-01"
+    running = [line for line in warned(verify(study)).splitlines() if place in line]
+    assert [line for line in running if "journal gives" not in line] == [f"{place}: runs in another program"]
+    store.close()
+    left = warned(verify(study))
+    assert ".trial-002.parquet.0123abcd.tmp: was left half-written" in left
+    assert "trial-001.parquet: is in no line of the journal; resuming the session takes it up" in left
+    assert "recordings: trial 1, attempt 1 has none, and no line says why" in left
+
+
 def test_tables_of_a_session_that_has_not_ended_may_be_behind_its_journal(
     study: Path, start: Callable[..., SessionStore], summary: dict[str, Any]
 ) -> None:
