@@ -99,7 +99,7 @@ class Emulator(HandOrders):
         random = random or Random(0)  # noqa: S311 - faults and tremor keep no secrets
         self._tremble(random, tremor_m)
         self.faults = Faults(self._state.faults, random)
-        ftdi.set_bridge(self._state.bridge)
+        ftdi.power_up(self._state.bridge)
         set_arms(self._state.arms, self.geometry, units_per_nm, arm_offset_rad)
         self._state.handle = new_scripted_handle(quantum_m=0.0)
         self._state.handle.stop_m = STOPS_M
@@ -292,6 +292,9 @@ def _begin(e: Any) -> None:
         e.moved_ns += jump_ns
         e.hand.began_ns += jump_ns
         e.run.stalled_ns += jump_ns
+    if e.faults.was_unplugged:
+        e.faults.was_unplugged = 0
+        ftdi.power_up(e.bridge)
     _advance(e, e.bridge.now_ns)
 
 

@@ -40,6 +40,7 @@ FAULTS = np.dtype(
         ("stall_ns", np.int64),
         ("ignored_pings", np.int64),
         ("state", np.uint64),  # of the generator
+        ("was_unplugged", np.int64),  # 1 until the bridge has begun anew
         *((name, np.int64) for name in SWITCHES),
     ],
     align=True,
@@ -98,6 +99,8 @@ class Faults:
     def on(self, name: str, on: bool = True) -> None:
         """Switch it on, or off."""
         setattr(self._state, _switch(name), int(on))
+        if name == "unplugged" and on:
+            self._state.was_unplugged = 1
 
     def off(self, name: str) -> None:
         """Switch it off."""

@@ -62,9 +62,13 @@ _STATUS = (0x01, 0x60)  # modem status, line status: ready and empty
 _EIGHTHS = (0, 4, 2, 1)  # of a divisor, by its two highest bits
 
 
-def set_bridge(bridge: Any) -> None:
-    """Make a bridge as it is after power-up."""
+@kernel
+def power_up(bridge: Any) -> None:
+    """Make the bridge as it is when its cable was plugged in: 9600 baud, 16 ms, nothing in its buffers."""
     bridge.divisor, bridge.latency_ns, bridge.event = wire.BAUD_9600, 16_000_000, -1
+    bridge.dtr = 0
+    bridge.out_first, bridge.back_first = bridge.out_last, bridge.back_last
+    bridge.out_free_ns, bridge.back_free_ns, bridge.sent_ns = bridge.now_ns, bridge.now_ns, bridge.now_ns
 
 
 @kernel

@@ -156,14 +156,19 @@ def test_time_goes_on_by_what_a_transfer_takes_and_by_pauses_alone():
     assert emulator.now_ns - began_ns < 251 * MS
 
 
-def test_unplugged_it_is_gone_and_comes_back():
+def test_unplugged_it_is_gone_and_comes_back_as_after_power_up():
     emulator = at_work()
+    exchanged(emulator, (50, 60, 70))
     emulator.faults.on("unplugged")
     assert emulator.write(QUIET, 10) == (wire.ERROR_NO_DEVICE, 0)
     assert emulator.read(64, 10) == (wire.ERROR_NO_DEVICE, b"")
     assert emulator.control(wire.REQUEST_LATENCY, 1) == wire.ERROR_NO_DEVICE
     emulator.faults.off("unplugged")
+    assert exchanged(emulator) == b""
+    assert emulator.torques == (50, 60, 70)
+    emulator.control(wire.REQUEST_BAUD, wire.BAUD_1500000)
     assert len(exchanged(emulator)) == 16
+    assert emulator.torques == (0, 0, 0)
 
 
 def test_an_endpoint_that_is_none_is_not_found():
