@@ -30,7 +30,7 @@ from study_app.evaluation.faults import BUTTON, GLITCH, JUMP, LOST, LOST_AT_WRIT
 from study_app.evaluation.ledger import wake_of
 from study_app.evaluation.memory import resident_bytes
 from study_app.evaluation.restless import RestlessHand
-from study_app.evaluation.soaked import Rests, Soaked
+from study_app.evaluation.soaked import FELT_N, Rests, Soaked
 from study_app.haptics.clock import SystemClock, VirtualClock
 from study_app.haptics.gate import resolve
 from study_app.haptics.layout import SAMPLE, records
@@ -121,6 +121,7 @@ class Soak:
         self._recoveries, self._loads, self._stops = 0, 0, 0
         self._presented = self._names[0]
         self._stretch: Stretch | None = None
+        self._still_from = 0
         self._memory: list[int] = []
         self._began_s = self._turned_s = 0.0
 
@@ -223,6 +224,7 @@ class Soak:
         """Set the stage for a part of a round."""
         self._due = _Due(motion=tick)
         if stretch.part == "rest":
+            self._still_from = tick
             self.device.allow({}, ROUGH_GAP)
             self.servo.fade_in()
             self.hand.keep_still()
@@ -237,14 +239,18 @@ class Soak:
             self._due.stop = self._later(tick, 1.0, 10.0)
 
     def _leave(self) -> None:
-        """Read what a rest has left of wake and force, where a liquid leaves none by itself."""
+        """Read what a rest has left of wake and force."""
         sample = self.servo.telemetry.latest()
+        if self._is_left_alone and sample is not None:
+            self._rests.count += 1
+            self._rests.wake_mps = max(self._rests.wake_mps, _size(sample.wake_mps))
+            self._rests.force_n = max(self._rests.force_n, _size(sample.force_n))
+
+    @property
+    def _is_left_alone(self) -> bool:
+        """Whether the hand keeps still in a liquid that leaves no force by itself."""
         effects = {effect for liquid in self._scenes[self._presented].liquids for effect in liquid.effects}
-        if self._stretch is None or self._stretch.part != "rest" or sample is None or effects - {"drag", "wake"}:
-            return
-        self._rests.count += 1
-        self._rests.wake_mps = max(self._rests.wake_mps, _size(sample.wake_mps))
-        self._rests.force_n = max(self._rests.force_n, _size(sample.force_n))
+        return self._stretch is not None and self._stretch.part == "rest" and not effects - {"drag", "wake"}
 
     def _act(self, stretch: Stretch, tick: int) -> None:
         """Do what is due: another motion, another liquid, the force stopped, the force let on again."""
@@ -284,10 +290,13 @@ class Soak:
         self._load(self._presented)
 
     def _look(self) -> None:
-        """Look at all samples that are new, and once a tenth at the memory."""
+        """Look at all samples that are new, and at every tenth at the memory."""
         samples = self._reader.read()
         self.audit.take(samples)
         self.drift.take(samples)
+        pushed = samples.tick[np.linalg.norm(samples.device_force_n, axis=1) > FELT_N]
+        if self._is_left_alone and pushed.size:
+            self._rests.pushed_s = max(self._rests.pushed_s, (int(pushed[-1]) - self._still_from) / self._rate_hz)
         if len(self._memory) <= min(10 * self.done // self.ticks, 9) and self.done > 0:
             self._memory.append(resident_bytes())
 

@@ -18,6 +18,7 @@ from study_app.store.atomic import write_file
 MOST_DRIFT: Final = 1e-9  # of the wake, in units of Σ|e|/S
 MOST_GROWTH_BYTES: Final = 5 * 2**20
 MOST_RESIDUE_N: Final = 1e-12
+FELT_N: Final = 0.05
 
 _SEEN: Final = {
     NON_FINITE: "not_finite",
@@ -32,9 +33,13 @@ _SEEN: Final = {
 
 @dataclass(slots=True)
 class Rests:
-    """What was left of wake [m/s] and force [N] after the hand had kept still, at most."""
+    """What was left of wake [m/s] and force [N] after the hand had kept still, at most.
+
+    ``pushed_s`` is how long a force above ``FELT_N`` was sent to a hand that kept still.
+    """
 
     count: int = 0
+    pushed_s: float = 0.0
     wake_mps: float = 0.0
     force_n: float = 0.0
 
@@ -159,7 +164,8 @@ class Soaked:
             f"  clock against ticks   {self.counts.drift_ns} ns",
             f"  wake and definition   {drift.worst:.1e} of Σ|e|/S at most in {drift.comparisons:,} looks; "
             f"a wake ran for {drift.longest_s:,.0f} s",
-            f"  left after {rests.count:,} rests   wake {rests.wake_mps:g} m/s, force {rests.force_n:.1e} N",
+            f"  left after {rests.count:,} rests   wake {rests.wake_mps:g} m/s, force {rests.force_n:.1e} N; "
+            f"more than {FELT_N} N for {rests.pushed_s:.2f} s at most",
         )
 
     def _force_text(self) -> tuple[str, ...]:
@@ -211,6 +217,7 @@ class Soaked:
             "rests": self.rests.count,
             "residue_wake_mps": self.rests.wake_mps,
             "residue_force_n": self.rests.force_n,
+            "pushed_at_rest_s": self.rests.pushed_s,
             "largest_force_n": float(self.device.most_n),
             "largest_step_n": float(self.counts.steepest_n),
             "largest_let_go_n": float(self.counts.let_go_n),
