@@ -7,55 +7,38 @@ depends on nothing but what it is told and the ``random`` it was made with.
 
 from __future__ import annotations
 
-from functools import cache
 from random import Random
 from typing import Any
 
 import numpy as np
 
-from study_app.devices.falcon import emulator_ftdi as ftdi
 from study_app.devices.falcon import wire
-from study_app.devices.falcon.bulk import BULK, BulkCalls
-from study_app.devices.falcon.emulator_arm import ARMS, bend, count, set_arms, strain
-from study_app.devices.falcon.emulator_boot import LOADER, RUNNING, WAITING, load, reset
-from study_app.devices.falcon.emulator_faults import FAULTS, Faults, draw
-from study_app.devices.falcon.emulator_ftdi import BRIDGE, OUT_RING, byte_at
-from study_app.devices.falcon.emulator_run import LONGEST_NS, RUN, live, work
+from study_app.devices.falcon.bulk import BulkCalls
+from study_app.devices.falcon.emulator_arm import set_arms
+from study_app.devices.falcon.emulator_boot import RUNNING
+from study_app.devices.falcon.emulator_faults import Faults
+from study_app.devices.falcon.emulator_ftdi import power_up
+from study_app.devices.falcon.emulator_host import (
+    EMULATOR,
+    bulk,
+    control,
+    feel,
+    let_pass,
+    look,
+    run_program,
+    settle,
+    supply,
+)
 from study_app.devices.falcon.geometry import DEFAULT_GEOMETRY, Geometry, geometry_named
-from study_app.devices.hand import HAND
 from study_app.devices.hand_orders import HandOrders
 from study_app.devices.scripted import TREMOR_M, new_scripted_handle
-from study_app.haptics.cfunctions import c_function, record_at
-from study_app.haptics.compiled import kernel
 from study_app.haptics.layout import records
-from study_app.haptics.plant import HANDLE
-
-EMULATOR = np.dtype(
-    [
-        ("bridge", BRIDGE),
-        ("faults", FAULTS),
-        ("loader", LOADER),
-        ("run", RUN),
-        ("arms", ARMS),
-        ("handle", HANDLE),
-        ("hand", HAND),
-        ("powered", np.int64),  # 1 while the mains adapter is on
-        ("buttons", np.int64),  # bits 0 to 3, as the grip reports them
-        ("moved_ns", np.int64),  # up to when hand and handle have moved
-        ("weight_n", np.float64),  # of what hangs on the grip
-    ],
-    align=True,
-)
 
 STOPS_M = (0.055, 0.055, 0.050)
 """Half extents of the housing about the hand's origin: beyond any place a hand is sent to."""
 UNITS_PER_NM = 6616.0
 """Motor units for an arm torque of 1 N m: Martin & Hillier 2009; others measured 10 000."""
 ALL_HOMED = 0b111
-
-_emulator_at = record_at(EMULATOR)
-_INT = np.dtype([("value", np.int32)])
-_int_at = record_at(_INT)
 
 
 class Emulator(HandOrders):
@@ -67,7 +50,7 @@ class Emulator(HandOrders):
 
     Parameters
     ----------
-    random : where tremor, faults and the encoders' first counts are drawn from; None: always the same ones
+    random : where tremor and faults are drawn from; None: always the same ones
     geometry : its measures, or the name of published ones
     running : whether its program is loaded already
     serial : of its bridge
@@ -99,22 +82,22 @@ class Emulator(HandOrders):
         random = random or Random(0)  # noqa: S311 - faults and tremor keep no secrets
         self._tremble(random, tremor_m)
         self.faults = Faults(self._state.faults, random)
-        ftdi.power_up(self._state.bridge)
+        power_up(self._state.bridge)
         set_arms(self._state.arms, self.geometry, units_per_nm, arm_offset_rad)
         self._state.handle = new_scripted_handle(quantum_m=0.0)
         self._state.handle.stop_m = STOPS_M
         self._state.hand.place_m = self._state.hand.aim_m
         self._state.powered = 1
-        _settle(self._state)
+        settle(self._state)
         if running:
-            _run_program(self._state)
+            run_program(self._state)
 
     # The bridge, as a host sees it.
 
     def control(self, request: int, value: int) -> int:
         """Carry out a control request of the bridge; return 0 or a libusb error. ``recorded`` keeps them all."""
         self.recorded.append((request, value))
-        return int(_control(self._state, request, value))
+        return int(control(self._state, request, value))
 
     def write(self, data: bytes, timeout_ms: int) -> tuple[int, int]:
         """Transfer bytes out; return 0 or a libusb error, and how many it took."""
@@ -155,17 +138,17 @@ class Emulator(HandOrders):
 
     def pause(self, seconds: float) -> None:
         """Let emulated time pass, hand and handle move."""
-        _pause(self._state, round(seconds * 1e9))
+        let_pass(self._state, round(seconds * 1e9))
 
     def look(self) -> None:
         """Let it come up to the present of its clock: hear what has arrived, move for a while at most."""
-        _look(self._state)
+        look(self._state)
 
     # What it is and does.
 
     def power(self, on: bool) -> None:
         """Plug its mains adapter in, or pull it: then its program is lost and its arms are limp."""
-        _power(self._state, 1 if on else 0)
+        supply(self._state, 1 if on else 0)
 
     def take(self, fault: str) -> None:
         """Take a fault as a command line gives it: ``drop=0.01``, ``frozen`` or ``power-off``."""
@@ -233,7 +216,7 @@ class Emulator(HandOrders):
     @property
     def force_n(self) -> tuple[float, float, float]:
         """The force of its motors on the hand, by virtual work [N]."""
-        _strain(self._state)
+        feel(self._state)
         x, y, z = self._state.arms.force_n
         return float(x), float(y), float(z)
 
@@ -260,179 +243,3 @@ class Emulator(HandOrders):
     @held.setter
     def held(self, held: bool) -> None:
         self._state.handle.held = int(held)
-
-
-@cache
-def bulk() -> Any:
-    """Compile the transfer function, once for all emulators."""
-    return c_function(BULK, _bulk)
-
-
-def _bulk(handle: int, endpoint: int, data: int, length: int, transferred: int, timeout_ms: int) -> int:
-    e = _emulator_at(handle)
-    moved = _int_at(transferred)
-    moved.value = 0
-    if e.faults.unplugged:
-        return wire.ERROR_NO_DEVICE
-    _begin(e)
-    end_ns = ftdi.end_of(e.bridge, timeout_ms * 1_000_000)
-    if endpoint == wire.ENDPOINT_OUT:
-        return _bulk_out(e, data, length, moved, end_ns)
-    if endpoint == wire.ENDPOINT_IN:
-        return _bulk_in(e, data, length, moved, end_ns)
-    return wire.ERROR_NOT_FOUND
-
-
-@kernel
-def _begin(e: Any) -> None:
-    """Begin a transfer now; where the clock is another than before, everything moves over to its time."""
-    jump_ns = ftdi.begin(e.bridge)
-    if jump_ns != 0:
-        ftdi.shift_bridge(e.bridge, jump_ns)
-        e.moved_ns += jump_ns
-        e.hand.began_ns += jump_ns
-        e.run.stalled_ns += jump_ns
-    if e.faults.was_unplugged:
-        e.faults.was_unplugged = 0
-        ftdi.power_up(e.bridge)
-    _advance(e, e.bridge.now_ns)
-
-
-@kernel
-def _bulk_out(e: Any, data: int, length: int, moved: Any, end_ns: int) -> int:
-    for k in range(length):
-        if not ftdi.send(e.bridge, byte_at(data + k).value, end_ns):
-            _advance(e, end_ns)
-            return wire.ERROR_TIMEOUT
-        moved.value = k + 1
-        _advance(e, e.bridge.now_ns)
-    return wire.SUCCESS
-
-
-@kernel
-def _bulk_in(e: Any, data: int, length: int, moved: Any, end_ns: int) -> int:
-    bridge = e.bridge
-    while moved.value < length:
-        ftdi.overflow(bridge)
-        due_ns = ftdi.hand_over_ns(bridge)
-        if bridge.out_first < bridge.out_last:
-            heard_ns = bridge.out_ns[bridge.out_first % OUT_RING]
-            if heard_ns <= min(due_ns, end_ns):  # what it makes the device say may be due sooner
-                _advance(e, heard_ns)
-                continue
-        if due_ns > end_ns:
-            _advance(e, end_ns)
-            return wire.ERROR_TIMEOUT
-        _advance(e, due_ns)
-        waiting = bridge.back_last - bridge.back_first
-        room = length - moved.value
-        if room < wire.USB_PACKET and _arrived_of(bridge, waiting) + wire.STATUS_BYTES > room:
-            return wire.ERROR_OVERFLOW
-        noise = int(draw(e.faults) * 0x10000) if e.faults.status_noise else 0
-        got = ftdi.hand_over(bridge, data + moved.value, noise)
-        moved.value += got
-        if got < wire.USB_PACKET:
-            return wire.SUCCESS
-    return wire.SUCCESS
-
-
-@kernel
-def _arrived_of(bridge: Any, waiting: int) -> int:
-    """Return how many bytes the next packet would carry."""
-    held = 0
-    while held < min(waiting, wire.CHUNK):
-        if bridge.back_ns[(bridge.back_first + held) % ftdi.BACK_RING] > bridge.now_ns:
-            break
-        held += 1
-    return held
-
-
-@kernel
-def _advance(e: Any, to_ns: int) -> None:
-    """Let the device hear what arrives up to ``to_ns``."""
-    bridge = e.bridge
-    while bridge.out_first < bridge.out_last:
-        place = bridge.out_first % OUT_RING
-        at_ns = bridge.out_ns[place]
-        if at_ns > to_ns:
-            break
-        bridge.now_ns = max(bridge.now_ns, at_ns)
-        bridge.out_first += 1
-        if e.powered == 0:
-            continue
-        if e.loader.state == RUNNING:
-            work(e, bridge.out[place], bridge.out_divisor[place], at_ns)
-        else:
-            load(e.loader, bridge, e.faults, bridge.out[place], bridge.out_divisor[place], at_ns)
-            if e.loader.state == RUNNING:
-                _run_program(e)
-    bridge.now_ns = max(bridge.now_ns, to_ns)
-
-
-@kernel
-def _run_program(e: Any) -> None:
-    """Begin with encoders at 0, no torque and no arm homed."""
-    e.loader.state = RUNNING
-    _limp(e)
-    for arm in range(3):
-        e.run.origin[arm] = count(e.arms, arm)
-        e.run.before_rad[arm] = e.arms.angle_rad[arm]
-
-
-@kernel
-def _limp(e: Any) -> None:
-    run = e.run
-    run.held = 0
-    run.homed = 0
-    run.homing = 0
-    run.lights = 0
-    run.stroke = 0
-    for arm in range(3):
-        run.torque[arm] = 0
-        run.acting[arm] = 0.0
-
-
-@kernel
-def _control(e: Any, request: int, value: int) -> int:
-    if e.faults.unplugged:
-        return wire.ERROR_NO_DEVICE
-    _begin(e)
-    dtr = e.bridge.dtr
-    ftdi.control(e.bridge, request, value)
-    if e.bridge.dtr > dtr and e.bridge.divisor == wire.BAUD_9600 and e.powered != 0:
-        reset(e.loader)
-        _limp(e)
-    return wire.SUCCESS
-
-
-@kernel
-def _power(e: Any, on: int) -> None:
-    e.powered = on
-    reset(e.loader)
-    e.loader.state = WAITING
-    _limp(e)
-
-
-@kernel
-def _pause(e: Any, lasting_ns: int) -> None:
-    _begin(e)
-    end_ns = ftdi.end_of(e.bridge, lasting_ns)
-    _advance(e, end_ns)
-    live(e, end_ns, max(lasting_ns, LONGEST_NS))
-
-
-@kernel
-def _look(e: Any) -> None:
-    _begin(e)
-    live(e, e.bridge.now_ns, LONGEST_NS)
-
-
-@kernel
-def _settle(e: Any) -> None:
-    bend(e.arms, e.handle.position_m)
-    e.loader.state = WAITING
-
-
-@kernel
-def _strain(e: Any) -> None:
-    strain(e.arms, e.run.acting, e.handle.position_m)
