@@ -120,3 +120,9 @@ class HandOrders:
         for name, value in fields.items():
             setattr(order, name, value)
         post(self._state.hand, order)
+
+
+def hand_of(device: object) -> HandOrders | None:
+    """Return what takes orders to the simulated hand at ``device``: itself, or its ``hand``; None: a person's own."""
+    hand = device if isinstance(device, HandOrders) else getattr(device, "hand", None)
+    return hand if isinstance(hand, HandOrders) else None

@@ -8,7 +8,7 @@ import pytest
 if numba.config.DISABLE_JIT:
     pytest.skip("devices are C functions", allow_module_level=True)
 
-from study_app.devices import list_devices, open_device
+from study_app.devices import is_falcon, is_simulated, kind_of, list_devices, moves_by_itself, open_device
 from study_app.errors import DeviceNotFound
 from study_app.haptics.cfunctions import READ_LOST, READ_NEW, READ_NOTHING_NEW
 from study_app.haptics.layout import READING, records
@@ -42,8 +42,8 @@ def test_the_mouse_is_the_default():
     assert list_devices()[0] == "mouse"
 
 
-@pytest.mark.parametrize("name", list_devices())
-class TestEveryDevice:
+@pytest.mark.parametrize("name", ["mouse", "scripted"])
+class TestEverySimulatedDevice:
     def test_is_what_its_name_opens(self, name):
         with open_device(name) as device:
             assert device.name == name
@@ -115,8 +115,35 @@ class TestEveryDevice:
 
 
 def test_an_unknown_device_is_refused_with_those_there_are():
-    with pytest.raises(DeviceNotFound, match="'falcn' is not known; choose one of: mouse, scripted"):
+    with pytest.raises(DeviceNotFound, match="'falcn' is not known; choose one of: mouse, falcon, scripted"):
         open_device("falcn")
+
+
+@pytest.mark.parametrize("name", ["mouse:2", "falcon-emulated:x", "falcon-sockets:x", ":"])
+def test_a_device_of_a_kind_that_has_but_one_is_not_known(name):
+    with pytest.raises(DeviceNotFound, match="is not known"):
+        kind_of(name)
+
+
+def test_a_socket_needs_its_path():
+    with pytest.raises(DeviceNotFound, match="falcon-socket:PATH"):
+        open_device("falcon-socket")
+    assert kind_of("falcon-socket:/run/falcon:1") == "falcon-socket"
+
+
+@pytest.mark.parametrize(
+    ("name", "falcon", "by_itself", "simulated"),
+    [
+        ("mouse", False, False, False),
+        ("falcon", True, False, False),
+        ("falcon:FT1", True, False, False),
+        ("scripted", False, True, True),
+        ("falcon-emulated", True, True, True),
+        ("falcon-socket:/x", True, False, True),
+    ],
+)
+def test_who_holds_a_device_follows_from_its_name(name, falcon, by_itself, simulated):
+    assert (is_falcon(name), moves_by_itself(name), is_simulated(name)) == (falcon, by_itself, simulated)
 
 
 def test_naming_the_devices_loads_no_compiler():

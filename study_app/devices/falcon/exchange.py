@@ -35,7 +35,10 @@ from study_app.devices.falcon.wire import (
     ENDPOINT_OUT,
     ERROR_NO_DEVICE,
     ERROR_TIMEOUT,
+    FLAG_BLUE,
+    FLAG_GREEN,
     FLAG_HOMING,
+    FLAG_RED,
     PACKET,
     SUCCESS,
     USB_PACKET,
@@ -74,7 +77,6 @@ FALCON = np.dtype(
         ("transfer", np.intp),  # address of its function (``bulk.BULK``)
         ("mechanism", MECHANISM),
         ("centre_m", np.float64),  # z of the hand's origin in the Falcon's frame
-        ("lights", np.int64),  # and homing (``wire.FLAG_*``): sent with every packet
         ("started", np.int64),  # 1 after the first turn
         ("lost", np.int64),  # 1: the bridge is gone
         # the stream
@@ -158,7 +160,6 @@ def new_exchange(calls: BulkCalls, mechanism: Any, geometry: Geometry) -> Any:
     falcon.handle, falcon.transfer = calls.handle, calls.transfer
     falcon.mechanism = mechanism
     falcon.centre_m = geometry.centre_m
-    falcon.lights = FLAG_HOMING
     falcon.position_m = START_M
     return memory
 
@@ -171,6 +172,8 @@ def exchange_functions() -> tuple[Any, Any]:
 
 def _read(context: int, now_ns: int, reading: int) -> int:
     falcon = _falcon_at(context)
+    if falcon.lost != 0:  # or not open: then there is no function to call
+        return READ_LOST
     elapsed_ns = now_ns - falcon.now_ns
     falcon.now_ns = now_ns
     falcon.turns += 1
@@ -208,7 +211,7 @@ def _write(context: int, fx: float, fy: float, fz: float) -> int:
         return 0
     falcon.force_n[0], falcon.force_n[1], falcon.force_n[2] = fx, fy, fz
     push(falcon)
-    pack(falcon.units, falcon.lights, falcon.packet)
+    pack(falcon.units, _lights(falcon), falcon.packet)
     _send(falcon, context)
     return READ_LOST if falcon.lost != 0 else 0
 
@@ -226,6 +229,14 @@ def push(falcon: Any) -> None:
     jacobian(falcon.mechanism, falcon.theta, falcon.position_m, falcon.rates)
     torques(falcon.rates, falcon.force_n, falcon.torque_nm)
     falcon.shortened += motor_units(falcon.mechanism, falcon.torque_nm, falcon.units)
+
+
+@kernel
+def _lights(falcon: Any) -> int:
+    """Return the homing flag, which must stay set, and red before homing, blue before the out-stroke, then green."""
+    if falcon.homed == 0:
+        return FLAG_HOMING | FLAG_RED
+    return FLAG_HOMING | (FLAG_BLUE if falcon.pulled_out == 0 else FLAG_GREEN)
 
 
 @kernel

@@ -9,13 +9,18 @@ if numba.config.DISABLE_JIT:
 
 from study_app.devices.falcon.exchange import COUNTERS, MOST_OWED, RAMP_S
 from study_app.devices.falcon.kinematics import REACHED, inverse
+from study_app.devices.falcon.packets import FLAGS_AT
 from study_app.devices.falcon.wire import (
     ERROR_IO,
     ERROR_NO_DEVICE,
     ERROR_OVERFLOW,
     ERROR_TIMEOUT,
+    FLAG_BLUE,
+    FLAG_GREEN,
     FLAG_HOMING,
+    FLAG_RED,
     MOST_TORQUE,
+    ZERO,
     quiet_packet,
 )
 from study_app.haptics.cfunctions import READ_LOST, READ_NEW, READ_NOTHING_NEW
@@ -51,7 +56,7 @@ def force_of(turns, place_m):
 class TestAPosition:
     def test_the_first_turn_asks_and_the_next_one_knows(self, turns):
         assert turns.turn() == (READ_NOTHING_NEW, 0)
-        assert turns.bridge.sent == [quiet_packet(FLAG_HOMING)]
+        assert turns.bridge.sent == [quiet_packet(FLAG_HOMING | FLAG_RED)]
         assert turns.turn(reply(SOMEWHERE_M))[0] == READ_NEW
         assert turns.position_m == pytest.approx(SOMEWHERE_M, abs=60e-6)  # whole counts of the encoders
 
@@ -172,11 +177,19 @@ class TestTheGate:
         turns.turn(reply(), force_n=(1.0, bad, 0.0))
         assert turns.torques == [0, 0, 0]
 
-    def test_every_packet_holds_the_homing_flag_and_the_lights(self, turns):
-        turns.open_gate()
-        turns.falcon.lights |= 0x02
-        turns.turn(reply(), force_n=PUSH_N)
-        assert turns.bridge.sent[-1][13] == 0x41 + 0x03
+    def test_every_packet_holds_the_homing_flag_and_the_light_of_the_gate(self, turns):
+        def flags_after(*got):
+            turns.turn(*got)
+            return turns.bridge.sent[-1][FLAGS_AT] - ZERO
+
+        turns.turn()
+        assert flags_after(reply(homed=0b011)) == FLAG_HOMING | FLAG_RED
+        assert flags_after(reply()) == FLAG_HOMING | FLAG_BLUE
+        assert flags_after(reply(OUT_M)) == FLAG_HOMING | FLAG_GREEN
+        assert flags_after(reply()) == FLAG_HOMING | FLAG_GREEN
+        for _ in range(3):
+            flags = flags_after(reply(homed=0))
+        assert flags == FLAG_HOMING | FLAG_RED
 
 
 class TestLostAndLate:

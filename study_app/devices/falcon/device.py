@@ -1,0 +1,254 @@
+"""The Falcon as a device: opened with its program loaded, homed and guarded; closed without torque."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Final, Self
+
+import numpy as np
+
+from study_app.devices.base import Device
+from study_app.devices.falcon import boot, calibration
+from study_app.devices.falcon.bulk import BulkCalls
+from study_app.devices.falcon.exchange import COUNTERS, exchange_functions, new_exchange
+from study_app.devices.falcon.failures import usb_failure
+from study_app.devices.falcon.geometry import DEFAULT_GEOMETRY, WORKSPACE_M, geometry_named
+from study_app.devices.falcon.guard import Guard
+from study_app.devices.falcon.homing import PATIENCE_S, home
+from study_app.devices.falcon.kinematics import REACHED, inverse, new_mechanism
+from study_app.devices.falcon.transport import Transport, open_transport
+from study_app.devices.falcon.wire import ERROR_NO_DEVICE, FLAG_BLUE, FLAG_HOMING, quiet_packet
+from study_app.errors import DeviceError
+from study_app.haptics.layout import READING, records
+
+FORCE_LIMIT_N: Final = 8.0
+LAST_PACKETS: Final = 10
+"""Zero torque is sent so often at the end: the last one may persist, and one packet may be lost."""
+
+_FARTHEST = 1700  # counts, a little more than is known to be used
+_CLOSED = BulkCalls(0, 0)
+
+
+class FalconDevice(Device):
+    """A Novint Falcon, or what answers like one, behind a bridge.
+
+    Parameters
+    ----------
+    bridge : what ``transport.open_transport`` takes
+    firmware : file of its program, which it needs after it was switched on
+    workspace_m : half extents of where the grip shall reach [m]
+    force_limit_n : the greatest force it may be asked for [N]
+    geometry : published measures, where a calibration names no others
+    tell : is given what to do while it is opened, a line at a time
+    cancelled : is asked while it is homed whether to give up
+    patience_s : how long homing may take [s]
+    """
+
+    name = "falcon"
+    guarded = True
+
+    def __init__(
+        self,
+        bridge: str = "falcon",
+        *,
+        firmware: str | Path | None = None,
+        workspace_m: tuple[float, float, float] = WORKSPACE_M,
+        force_limit_n: float = FORCE_LIMIT_N,
+        geometry: str = DEFAULT_GEOMETRY,
+        tell: Callable[[str], object] | None = None,
+        cancelled: Callable[[], bool] | None = None,
+        patience_s: float = PATIENCE_S,
+    ) -> None:
+        self.bridge = bridge
+        self.name = bridge.partition(":")[0]
+        self.workspace_m = workspace_m
+        self.force_limit_n = force_limit_n
+        self._firmware = firmware
+        self._geometry = geometry_named(geometry)
+        self._tell = tell if tell is not None else _say_nothing
+        self._cancelled = cancelled
+        self._patience_s = patience_s
+        self._transport: Transport | None = None
+        self._guard: Guard | None = None
+        self._calibration: calibration.Calibration | None = None
+        self._found: dict[str, Any] = {}
+        self._reading = records(READING, 1)
+        mechanism = new_mechanism(self._geometry, calibration.UNCALIBRATED_UNITS_PER_NM)
+        self._check_reach(mechanism)
+        self._memory = new_exchange(_CLOSED, mechanism, self._geometry)
+        self._falcon = self._memory[0]
+        self._falcon.lost = 1  # while it is not open
+        self.context = int(self._memory.ctypes.data)
+        self.read, self.write = exchange_functions()
+
+    def open(self) -> None:
+        """Open the bridge, load the program if need be, and home it, telling what to do; then it is guarded.
+
+        Raises
+        ------
+        DeviceError
+            It is not there, cannot be opened, needs its program, or was not homed.
+        """
+        if self._transport is not None:
+            return
+        transport = self._open_bridge()
+        try:
+            self._found = {"serial": transport.serial, "firmware": self._run_program(transport)}
+            self._found |= self._hasten(transport)
+            self._calibrate(transport.serial)
+            self._transport = transport
+            if self.guarded:
+                self._guard = Guard(transport.name)
+                self._guard.start()
+            self._home(transport)
+        except BaseException:
+            self._transport = transport
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """Send zero torque several times and let go of it; a second call does nothing."""
+        transport, self._transport = self._transport, None
+        guard, self._guard = self._guard, None
+        used, gone = bool(self._falcon.handle), bool(self._falcon.lost)
+        self._falcon.lost = 1
+        self._falcon.handle, self._falcon.transfer = _CLOSED
+        if transport is None:
+            return
+        quiet = _quieten(transport) if used else True
+        transport.close()
+        if guard is not None and (quiet or gone):
+            guard.stand_down()
+        elif guard is not None:
+            guard.release()
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """How many turns, packets and errors there were since it was homed: see ``exchange.FALCON``."""
+        return {name: int(self._falcon[name]) for name in COUNTERS}
+
+    def describe(self) -> dict[str, Any]:
+        """Return what the receipt says of it."""
+        used = self._calibration
+        return {
+            "name": self.name,
+            "workspace_m": list(self.workspace_m),
+            "force_limit_n": self.force_limit_n,
+            "geometry": self._geometry.name,
+            "calibration": "none" if used is None else used.describe(),
+            "units_per_nm": float(self._falcon.mechanism.units_per_nm),
+            **self._found,
+        }
+
+    def _open_bridge(self) -> Transport:
+        return open_transport(self.bridge)
+
+    def _check_reach(self, mechanism: Any) -> None:
+        """Refuse a workspace that the arms do not reach."""
+        theta = np.zeros(3)
+        for corner in np.array(np.meshgrid(*((-half, half) for half in self.workspace_m))).reshape(3, -1).T:
+            reached = inverse(mechanism, np.add(corner, [0.0, 0.0, self._geometry.centre_m]), theta) == REACHED
+            if not reached or np.abs((theta - mechanism.zero_rad) / mechanism.rad_per_count).max() > _FARTHEST:
+                asked, known = (
+                    " x ".join(f"{2000 * half:g}" for half in size) for size in (self.workspace_m, WORKSPACE_M)
+                )
+                raise DeviceError(
+                    f"a workspace of {asked} mm is more than a Falcon reaches; {known} mm is about the most: make the "
+                    "protocol's workspace_mm smaller"
+                )
+
+    def _run_program(self, transport: Transport) -> str:
+        """See to it that its program runs; return which one."""
+        boot.configure(transport)
+        if boot.is_running(transport):
+            return "already running"
+        if self._firmware is None:
+            raise DeviceError(
+                "the Falcon has no program since it was switched on, and none may be given away with this software: "
+                "give --firmware PATH, the file nvent_firmware.bin (8492 bytes) that came with your Falcon's software; "
+                "if it has one, check its mains adapter"
+            )
+        try:
+            program = Path(self._firmware).read_bytes()
+        except OSError as error:
+            raise DeviceError(f"the firmware {self._firmware} cannot be read: {error.strerror}") from error
+        self._tell("Loading the Falcon's firmware.")
+        return boot.boot(transport, program, tell=self._tell).sha256
+
+    def _hasten(self, transport: Transport) -> dict[str, Any]:
+        """Measure the round trip with the bridge's event character and without, and keep the quicker way."""
+        boot.set_event_character(transport, on=False)
+        plain_s = boot.measure_round_trip(transport)
+        boot.set_event_character(transport, on=True)
+        hastened_s = boot.measure_round_trip(transport)
+        better = hastened_s < plain_s
+        if not better:
+            boot.set_event_character(transport, on=False)
+        return {
+            "event_character": better,
+            "round_trip_ms": {"with": round(1000 * hastened_s, 3), "without": round(1000 * plain_s, 3)},
+        }
+
+    def _calibrate(self, serial: str | None) -> None:
+        """Use what was measured of this Falcon, if it was."""
+        self._calibration = calibration.load(serial) if serial else None
+        if self._calibration is None:
+            return
+        self._geometry = geometry_named(self._calibration.geometry)
+        self._falcon.mechanism = new_mechanism(
+            self._geometry, self._calibration.units_per_nm, self._calibration.arm_offset_rad
+        )
+
+    def _home(self, transport: Transport) -> None:
+        mechanism = self._falcon.mechanism.copy()
+        self._memory[:] = new_exchange(transport.calls(), mechanism, self._geometry)
+        home(self._falcon, self._turn, transport.now_s, self._tell, patience_s=self._patience_s)
+        self._begin_anew()
+
+    def _begin_anew(self) -> None:
+        """Let the force come in over half a second from the next turn on, and count from there."""
+        self._falcon.share = 0.0
+        self._falcon.started = 0
+        for name in COUNTERS:
+            self._falcon[name] = 0
+
+    def _turn(self) -> None:
+        """Take a turn without force."""
+        transport = self._transport
+        assert transport is not None  # noqa: S101 - it is being opened
+        now_ns = round(1e9 * transport.now_s())
+        self.read.ctypes(self.context, now_ns, int(self._reading.ctypes.data))
+        self.write.ctypes(self.context, 0.0, 0.0, 0.0)
+        if self._falcon.lost:
+            raise usb_failure(ERROR_NO_DEVICE, "homing it")
+        if self._cancelled is not None and self._cancelled():
+            raise DeviceError("homing the Falcon was given up")
+        transport.pause(0.001)
+
+    def __enter__(self) -> Self:
+        self.open()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def _quieten(transport: Transport) -> bool:
+    """Send zero torque, several times; return whether any of it went out."""
+    sent = 0
+    for _ in range(LAST_PACKETS):
+        try:
+            transport.write(quiet_packet(FLAG_HOMING | FLAG_BLUE), 0.1)
+        except DeviceError:
+            continue
+        sent += 1
+        transport.pause(0.002)
+    return sent > 0
+
+
+def _say_nothing(_line: str) -> None:
+    """Tell nobody."""

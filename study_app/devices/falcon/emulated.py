@@ -1,0 +1,84 @@
+"""The Falcon's driver in front of an emulated Falcon, whose grip a simulated hand holds.
+
+All of the driver is the real one, down to pyusb and the C function; the emulator is behind it as the bus is. Once it
+is open, the emulator's time is that of the servo's turns, so that it runs as fast as a rehearsal does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from random import Random
+from typing import Any
+
+from study_app.devices.falcon.device import FORCE_LIMIT_N, FalconDevice
+from study_app.devices.falcon.emulator import Emulator
+from study_app.devices.falcon.emulator_backend import EmulatedBackend
+from study_app.devices.falcon.geometry import WORKSPACE_M
+from study_app.devices.falcon.transport import PyUsbTransport, Transport
+
+_STILL_TURNS = 10  # between two strokes of homing it moves again sooner
+
+
+class EmulatedFalcon(FalconDevice):
+    """A Falcon of numbers; ``hand`` takes the orders of whoever simulates a participant.
+
+    Parameters
+    ----------
+    random : where the hand's tremor and the emulator's faults are drawn from; None: always the same ones
+    firmware : file to load into it; without one its program runs already
+    workspace_m : half extents of where the grip shall reach, and can be sent [m]
+    force_limit_n : the greatest force it may be asked for [N]
+    tell : is given what to do while it is opened
+    emulator : another than a new one
+    options : of ``FalconDevice``
+    """
+
+    guarded = False  # it ends with the program
+
+    def __init__(
+        self,
+        random: Random | None = None,
+        *,
+        firmware: str | Path | None = None,
+        workspace_m: tuple[float, float, float] = WORKSPACE_M,
+        force_limit_n: float = FORCE_LIMIT_N,
+        tell: Callable[[str], object] | None = None,
+        emulator: Emulator | None = None,
+        **options: Any,
+    ) -> None:
+        super().__init__(
+            "falcon-emulated",
+            firmware=firmware,
+            workspace_m=workspace_m,
+            force_limit_n=force_limit_n,
+            tell=tell,
+            **options,
+        )
+        self.hand = emulator if emulator is not None else new_emulator(random, firmware, workspace_m)
+        self._backend = EmulatedBackend(self.hand)
+
+    def open(self) -> None:
+        """Open it, and wait until the hand that homed it has brought the grip to the middle."""
+        super().open()
+        still = 0
+        while still < _STILL_TURNS:
+            self._turn()
+            still = 0 if self.hand.moving else still + 1
+        self._begin_anew()
+        self._backend.follow_clock(self.context)  # FALCON begins with the time of the turn
+
+    def close(self) -> None:
+        """Send zero torque several times and let go of it; a second call does nothing."""
+        self._backend.follow_clock(0)
+        super().close()
+
+    def _open_bridge(self) -> Transport:
+        return PyUsbTransport(self._backend)
+
+
+def new_emulator(
+    random: Random | None, firmware: str | Path | None, workspace_m: tuple[float, float, float]
+) -> Emulator:
+    """Return an emulator as it is after power-up, its program running unless it is to be loaded."""
+    return Emulator(random, running=firmware is None, workspace_m=workspace_m)

@@ -1,0 +1,98 @@
+"""Homing: the grip out, in, and out again, with words for whoever holds it, and why it did not come to an end.
+
+Arms find their index on the way in; before that the encoders count from anywhere, so no force is sent. The out-stroke
+after it shows that positions are right, and that the hand is where the device wants it when the force comes in.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Final
+
+from study_app.devices.falcon.exchange import ALL_HOMED
+from study_app.errors import DeviceError
+
+PATIENCE_S: Final = 120.0
+ADVICES: Final = 6  # so often, in that time, advice is given
+MOVED: Final = 60  # counts of an arm that show that somebody moves the grip: two degrees
+
+STROKES: Final = "Homing (red light): pull the grip of the Falcon all the way out, then push it all the way in."
+PULL_OUT: Final = "Homed (blue light): now pull the grip all the way out once more."
+READY: Final = "The Falcon is ready (green light)."
+
+_REASONS: Final = {
+    "silent": "it does not answer: check its mains adapter, then unplug it, plug it in and start again",
+    "limp": "its encoders do not move: check its mains adapter; if the grip was moved, switch it off and on, then load "
+    "its firmware again",
+    "not-pushed-in": "not every arm has passed its index: push the grip fully in, as far as it goes, then pull it out",
+    "not-pulled-out": "it is homed, but its grip was not pulled out: pull it fully out, toward you",
+}
+
+
+class NotHomed(DeviceError):
+    """Homing did not come to an end; ``kind`` is a key of the reasons, by which diagnosis knows it."""
+
+    def __init__(self, kind: str) -> None:
+        self.kind = kind
+        super().__init__(f"the Falcon was not homed: {_REASONS[kind]}")
+
+
+def home(
+    falcon: Any,
+    turn: Callable[[], None],
+    now_s: Callable[[], float],
+    tell: Callable[[str], object],
+    *,
+    patience_s: float = PATIENCE_S,
+) -> None:
+    """Turn the exchange, without force, until all arms are homed and the grip was pulled out.
+
+    Parameters
+    ----------
+    falcon : record of ``exchange.FALCON``
+    turn : takes one turn of it, and lets a millisecond pass
+    now_s : the time [s]
+    tell : is given what to do, a line at a time
+
+    Raises
+    ------
+    NotHomed
+        It did not happen within ``patience_s``.
+    """
+    began_s = now_s()
+    advised_s = began_s
+    lowest, highest = [0] * 3, [0] * 3
+    announced = False
+    tell(STROKES)
+    while not falcon.pulled_out:
+        turn()
+        _follow(falcon, lowest, highest)
+        if falcon.homed and not announced:
+            announced = True
+            tell(PULL_OUT)
+        kind = _trouble(falcon, lowest, highest)
+        if now_s() - began_s > patience_s:
+            raise NotHomed(kind)
+        if now_s() - advised_s > patience_s / ADVICES:
+            advised_s = now_s()
+            tell(f"Still homing: {_REASONS[kind]}.")
+    tell(READY)
+
+
+def _follow(falcon: Any, lowest: list[int], highest: list[int]) -> None:
+    counts = [int(count) for count in falcon.status.encoders]
+    if falcon.status.count <= 1:
+        lowest[:], highest[:] = counts, counts
+    elif falcon.status.homed != ALL_HOMED:  # the origin jumps where an arm is homed: that is no motion
+        lowest[:] = map(min, lowest, counts)
+        highest[:] = map(max, highest, counts)
+
+
+def _trouble(falcon: Any, lowest: list[int], highest: list[int]) -> str:
+    """Return the reason why it is not homed, as far as it can be told."""
+    if falcon.status.count == 0:
+        return "silent"
+    if falcon.homed:
+        return "not-pulled-out"
+    moved = max(high - low for low, high in zip(lowest, highest, strict=True))
+    return "not-pushed-in" if moved > MOVED else "limp"
