@@ -11,6 +11,12 @@ from study_app.cli.words import FILE, RESULTS, SESSION
 SEED = click.IntRange(0, 2**31 - 1)
 WINDOWED = click.option("--windowed", is_flag=True, help="Show the participant's window in a frame, not full-screen.")
 SCREEN = click.option("--screen", type=click.IntRange(1), help="Number of the participant's screen.")
+FIRMWARE = click.option(
+    "--firmware",
+    type=click.Path(path_type=Path),
+    metavar="PATH",
+    help="Program of a Falcon that was switched on since it last ran: its owner has the file.",
+)
 OPERATOR = click.option("--operator", default="", metavar="INITIALS", help="Who runs the session.")
 
 
@@ -50,7 +56,14 @@ def design(protocol: str, participants: int, seed: int) -> None:
 @click.option("--participant", metavar="ID", required=True, help="Letters and digits, such as P007.")
 @click.option("--session", type=click.IntRange(1, 99), default=1, show_default=True, help="Session number.")
 @click.option("--seed", type=SEED, help="Default: drawn, shown and recorded.")
-@click.option("--device", default="mouse", show_default=True, metavar="NAME", help="mouse or scripted.")
+@click.option(
+    "--device",
+    default="mouse",
+    show_default=True,
+    metavar="NAME",
+    help="mouse, falcon, scripted, falcon-emulated or falcon-socket:PATH.",
+)
+@FIRMWARE
 @click.option("--language", metavar="LANG", help="Default: the protocol's first.")
 @OPERATOR
 @WINDOWED
@@ -64,6 +77,7 @@ def run(
     session: int,
     seed: int | None,
     device: str,
+    firmware: Path | None,
     language: str | None,
     operator: str,
     *,
@@ -82,6 +96,7 @@ def run(
         session=session,
         seed=seed,
         device=device,
+        firmware=firmware,
         language=language,
         operator=operator,
         windowed=windowed,
@@ -98,9 +113,12 @@ def run(
 @FILE
 @click.option("--participants", type=click.IntRange(1, 999), default=1, show_default=True)
 @click.option("--seed", type=SEED, default=1, show_default=True)
+@click.option("--device", default="scripted", show_default=True, metavar="NAME", help="scripted or falcon-emulated.")
 @click.option("--no-recordings", is_flag=True, help="Keep answers and trial rows only, not every sample and frame.")
 @RESULTS
-def rehearse(protocol: str, participants: int, seed: int, *, no_recordings: bool, results: Path | None) -> None:
+def rehearse(
+    protocol: str, participants: int, seed: int, device: str, *, no_recordings: bool, results: Path | None
+) -> None:
     """Run whole sessions with simulated participants, faster than real time; every row says simulated."""
     from study_app.session.rehearsal import rehearse as rehearse_study
 
@@ -108,6 +126,7 @@ def rehearse(protocol: str, participants: int, seed: int, *, no_recordings: bool
         protocol,
         participants=participants,
         seed=seed,
+        device=device,
         results=results,
         recordings=not no_recordings,
         progress=click.echo,
@@ -119,11 +138,19 @@ def rehearse(protocol: str, participants: int, seed: int, *, no_recordings: bool
 @SESSION
 @click.option("--protocol", metavar="FILE", help="Its protocol; default: looked for among those at hand.")
 @click.option("--device", metavar="NAME", help="Default: the one it began with.")
+@FIRMWARE
 @OPERATOR
 @WINDOWED
 @SCREEN
 def resume(
-    session: Path, protocol: str | None, device: str | None, operator: str, *, windowed: bool, screen: int | None
+    session: Path,
+    protocol: str | None,
+    device: str | None,
+    firmware: Path | None,
+    operator: str,
+    *,
+    windowed: bool,
+    screen: int | None,
 ) -> None:
     """Go on with a session whose program was ended: same order and seed, at the interrupted trial."""
     from study_app import app
@@ -132,6 +159,7 @@ def resume(
         session,
         protocol=protocol,
         device=device,
+        firmware=firmware,
         operator=operator,
         windowed=windowed,
         screen=screen,

@@ -7,9 +7,9 @@ from typing import Any
 
 from PySide6.QtGui import QScreen
 
-from study_app.devices import list_devices, open_device
-from study_app.errors import SessionError
-from study_app.gui.choices import SIMULATED_DEVICE, NewSession
+from study_app.devices import is_falcon, is_simulated, kind_of
+from study_app.errors import DeviceError, SessionError
+from study_app.gui.choices import NewSession
 from study_app.gui.machine import Machine
 from study_app.protocol.model import Protocol
 from study_app.session.preflight import Facts, Screen
@@ -37,8 +37,9 @@ class Ready:
 
 def check(chosen: NewSession, study: Protocol) -> None:
     """Refuse what cannot begin before any window opens; nothing is touched."""
-    if chosen.device not in list_devices():
-        open_device(chosen.device)
+    kind_of(chosen.device)
+    if chosen.firmware is not None and not is_falcon(chosen.device):
+        raise DeviceError(f"only a Falcon takes firmware, not device '{chosen.device}': leave --firmware out")
     if chosen.language not in study.study.languages:
         known = ", ".join(study.study.languages)
         raise SessionError(
@@ -92,7 +93,7 @@ def open_store(
         language=chosen.language,
         device=machine.described,
         screens=screens,
-        simulated=chosen.device == SIMULATED_DEVICE,
+        simulated=is_simulated(chosen.device),
         pilot=chosen.pilot,
         recordings=chosen.recordings,
         clock=SessionClock(machine.servo.now_ns),

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from study_app.devices import open_device
-from study_app.gui.choices import SIMULATED_DEVICE, NewSession
+from study_app.devices import is_falcon, moves_by_itself, open_device
+from study_app.gui.choices import NewSession
 from study_app.protocol.model import Protocol
 from study_app.protocol.schedule import stream
 
@@ -36,15 +37,26 @@ class Machine:
             self.device.close()
 
 
-def open_machine(chosen: NewSession, study: Protocol) -> Machine:
-    """Open the device and start the servo at rest; compiling takes a minute the first time."""
+def open_machine(
+    chosen: NewSession,
+    study: Protocol,
+    *,
+    tell: Callable[[str], object] | None = None,
+    cancelled: Callable[[], bool] | None = None,
+) -> Machine:
+    """Open the device and start the servo at rest; compiling takes a minute the first time.
+
+    ``tell`` is given what a device asks for while it is opened, a line at a time; it gives up when ``cancelled``.
+    """
     from study_app.haptics.pack import elements_needed  # noqa: PLC0415 - the compiler: only once it is needed
     from study_app.haptics.servo import Servo  # noqa: PLC0415
 
     x, y, z = study.device.workspace_m
     options: dict[str, Any] = {"workspace_m": (x / 2, y / 2, z / 2), "force_limit_n": study.device.force_limit_n}
-    if chosen.device == SIMULATED_DEVICE:
+    if moves_by_itself(chosen.device):
         options["random"] = stream(chosen.seed, f"run/{chosen.participant}/tremor")
+    if is_falcon(chosen.device):
+        options |= {"firmware": chosen.firmware, "tell": tell, "cancelled": cancelled}
     device = open_device(chosen.device, **options)
     try:
         elements = max(elements_needed(study.scene_for(condition)) for condition in study.conditions)

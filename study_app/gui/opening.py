@@ -64,13 +64,19 @@ class OpeningWindow(QWidget):
         self._timer.timeout.connect(self._tell)
         self._timer.start(250)
         self._done = False
+        self._said = False
         wear(self, theme)
 
     def _tell(self) -> None:
         seconds = self._since.elapsed() / 1000
         self.lasted.setText(minutes(seconds))
-        if seconds > LONG_AFTER_S:
+        if seconds > LONG_AFTER_S and not self._said:
             self.step.setText(FIRST_TIME)
+
+    def say(self, line: str) -> None:
+        """Show what the device asks for, from now on instead of what goes on."""
+        self._said = True
+        self.step.setText(line)
 
     def finish(self) -> None:
         """Close because all is ready."""

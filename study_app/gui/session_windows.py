@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from study_app.devices import is_simulated, kind_of, moves_by_itself
+from study_app.devices.hand_orders import HandOrders, hand_of
 from study_app.devices.mouse import MouseDevice
-from study_app.devices.scripted import ScriptedDevice
-from study_app.devices.simulated import SimulatedDevice
 from study_app.gui.bridge import Parts, SessionBridge
 from study_app.gui.operator import OperatorWindow
 from study_app.gui.operator.progress import SessionProgress, progress_after, stages
@@ -31,6 +31,14 @@ if TYPE_CHECKING:
     from study_app.gui.theme import Theme
     from study_app.haptics.servo import Servo
     from study_app.store.open_session import SessionStore
+
+DEVICE_NAMES = {
+    "mouse": "Mouse",
+    "falcon": "Novint Falcon",
+    "scripted": "Scripted hand",
+    "falcon-emulated": "Emulated Falcon",
+    "falcon-socket": "Falcon behind a socket",
+}
 
 
 def open_windows(
@@ -63,8 +71,9 @@ def open_windows(
         captures_pointer=by_mouse,
         pilot=chosen.pilot,
     )
+    hand = hand_of(device)
     parts = Parts(
-        session=_facts(chosen, protocol, schedule, servo),
+        session=_facts(chosen, protocol, schedule, machine),
         schedule=schedule,
         key=store.key.codes,
         language=chosen.language,
@@ -74,10 +83,10 @@ def open_windows(
         recorder=store.recorder,
         start=start,
         exclude=_excluder(chosen),
-        aim_m=_aim(device, servo),
+        aim_m=_aim(hand, servo),
         point_to=device.point_to if isinstance(device, MouseDevice) else None,
         press=device.press if isinstance(device, MouseDevice) else None,
-        hand_for=_hands(device, chosen, clock) if isinstance(device, ScriptedDevice) else None,
+        hand_for=_hands(hand, chosen, clock) if hand is not None and moves_by_itself(device.name) else None,
     )
     shown_on, operated_on = choose_screens(chosen.screen)
     bridge = SessionBridge(parts, participant, operator, refresh_hz=shown_on.refreshRate() or 60.0)
@@ -103,8 +112,9 @@ def _excluder(chosen: NewSession) -> Callable[[int | None, str], None]:
     return leave_out
 
 
-def _facts(chosen: NewSession, protocol: Protocol, schedule: Schedule, servo: Servo) -> Session:
+def _facts(chosen: NewSession, protocol: Protocol, schedule: Schedule, machine: Machine) -> Session:
     """Return what the operator's window says throughout; the force's share of its limit stays hidden."""
+    by_mouse, nobody = chosen.device == "mouse", is_simulated(chosen.device)
     return Session(
         protocol=protocol,
         stages=stages(protocol, schedule),
@@ -112,19 +122,28 @@ def _facts(chosen: NewSession, protocol: Protocol, schedule: Schedule, servo: Se
         expected_s=expected_duration_s(protocol),
         answers_of=protocol.responses_per_participant(),
         lateness_limit_s=protocol.limits.lateness_ms / 1000,
-        device_name="Mouse" if chosen.device == "mouse" else "Scripted hand",
-        device_kind="mouse" if chosen.device == "mouse" else "simulated",
+        device_name=DEVICE_NAMES[kind_of(chosen.device)],
+        device_kind="mouse" if by_mouse else "simulated" if nobody else "falcon",
         device_rows=(
-            ("Priority", str(servo.describe()["priority"]).partition(" (")[0]),
+            ("Priority", str(machine.servo.describe()["priority"]).partition(" (")[0]),
+            *_calibration(machine.device),
             (f"Force sent, share of {protocol.device.force_limit_n:g} N limit", "hidden"),
         ),
     )
 
 
-def _aim(device: Device, servo: Servo) -> Callable[[], tuple[float, float, float]]:
-    """Return what tells where the hand is; of a simulated device where it means to be, for its lag shows the liquid."""
-    if isinstance(device, SimulatedDevice):
-        return lambda: device.aim_m
+def _calibration(device: Device) -> tuple[tuple[str, str], ...]:
+    """Return what the operator should know of a device that can be calibrated."""
+    used = device.describe().get("calibration")
+    if used is None:
+        return ()
+    return (("Calibration", f"of {used['measured']}" if isinstance(used, dict) else "none"),)
+
+
+def _aim(hand: HandOrders | None, servo: Servo) -> Callable[[], tuple[float, float, float]]:
+    """Return what tells where the hand is; of a simulated one where it means to be, for its lag shows the liquid."""
+    if hand is not None:
+        return lambda: hand.aim_m
 
     def position_m() -> tuple[float, float, float]:
         x, y, z = servo.telemetry.position_at(servo.now_ns())[0]
@@ -134,17 +153,17 @@ def _aim(device: Device, servo: Servo) -> Callable[[], tuple[float, float, float
 
 
 def _hands(
-    device: ScriptedDevice, chosen: NewSession, clock: Callable[[], float]
+    hand: HandOrders, chosen: NewSession, clock: Callable[[], float]
 ) -> Callable[[Page], Explorer | Reacher | None]:
     """Return what makes the simulated hand for a page; on a page without a task the hand rests."""
     draw = stream(chosen.seed, f"run/{chosen.participant}/hand").random
 
     def hand_for(page: Page) -> Explorer | Reacher | None:
         if not isinstance(page, TaskPage):
-            device.rest()
+            hand.rest()
             return None
         if isinstance(page.task, Reach):
-            return Reacher(page.task, device, draw)
-        return Explorer(page.task, device, draw, clock())
+            return Reacher(page.task, hand, draw)
+        return Explorer(page.task, hand, draw, clock())
 
     return hand_for

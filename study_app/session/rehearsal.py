@@ -19,7 +19,8 @@ from typing import Any, Self
 
 import numpy as np
 
-from study_app.devices.scripted import ScriptedDevice
+from study_app.devices import moves_by_itself, open_device
+from study_app.devices.hand_orders import hand_of
 from study_app.errors import SessionError, StoreError
 from study_app.haptics.clock import VirtualClock
 from study_app.haptics.pack import elements_needed
@@ -54,6 +55,7 @@ def rehearse(
     *,
     participants: int,
     seed: int,
+    device: str = "scripted",
     results: Path | None = None,
     recordings: bool = True,
     progress: Callable[[str], object] | None = None,
@@ -65,6 +67,7 @@ def rehearse(
     protocol : file or name of a protocol
     participants : how many
     seed : all randomness comes from it, the key's too
+    device : "scripted" or "falcon-emulated"
     results : study folder; by default ``results/<study>``
     recordings : whether every turn of the servo and every frame of a trial is kept
     progress : is told a line after each session
@@ -76,9 +79,13 @@ def rehearse(
     StoreError
         The folder holds another study or an id is used already, and then nothing was touched; or results cannot be
         written.
+    DeviceError
+        The device is not known, or cannot be opened.
     SessionError
-        A session broke; what was kept before is safe.
+        The device does not move by itself, or a session broke; what was kept before is safe.
     """
+    if not moves_by_itself(device):
+        raise SessionError(f"device '{device}' waits for a person: rehearse on scripted or falcon-emulated")
     source = source_bytes(protocol)
     study = parse(source, str(protocol))
     folder = Path("results") / study.study.name if results is None else Path(results)
@@ -88,7 +95,7 @@ def rehearse(
         check_unused(StudyFolder(folder), person, 1)
     for person in people:
         began = time.perf_counter()
-        with _Machine(study, person, seed) as machine:
+        with _Machine(study, person, seed, device) as machine:
             store = begin(
                 folder,
                 study,
@@ -130,7 +137,7 @@ def resume(session_folder: Path, *, protocol: str | Path | None = None) -> None:
     source = source_bytes(name)
     study = parse(source, name)
     person, seed = begun["participant"], begun["seed"]
-    with _Machine(study, person, seed) as machine:
+    with _Machine(study, person, seed, begun["device"]) as machine:
         store = reopen(
             session_folder,
             study,
@@ -146,15 +153,22 @@ def resume(session_folder: Path, *, protocol: str | Path | None = None) -> None:
 
 
 class _Machine:
-    """A scripted device and its servo on a clock that stands still but for the servo; they end with the block."""
+    """A device with a simulated hand, and its servo on a clock that stands still but for the servo.
 
-    def __init__(self, study: Protocol, person: str, seed: int) -> None:
+    Both end with the block.
+    """
+
+    def __init__(self, study: Protocol, person: str, seed: int, device: str) -> None:
         x, y, z = study.device.workspace_m
-        self.device = ScriptedDevice(
-            stream(seed, f"rehearsal/{person}/hand"),
+        self.device = open_device(
+            device,
+            random=stream(seed, f"rehearsal/{person}/hand"),
             workspace_m=(x / 2, y / 2, z / 2),
             force_limit_n=study.device.force_limit_n,
         )
+        hand = hand_of(self.device)
+        assert hand is not None  # noqa: S101 - it moves by itself
+        self.hand = hand
         elements = max(elements_needed(study.scene_for(condition)) for condition in study.conditions)
         self.servo = Servo(self.device, clock=VirtualClock(), rate_hz=study.device.rate_hz, elements=elements)
 
@@ -164,7 +178,6 @@ class _Machine:
         return self.device.describe() | self.servo.describe()
 
     def __enter__(self) -> Self:
-        self.device.open()
         return self
 
     def __exit__(
@@ -255,13 +268,13 @@ class _Rehearsal:
 
     def _do(self, page: TaskPage) -> None:
         """Do a task until its page is left, seeing every frame and feeling every tick."""
-        device, draw = self._machine.device, self._stream(f"{page.trial}/behaviour")
+        arm, draw = self._machine.hand, self._stream(f"{page.trial}/behaviour")
         self._paint = self._stream(f"{page.trial}/screen")
         senses = Senses(self._study.scene.scale)
         self._touch.read()
         self._next_frame_ns = self._machine.servo.now_ns()
         task = page.task
-        hand = Reacher(task, device, draw) if isinstance(task, Reach) else Explorer(task, device, draw, self._now_s())
+        hand = Reacher(task, arm, draw) if isinstance(task, Reach) else Explorer(task, arm, draw, self._now_s())
         while page is self._page:
             self._advance(LOOK_S)
             wants_to_go_on = self._see(senses, hand)
@@ -269,7 +282,7 @@ class _Rehearsal:
             self._poll()
             if wants_to_go_on and page is self._page:
                 self._post(Continue(self._now_s()))
-        device.rest()
+        arm.rest()
         self._felt = senses.felt()
 
     def _see(self, senses: Senses, hand: Explorer | Reacher) -> bool:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from study_app.devices.scripted import ScriptedDevice
+from study_app.devices.hand_orders import HandOrders
 from study_app.protocol.answers import Felt
 from study_app.protocol.model import Explore, Reach
 from study_app.session.pages import TextPage
@@ -75,7 +75,7 @@ class Senses:
 class Explorer:
     """Moves about for a while that it likes, then wants to go on."""
 
-    def __init__(self, task: Explore, device: ScriptedDevice, draw: Draw, now_s: float) -> None:
+    def __init__(self, task: Explore, device: HandOrders, draw: Draw, now_s: float) -> None:
         stay_s = task.min_s + (0.1 + 0.2 * draw()) * max(task.min_s, 5.0)
         self._leave_s = now_s + min(stay_s, task.max_s)
         device.follow(*exploration(draw, device.workspace_m, stay_s))
@@ -88,7 +88,7 @@ class Explorer:
 class Reacher:
     """Reaches for the target that is seen lit, and tries again where the ball is seen to have come to rest outside."""
 
-    def __init__(self, task: Reach, device: ScriptedDevice, draw: Draw) -> None:
+    def __init__(self, task: Reach, device: HandOrders, draw: Draw) -> None:
         self._task = task
         self._device = device
         self._draw = draw

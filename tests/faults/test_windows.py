@@ -33,7 +33,7 @@ def machines(monkeypatch: pytest.MonkeyPatch) -> list[Machine]:
     monkeypatch.setattr(beginning, "MEASURED_S", 0.1)
     opened: list[Machine] = []
     open_machine = app.open_machine
-    monkeypatch.setattr(app, "open_machine", lambda *chosen: opened.append(open_machine(*chosen)) or opened[-1])
+    monkeypatch.setattr(app, "open_machine", lambda *a, **k: opened.append(open_machine(*a, **k)) or opened[-1])
     return opened
 
 

@@ -152,7 +152,7 @@ def test_a_signal_ends_with_a_status_and_its_exit_code(short_demo, results, numb
 def test_a_lost_device_ends_the_session_with_one_line(short_demo, results, monkeypatch):
     machines = []
     open_machine = app.open_machine
-    monkeypatch.setattr(app, "open_machine", lambda *chosen: machines.append(open_machine(*chosen)) or machines[-1])
+    monkeypatch.setattr(app, "open_machine", lambda *a, **k: machines.append(open_machine(*a, **k)) or machines[-1])
 
     def unplug(participant):
         QTest.keyClick(participant.widget, Qt.Key.Key_Return)
@@ -201,7 +201,7 @@ def test_cancelling_the_opening_creates_nothing(short_demo, results):
 
 
 def test_a_mistake_in_the_program_is_an_exit_code_and_a_trace(short_demo, results, monkeypatch, capsys):
-    def fails(*_chosen):
+    def fails(*_chosen, **_asked):
         raise RuntimeError("not thought of")
 
     monkeypatch.setattr(app, "open_machine", fails)
