@@ -35,7 +35,7 @@ REQUEST: Final = struct.Struct("<BBHHH")
 ANSWER: Final = struct.Struct("<iI")
 IDENTITY: Final = struct.Struct("<HH")
 LONGEST_TIMEOUT_MS: Final = 10_000
-_GRACE_S: Final = 5  # how much longer than a time-out an answer may take before the server counts as gone
+_GRACE_S: Final = 30  # how much longer than a time-out an answer may take before the server counts as gone
 _SERVO_S: Final = 2  # the same for the servo, whose time-outs are a few milliseconds
 
 
@@ -140,6 +140,7 @@ class SocketTransport:
             code, size = ANSWER.unpack(_receive(connection, ANSWER.size))
             answer = _receive(connection, size)
         except OSError as error:
+            self.close()  # half an answer, or a late one, must not be taken for the next
             raise usb_failure(wire.ERROR_NO_DEVICE, where) from error
         if code < 0 and not (code == wire.ERROR_TIMEOUT and answer):
             raise usb_failure(code, where)

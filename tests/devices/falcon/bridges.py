@@ -3,6 +3,7 @@
 import ctypes
 import socket
 import threading
+from contextlib import suppress
 from types import SimpleNamespace
 
 import numba
@@ -159,7 +160,7 @@ class Server(threading.Thread):
                 client, _ = self._listener.accept()
             except OSError:
                 return
-            with client, client.makefile("rb") as stream:
+            with client, client.makefile("rb") as stream, suppress(BrokenPipeError):
                 self._serve(client, stream)
 
     def _serve(self, client, stream):
@@ -307,3 +308,12 @@ class Compiled:
 
 
 both = pytest.mark.parametrize("kind", [Python, pytest.param(Compiled, marks=compiled)])
+
+
+def warm(emulator):
+    """Return ``emulator`` with all compiled that a server of it calls, so that nobody waits for that."""
+    emulator.control(wire.REQUEST_LATENCY, wire.LATENCY_RUN_MS)
+    emulator.write(b"\0", 1)
+    emulator.read(wire.USB_PACKET, 1)
+    emulator.pause(1e-3)
+    return emulator

@@ -10,11 +10,11 @@ import pytest
 if not hasattr(socket, "AF_UNIX"):
     pytest.skip("no Unix sockets here", allow_module_level=True)
 
-from study_app.devices.falcon import wire
+from study_app.devices.falcon import transport_socket, wire
 from study_app.devices.falcon.failures import FalconLost, FalconNotFound, UsbFailure
 from study_app.devices.falcon.transport import open_transport
 from study_app.devices.falcon.transport_socket import BULK_IN, BULK_OUT, CONTROL, DESCRIPTOR, SocketTransport
-from tests.devices.falcon.bridges import Compiled, Server, both, compiled
+from tests.devices.falcon.bridges import Compiled, Server, both, compiled, warm
 
 
 @pytest.fixture
@@ -162,6 +162,19 @@ def test_signals_do_not_cut_a_transfer(server, path, kind):
     transport.close()
 
 
+def test_an_answer_that_is_late_is_not_taken_for_the_next(server, path, monkeypatch):
+    monkeypatch.setattr(transport_socket, "_GRACE_S", 0)
+    monkeypatch.setattr(transport_socket, "LONGEST_TIMEOUT_MS", 1000)  # then an answer has a second
+    transport = SocketTransport(str(path))
+    answer, given_up = server._answer, threading.Event()
+    server._answer = lambda kind: (given_up.wait(30), answer(kind))[1]
+    with pytest.raises(FalconLost):
+        transport.control(0, 0)
+    given_up.set()
+    with pytest.raises(FalconLost):
+        transport.control(0, 0)
+
+
 def test_nobody_there(path):
     with pytest.raises(FalconNotFound, match="connecting to"):
         SocketTransport(str(path))
@@ -206,3 +219,33 @@ def test_a_read_of_other_than_whole_packets_is_refused(server, path):
     with pytest.raises(ValueError, match="multiple of 64"):
         transport.read(16, 1.0)
     transport.close()
+
+
+@compiled
+def test_an_emulated_falcon_is_booted_and_answers_through_its_socket(path):
+    from study_app.devices.falcon.boot import boot, configure, is_running, measure_round_trip, set_event_character
+    from study_app.devices.falcon.emulator import Emulator
+    from study_app.devices.falcon.emulator_server import EmulatorServer
+    from tests.devices.falcon.test_firmware import stream
+
+    emulator = warm(Emulator(tremor_m=0.0, serial="S17"))
+    with EmulatorServer(emulator, path):
+        transport = open_transport(f"falcon-socket:{path}")
+        assert transport.serial == "S17"
+        boot(transport, stream())
+        assert emulator.running
+        transport.reopen()
+        configure(transport)
+        assert is_running(transport)
+        set_event_character(transport, on=True)
+        assert 2 * 16 * 10 / 1.5e6 < measure_round_trip(transport) <= 0.05
+        way = Compiled(transport)
+        way.write(wire.quiet_packet())
+        came = b""
+        while len(came) < wire.PACKET:
+            came += way.read(0.1)[wire.STATUS_BYTES :]
+        assert (came[0], came[-1]) == (wire.START, wire.STOP)
+        with pytest.raises(UsbFailure) as caught:
+            SocketTransport(str(path))
+        assert caught.value.kind == "busy"
+        transport.close()
