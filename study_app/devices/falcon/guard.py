@@ -1,0 +1,163 @@
+"""Zero torque when the program dies: a small process that outlives it.
+
+The last torque may persist in a Falcon that hears no more. So a child waits on a pipe from the program; if the pipe
+ends without ``WORD``, the program is gone, whatever ended it, and the child opens the Falcon and sends quiet packets.
+They keep the homing flag, and nothing of the bridge is set: what runs and is homed stays so. Run as
+``python -m study_app.devices.falcon.guard NAME``, NAME being one of ``transport.open_transport``.
+"""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+from contextlib import suppress
+from types import TracebackType
+from typing import Final, Self
+
+from study_app.devices.falcon.transport import Transport, open_transport
+from study_app.devices.falcon.wire import FLAG_HOMING, quiet_packet
+from study_app.errors import DeviceError
+
+WORD: Final = b"done\n"
+READY: Final = b"ready\n"
+PACKETS: Final = 10
+PATIENCE_S: Final = 10.0
+"""How long the guard tries to open the Falcon: the system takes a moment to take it from a program that died."""
+
+_RETRY_S = 0.02
+_BETWEEN_S = 0.002
+_WRITE_S = 0.1
+_LEAVE_S = 5.0
+
+
+class Guard:
+    """The guard of the Falcon that ``open_transport(name)`` opens.
+
+    As a context manager it starts on entry and stands down on exit; if an exception is on its way out, it does not
+    stand down, but sends its packets as soon as the Falcon is closed.
+    """
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self._child: subprocess.Popen[bytes] | None = None
+
+    def start(self) -> None:
+        """Start it, and wait until it watches.
+
+        Raises
+        ------
+        DeviceError
+            It does not start: then no force may be sent.
+        """
+        if self._child is not None:
+            return
+        command = [sys.executable, "-m", __spec__.name, self._name]
+        # In a session, or console, of its own: what ends the program with its terminal does not end its guard.
+        child = subprocess.Popen(  # noqa: S603 - our own module, and no shell
+            command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            bufsize=0,
+            start_new_session=True,
+            creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
+        )
+        if child.stdout is None or child.stdout.readline() != READY:
+            child.kill()
+            child.wait()
+            _close(child)
+            raise DeviceError("the Falcon's guard process does not start, so no force may be sent: install again")
+        self._child = child
+
+    @property
+    def watching(self) -> bool:
+        """Whether it was started, and is alive."""
+        return self._child is not None and self._child.poll() is None
+
+    def stand_down(self) -> None:
+        """Tell it that all is well: the torque is zero and the Falcon closed. A second call does nothing."""
+        self._end(WORD)
+
+    def release(self) -> None:
+        """Let it send its packets, once the Falcon is closed; wait until it has."""
+        self._end(b"")
+
+    def _end(self, word: bytes) -> None:
+        child, self._child = self._child, None
+        if child is None or child.stdin is None:
+            return
+        with suppress(OSError):  # it may have gone
+            child.stdin.write(word)
+            child.stdin.flush()
+        child.stdin.close()
+        try:
+            child.wait(_LEAVE_S if word else PATIENCE_S + _LEAVE_S)
+        except subprocess.TimeoutExpired:
+            child.kill()
+            child.wait()
+        _close(child)
+
+    def __enter__(self) -> Self:
+        self.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if error is None:
+            self.stand_down()
+        else:
+            self.release()
+
+
+def _close(child: subprocess.Popen[bytes]) -> None:
+    for stream in (child.stdin, child.stdout):
+        if stream is not None:
+            stream.close()
+
+
+def quiet(transport: Transport) -> int:
+    """Send ``PACKETS`` quiet packets; return how many went out."""
+    sent = 0
+    for _ in range(PACKETS):
+        with suppress(DeviceError):
+            transport.write(quiet_packet(FLAG_HOMING), _WRITE_S)
+            sent += 1
+        transport.pause(_BETWEEN_S)
+    return sent
+
+
+def _open_patiently(name: str) -> Transport:
+    ends_s = time.monotonic() + PATIENCE_S
+    while True:
+        try:
+            return open_transport(name)
+        except DeviceError:
+            if time.monotonic() > ends_s:
+                raise
+        time.sleep(_RETRY_S)
+
+
+def watch(name: str) -> int:
+    """Wait for the end of the standard input; without ``WORD`` in it, quieten the Falcon. Return an exit code."""
+    for number in ("SIGINT", "SIGTERM", "SIGHUP"):
+        if hasattr(signal, number):
+            signal.signal(getattr(signal, number), signal.SIG_IGN)  # it ends when the program has ended
+    sys.stdout.buffer.write(READY)
+    sys.stdout.flush()
+    if sys.stdin.buffer.read().endswith(WORD):
+        return 0
+    try:
+        transport = _open_patiently(name)
+    except DeviceError as error:
+        sys.stderr.write(f"the Falcon may still push: {error}; switch it off\n")
+        return 2
+    try:
+        return 0 if quiet(transport) else 2
+    finally:
+        transport.close()
+
+
+if __name__ == "__main__":
+    sys.exit(watch(*sys.argv[1:]))

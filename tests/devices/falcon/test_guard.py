@@ -1,0 +1,239 @@
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+
+import pytest
+
+if not hasattr(socket, "AF_UNIX"):
+    pytest.skip("no Unix sockets here", allow_module_level=True)
+
+from study_app.devices.falcon import guard as guarding
+from study_app.devices.falcon.failures import FalconNotFound
+from study_app.devices.falcon.guard import PACKETS, Guard, watch
+from study_app.devices.falcon.transport import open_transport
+from study_app.devices.falcon.transport_socket import DESCRIPTOR
+from study_app.devices.falcon.wire import FLAG_HOMING, quiet_packet
+from study_app.errors import DeviceError
+from tests.devices.falcon.bridges import Server, compiled, warm
+
+QUIET = [quiet_packet(FLAG_HOMING)] * PACKETS
+PUSHING = b"<PPPAPPPAPPPABA>"  # 4095 on every motor, homing on
+
+PROGRAM = """
+import sys
+from study_app.devices.falcon.guard import Guard
+from study_app.devices.falcon.transport import open_transport
+transport = open_transport(sys.argv[1])
+guard = Guard(sys.argv[1])
+{guarded}
+transport.write({packet!r}, 1.0)
+print("pushing", flush=True)
+{then}
+"""
+
+
+@pytest.fixture
+def server(tmp_path):
+    with Server(tmp_path / "falcon") as server:
+        server.bridge = f"falcon-socket:{tmp_path / 'falcon'}"
+        yield server
+
+
+def program(bridge, then="sys.stdin.read()", *, guarded=True):
+    """Return a program that pushes."""
+    code = PROGRAM.format(packet=PUSHING, then=then, guarded="guard.start()" if guarded else "")
+    running = subprocess.Popen([sys.executable, "-c", code, bridge], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    assert running.stdout.readline() == b"pushing\n"
+    return running
+
+
+def ended(running):
+    code = running.wait(30)
+    running.stdin.close()
+    running.stdout.close()
+    return code
+
+
+def guard_of(guard):
+    return guard._child
+
+
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM, signal.SIGABRT])
+def test_a_program_that_is_killed_leaves_no_torque(server, how):
+    running = program(server.bridge)
+    assert server.sent() == [PUSHING]
+    running.send_signal(how)
+    assert ended(running) == -how
+    server.wait_for(1 + PACKETS)
+    assert server.sent() == [PUSHING, *QUIET]
+    assert server.controls() == []  # the bridge stays as it was
+
+
+@pytest.mark.parametrize(
+    ("then", "code"), [("sys.exit(3)", 3), ("import os; os._exit(7)", 7), ("raise SystemError", 1)]
+)
+def test_a_program_that_ends_without_a_word_leaves_no_torque(server, then, code, capfd):
+    running = program(server.bridge, then)
+    assert ended(running) == code
+    server.wait_for(1 + PACKETS)
+    assert server.sent() == [PUSHING, *QUIET]
+    capfd.readouterr()
+
+
+def test_a_program_that_says_the_word_has_done_it_itself(server):
+    running = program(server.bridge, "transport.close(); guard.stand_down()")
+    assert ended(running) == 0
+    assert server.sent() == [PUSHING]
+    assert len(server.requests) == 2  # nobody else opened it
+
+
+def test_the_guard_waits_until_the_falcon_is_let_go(server):
+    answer, busy = server._answer, 5
+
+    def answer_busy(kind):
+        nonlocal busy
+        if kind == DESCRIPTOR and busy > 0:
+            busy -= 1
+            server.answers[DESCRIPTOR], kept = (-6, b""), server.answers[DESCRIPTOR]
+            said = answer(kind)
+            server.answers[DESCRIPTOR] = kept
+            return said
+        return answer(kind)
+
+    guard = Guard(server.bridge)
+    guard.start()
+    server._answer = answer_busy
+    guard.release()
+    assert server.sent() == QUIET
+    assert [request[0] for request in server.requests].count(DESCRIPTOR) == 6
+
+
+def test_what_ends_a_program_does_not_end_its_guard(server):
+    guard = Guard(server.bridge)
+    guard.start()
+    child = guard_of(guard)
+    assert os.getsid(child.pid) != os.getsid(0)
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        child.send_signal(number)
+    guard.release()
+    assert child.returncode == 0
+    assert server.sent() == QUIET
+
+
+def test_a_guard_stands_down_at_a_good_end(server):
+    with Guard(server.bridge) as guard:
+        assert guard.watching
+        child = guard_of(guard)
+        guard.start()
+        assert guard_of(guard) is child
+    assert not guard.watching
+    assert child.returncode == 0
+    guard.stand_down()
+    guard.release()
+    assert server.requests == []
+
+
+def test_a_guard_acts_at_a_bad_end(server):
+    transport = open_transport(server.bridge)
+
+    def fail():
+        with Guard(server.bridge):
+            transport.close()
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        fail()
+    assert server.sent() == QUIET
+
+
+def test_a_guard_that_died_is_not_watching_and_ends_all_the_same(server):
+    guard = Guard(server.bridge)
+    guard.start()
+    child = guard_of(guard)
+    child.kill()
+    child.wait()
+    assert not guard.watching
+    guard.stand_down()
+    assert server.requests == []
+
+
+def test_without_a_guard_there_is_no_force(monkeypatch):
+    monkeypatch.setattr(sys, "executable", "/bin/false")
+    with pytest.raises(DeviceError, match="guard"):
+        Guard("falcon").start()
+
+
+def test_a_falcon_that_has_gone_is_told_of(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(guarding, "PATIENCE_S", 0.0)
+    monkeypatch.setattr(guarding.signal, "signal", lambda *_: None)
+    with (tmp_path / "ended").open("w+") as ended_at_once:
+        monkeypatch.setattr(guarding.sys, "stdin", ended_at_once)
+        assert watch(f"falcon-socket:{tmp_path / 'none'}") == 2
+    said = capsys.readouterr()
+    assert said.out == "ready\n"
+    assert said.err.startswith("the Falcon may still push: ")
+    assert said.err.endswith("; switch it off\n")
+
+
+def test_patience_ends(monkeypatch, tmp_path):
+    seconds = iter(range(100))
+    naps = []
+    monkeypatch.setattr(time, "monotonic", lambda: float(next(seconds)))
+    monkeypatch.setattr(time, "sleep", naps.append)
+    with pytest.raises(FalconNotFound):
+        guarding._open_patiently(f"falcon-socket:{tmp_path / 'none'}")
+    assert len(naps) == guarding.PATIENCE_S
+
+
+def test_a_packet_that_does_not_go_out_does_not_keep_the_others_back():
+    class Stubborn:
+        sent, pauses, tries = [], 0, 0
+
+        def write(self, data, timeout_s):
+            self.tries += 1
+            if self.tries % 2:
+                raise DeviceError("not now")
+            self.sent.append(data)
+
+        def pause(self, seconds):
+            self.pauses += 1
+
+    stubborn = Stubborn()
+    assert guarding.quiet(stubborn) == PACKETS // 2
+    assert stubborn.tries == stubborn.pauses == PACKETS
+    assert stubborn.sent == QUIET[: PACKETS // 2]
+
+
+def test_the_guard_loads_no_compiler():
+    code = "import sys, study_app.devices.falcon.guard; sys.exit(bool({'numba', 'pandas', 'PySide6'} & {*sys.modules}))"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+@compiled
+def test_an_emulated_falcon_pushes_on_when_its_program_is_killed_and_not_when_it_was_guarded(tmp_path):
+    from study_app.devices.falcon.boot import configure
+    from study_app.devices.falcon.emulator import Emulator
+    from study_app.devices.falcon.emulator_server import EmulatorServer
+
+    emulator = warm(Emulator(tremor_m=0.0, running=True))
+    with EmulatorServer(emulator, tmp_path / "falcon") as server:
+        bridge = f"falcon-socket:{tmp_path / 'falcon'}"
+        transport = open_transport(bridge)
+        configure(transport)
+        transport.close()
+        for guarded in (False, True):
+            assert server.until(lambda: server.clients == 0, 30)
+            running = program(bridge, guarded=guarded)
+            assert server.until(lambda: emulator.torques == (4095, 4095, 4095), 30)
+            running.kill()
+            ended(running)
+            if guarded:
+                assert server.until(lambda: emulator.torques == (0, 0, 0), 30)
+            else:
+                assert server.until(lambda: server.clients == 0, 30)
+                assert emulator.torques == (4095, 4095, 4095)
+        assert server.until(lambda: emulator.packets == 2 + PACKETS, 30)
+        assert emulator.refused == 0
