@@ -93,7 +93,7 @@ def test_two_models_do_not_share_memory():
 
 @pytest.mark.skipif(not COMPILED, reason="the interpreter allocates all the time")
 @pytest.mark.parametrize("felt", [Scene(), *SCENES.values()], ids=["rest", *SCENES])
-def test_no_tick_allocates(felt):
+def test_hazard_18_no_tick_allocates_so_no_collection_can_pause_it(felt):
     @njit
     def run(model, safety, sample, positions_m, ticks):
         for k in range(ticks):
