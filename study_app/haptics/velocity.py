@@ -19,6 +19,7 @@ from study_app.haptics.layout import (
 from study_app.haptics.vector import clear, copy, norm, square
 
 TIE = 1e-9
+NOTHING_MPS = 1e-30
 
 
 @part
@@ -49,7 +50,8 @@ def estimate(parameters: Record, state: Record, window: Any, interval_s: float) 
 def _ewma(parameters: Record, state: Record, interval_s: float) -> None:
     """Move the estimate to the newest difference u = Δp/Δt: v ← v + α(Δt)(u − v) (Rek 2024, §4.2).
 
-    α(Δt) = 1 − (1 − α)^(Δt/1 ms) makes it the same filter at any rate; while Δt stays as it is, so does α.
+    α(Δt) = 1 − (1 − α)^(Δt/1 ms) makes it the same filter at any rate; while Δt stays as it is, so does α. What is left
+    at rest ends as 0: in denormal numbers, where it would stay, arithmetic is slow.
     """
     if interval_s != state.weighted_s:
         state.weighted_s = interval_s
@@ -57,7 +59,8 @@ def _ewma(parameters: Record, state: Record, interval_s: float) -> None:
     weight, per_s = state.weight, 1.0 / interval_s
     for axis in range(3):
         difference_mps = (state.position_m[axis] - state.previous_m[axis]) * per_s
-        state.estimate_mps[axis] += weight * (difference_mps - state.estimate_mps[axis])
+        estimate_mps = state.estimate_mps[axis] + weight * (difference_mps - state.estimate_mps[axis])
+        state.estimate_mps[axis] = estimate_mps if abs(estimate_mps) > NOTHING_MPS else 0.0
 
 
 @part

@@ -81,12 +81,6 @@ def test_real_liquids_are_as_strong_as_published(law, density, viscosity, at_hal
     assert felt[1] == pytest.approx(-8, rel=0.07)
 
 
-def test_at_rest_a_viscous_liquid_has_a_finite_slope():
-    felt = simulate(viscous("brown-lawler", 1420, 10), moving([(0.0, 0, 0), (1e-12, 0, 0)])).fx_n
-    assert felt[0] == 0.0
-    assert felt[1] == pytest.approx(-3 * np.pi * 10 * 0.068 * 1e-12, rel=1e-6)
-
-
 def test_a_coasting_ball_slows_down_as_the_exact_solution_says():
     # m v' = -c v²: from 1 m/s to 0.10526 m/s in one second for m/c = 0.1/0.85, by the time m dv/F takes.
     body = Body(drag_coefficient=2 * 0.85 / (1000 * np.pi * 0.034**2))

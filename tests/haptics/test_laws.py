@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from study_app.haptics.laws import HIGHEST_REYNOLDS, LAWS, drag_n
+from study_app.haptics.laws import LAWS, drag_n
 
 # Measured drag coefficients of smooth spheres below the drag crisis, Re against C_d. The point at Re 0.0588 lies 20 %
 # above Stokes' 24/Re and cannot be right: it is left out.
@@ -62,20 +62,6 @@ def test_drag_at_half_a_metre_a_second(law, liquid, newtons):
 @pytest.mark.parametrize(("liquid", "speed"), [(WATER, 3.01), (OLIVE_OIL, 3.51), (HONEY, 0.780), (TAR, 0.121)])
 def test_the_speed_at_which_8_newtons_are_reached(law, liquid, speed):
     assert drag_n(law, 0.93 * speed, **liquid) < 8 < drag_n(law, 1.07 * speed, **liquid)
-
-
-@pytest.mark.parametrize("law", LAWS)
-def test_at_rest_the_force_is_finite_and_the_slope_stokes(law):
-    assert LAWS[law](0.0) == 1.0
-    assert drag_n(law, 0.0, **TAR) == 0.0
-    assert drag_n(law, 1e-300, **TAR) == pytest.approx(3 * math.pi * 100 * 0.068 * 1e-300)
-
-
-@pytest.mark.parametrize("law", LAWS)
-def test_beyond_its_range_a_coefficient_stays(law):
-    held = coefficient(law, HIGHEST_REYNOLDS)
-    assert 0.43 < held < 0.48
-    assert [coefficient(law, re) for re in (2.1e5, 1e6, 1e9)] == pytest.approx([held] * 3)
 
 
 @pytest.mark.parametrize("law", LAWS)
