@@ -17,16 +17,14 @@ DAMPING_NSPM = 27.0  # 1.5 times critical
 LAG_S = 0.010
 
 
-class MouseDevice(SimulatedDevice):
-    """The built-in default: a pointer and its buttons, and no hardware.
+class PointedDevice(SimulatedDevice):
+    """A handle that hangs on a pointer; who moves the pointer is the subclass's affair.
 
     Parameters
     ----------
     workspace_m : half extents of where the handle reaches [m]
     force_limit_n : the greatest force it may be asked for [N]
     """
-
-    name = "mouse"
 
     def __init__(
         self, workspace_m: tuple[float, float, float] = (0.05, 0.05, 0.05), force_limit_n: float = 8.0
@@ -38,3 +36,9 @@ class MouseDevice(SimulatedDevice):
     def point_to(self, x_m: float, y_m: float, z_m: float) -> None:
         """Say where the pointer is [m, hand frame]; a place outside the workspace counts as its border."""
         self._post(POINT, target_m=self._inside(x_m, y_m, z_m))
+
+
+class MouseDevice(PointedDevice):
+    """The built-in default: a pointer and its buttons, and no hardware; a window says where the pointer is."""
+
+    name = "mouse"

@@ -33,6 +33,7 @@ from study_app.store.layout import MAX_SESSION, StudyFolder, check_participant, 
 DEVICE_WORDS = {
     "mouse": "Mouse (seen, not felt)",
     "falcon": "Novint Falcon",
+    "spacemouse": "SpaceMouse (seen, not felt)",
     "scripted": "Scripted hand (moves by itself)",
     "falcon-emulated": "Emulated Falcon (moves by itself)",
 }

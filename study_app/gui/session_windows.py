@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 DEVICE_NAMES = {
     "mouse": "Mouse",
     "falcon": "Novint Falcon",
+    "spacemouse": "SpaceMouse",
     "scripted": "Scripted hand",
     "falcon-emulated": "Emulated Falcon",
     "falcon-socket": "Falcon behind a socket",
@@ -123,7 +124,7 @@ def _facts(chosen: NewSession, protocol: Protocol, schedule: Schedule, machine: 
         answers_of=protocol.responses_per_participant(),
         lateness_limit_s=protocol.limits.lateness_ms / 1000,
         device_name=DEVICE_NAMES[kind_of(chosen.device)],
-        device_kind="mouse" if by_mouse else "simulated" if nobody else "falcon",
+        device_kind="mouse" if chosen.device in {"mouse", "spacemouse"} else "simulated" if nobody else "falcon",
         device_rows=(
             ("Priority", str(machine.servo.describe()["priority"]).partition(" (")[0]),
             *_calibration(machine.device),
