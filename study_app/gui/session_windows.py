@@ -115,7 +115,7 @@ def _excluder(chosen: NewSession) -> Callable[[int | None, str], None]:
 
 def _facts(chosen: NewSession, protocol: Protocol, schedule: Schedule, machine: Machine) -> Session:
     """Return what the operator's window says throughout; the force's share of its limit stays hidden."""
-    by_mouse, nobody = chosen.device == "mouse", is_simulated(chosen.device)
+    seen_alone, nobody = chosen.device in {"mouse", "spacemouse"}, is_simulated(chosen.device)
     return Session(
         protocol=protocol,
         stages=stages(protocol, schedule),
@@ -124,7 +124,7 @@ def _facts(chosen: NewSession, protocol: Protocol, schedule: Schedule, machine: 
         answers_of=protocol.responses_per_participant(),
         lateness_limit_s=protocol.limits.lateness_ms / 1000,
         device_name=DEVICE_NAMES[kind_of(chosen.device)],
-        device_kind="mouse" if chosen.device in {"mouse", "spacemouse"} else "simulated" if nobody else "falcon",
+        device_kind="mouse" if seen_alone else "simulated" if nobody else "falcon",
         device_rows=(
             ("Priority", str(machine.servo.describe()["priority"]).partition(" (")[0]),
             *_calibration(machine.device),
