@@ -11,6 +11,7 @@ from study_app.session.rehearsal import rehearse
 from study_app.store.blinding import reveal
 from study_app.store.dictionary import dictionary_markdown
 from study_app.store.exclusions import exclude
+from tests.compiled import needs_servo
 
 ROOT = Path(__file__).resolve().parent.parent
 BEGIN = "<!-- dictionary: printed by python -m study_app.store.dictionary -->\n\n"
@@ -45,6 +46,7 @@ def named_files(section: str) -> set[str]:
     return paths
 
 
+@needs_servo
 def test_the_tree_names_every_file_of_a_study_and_no_other(section: str, tmp_path: Path) -> None:
     folder = rehearse("rek2024", participants=1, seed=1, results=tmp_path / "rek2024")
     exclude(folder, "P001", 1, by="AB", reason="a test")

@@ -28,6 +28,7 @@ from study_app.gui.pages.questionnaire import QuestionnaireWidget
 from study_app.gui.participant import ParticipantWindow
 from study_app.protocol.files import source_bytes
 from study_app.protocol.words import words
+from tests.compiled import needs_servo
 from tests.gui.small import ManualClock, questionnaire
 
 NEEDED = ("Xvfb", "xdotool")
@@ -36,6 +37,7 @@ GIVEN = [7, 1, 4, 6, 2, 3, 5, 7, 1]
 BY_CLICK = {1, 4, 8}
 
 pytestmark = [
+    needs_servo,
     pytest.mark.xvfb,
     pytest.mark.timeout(300),
     pytest.mark.skipif(bool(MISSING), reason=f"not installed here: {', '.join(MISSING)}"),

@@ -26,6 +26,9 @@ from study_app.store import journal
 from study_app.store.blinding import open_or_draw_key
 from study_app.store.layout import SessionFolder, StudyFolder
 from study_app.store.verify import verify
+from tests.compiled import needs_servo
+
+pytestmark = needs_servo
 
 CLOCK_COLUMNS = {"answered_at", "trial_started_at", "session_started_at", "session_ended_at"}
 

@@ -19,6 +19,7 @@ from study_app.store.exclusions import exclude
 from study_app.store.layout import SessionFolder, StudyFolder
 from study_app.store.reproduced import reproduced
 from study_app.store.verify import verify
+from tests.compiled import needs_servo
 
 ROOT = Path(__file__).resolve().parents[2]
 SAMPLE = StudyFolder(ROOT / "results" / "sample-rek2024")
@@ -62,6 +63,7 @@ def test_it_is_small_sealed_simulated_and_without_recordings() -> None:
         assert {row["simulated"] for row in responses(session)} == {"true"}
 
 
+@needs_servo
 def test_its_responses_are_those_of_a_rehearsal_today(tmp_path: Path) -> None:
     folder = rehearse("rek2024", participants=1, seed=1, results=tmp_path / "again", recordings=False)
     (again,) = StudyFolder(folder).sessions()

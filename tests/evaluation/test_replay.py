@@ -25,8 +25,11 @@ from study_app.session.runner import Runner
 from study_app.store.journal import SessionClock
 from study_app.store.layout import StudyFolder
 from study_app.store.session import begin
+from tests.compiled import needs_servo
 from tests.faults import short
 from tests.session import small
+
+pytestmark = needs_servo
 
 SECONDS = 1000  # ticks
 

@@ -16,12 +16,16 @@ from study_app.protocol.load import load
 from study_app.store import journal, tables
 from study_app.store.layout import SessionFolder, StudyFolder
 from study_app.store.verify import verify
+from tests.compiled import needs_servo
 from tests.faults import short
 
 TIMES = {"answered_at", "onset_s", "first_choice_s", "last_change_s", "attempt"}
 WHAT_RAN = ("trial", "block", "phase", "part", "index", "of", "code", "outcome")
 
-pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="needs processes that fork")
+pytestmark = [
+    needs_servo,
+    pytest.mark.skipif(not hasattr(os, "fork"), reason="needs processes that fork"),
+]
 
 
 def kill(folder: Path, resume: str, count: int) -> list[dict[str, Any]]:

@@ -17,10 +17,11 @@ from study_app.gui.participant import ParticipantWindow
 from study_app.protocol.load import load, source_bytes
 from study_app.session.pages import TaskPage
 from study_app.store.leaks import leaks, telltales
+from tests.compiled import needs_servo
 from tests.faults import short
 from tests.faults.windows import Person
 
-pytestmark = pytest.mark.usefixtures("qapp")
+pytestmark = [needs_servo, pytest.mark.usefixtures("qapp")]
 
 # Ids, parameters and delays that occur nowhere by chance.
 CONCEALED = (

@@ -21,10 +21,11 @@ from study_app.session.pages import PausePage, TaskPage
 from study_app.store import journal
 from study_app.store.layout import StudyFolder
 from study_app.store.verify import verify
+from tests.compiled import needs_servo
 from tests.faults import short
 from tests.faults.windows import Person
 
-pytestmark = pytest.mark.usefixtures("qapp")
+pytestmark = [needs_servo, pytest.mark.usefixtures("qapp")]
 
 
 @pytest.fixture(autouse=True)

@@ -26,9 +26,10 @@ from study_app.gui.theme import PARTICIPANT
 from study_app.protocol.load import source_bytes
 from study_app.session.pages import EndPage, PausePage, QuestionnairePage, TaskPage, TextPage
 from study_app.store.open_session import SessionStore
+from tests.compiled import needs_servo
 
 # The platform without a screen cannot limit or raise windows, and says so.
-pytestmark = pytest.mark.usefixtures("qapp")
+pytestmark = [needs_servo, pytest.mark.usefixtures("qapp")]
 
 
 @pytest.fixture(autouse=True)

@@ -17,6 +17,7 @@ from study_app.protocol.model import Protocol
 from study_app.session import measuring
 from study_app.session.measuring import measure
 from study_app.session.preflight import Facts, Screen, checks, refused
+from tests.compiled import needs_servo
 from tests.session import small
 
 WELL = Facts(
@@ -99,6 +100,7 @@ def void(_: object) -> None:
     """Drop what a call returned."""
 
 
+@needs_servo
 def test_servo_and_disk_are_measured_and_nothing_is_left(tmp_path: Path) -> None:
     facts = measured(tmp_path / "not" / "yet")
     assert facts.timing.rate_hz == pytest.approx(1000, rel=1e-3)
@@ -110,6 +112,7 @@ def test_servo_and_disk_are_measured_and_nothing_is_left(tmp_path: Path) -> None
     assert refused(checks(facts, small.protocol())) == ""
 
 
+@needs_servo
 def test_a_disk_that_takes_nothing_is_a_failure_with_its_reason(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -23,6 +23,7 @@ from study_app.session.tasks import TaskView
 from study_app.store.description import write_description
 from study_app.store.layout import StudyFolder
 from study_app.store.session import SessionStore
+from tests.compiled import needs_servo
 from tests.session import small
 
 HALF_M = (0.05, 0.03, 0.03)
@@ -155,6 +156,7 @@ def test_the_last_choice_for_an_item_is_its_answer_and_every_choice_is_on_the_sc
     assert all(1 <= choice.value <= 7 and choice.after_s > 0 for choice in given_)
 
 
+@needs_servo
 def test_a_device_that_is_lost_ends_the_rehearsal_with_a_word_why(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -177,6 +179,7 @@ def test_the_folder_of_another_study_is_named_before_an_id_that_is_used_in_it(tm
         rehearsal.rehearse("demo", participants=1, seed=1, results=folder.path)
 
 
+@needs_servo
 def test_a_disk_that_fails_ends_the_rehearsal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def full(self: SessionStore, event: str, **fields: Any) -> None:
         if event == "choice":

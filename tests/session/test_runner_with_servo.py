@@ -22,8 +22,11 @@ from study_app.session.state import Phase
 from study_app.store.journal import SessionClock
 from study_app.store.session import begin
 from study_app.store.tables import trials
+from tests.compiled import needs_servo
 from tests.session import small
 from tests.session.fakes import FakeJournal
+
+pytestmark = needs_servo
 
 
 class Bench:

@@ -1,0 +1,8 @@
+"""What runs without the compiler (``NUMBA_DISABLE_JIT=1``, for a debugger and coverage), and what does not."""
+
+from __future__ import annotations
+
+import numba
+import pytest
+
+needs_servo = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="the servo and its devices exist compiled only")
