@@ -7,6 +7,9 @@ import pytest
 from study_app.errors import StoreError
 from study_app.session.rehearsal import rehearse
 from study_app.store.reproduced import reproduced
+from tests.compiled import needs_servo
+
+pytestmark = needs_servo
 
 
 @pytest.fixture(scope="module")
