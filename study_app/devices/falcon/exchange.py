@@ -3,15 +3,12 @@
 The device answers each packet with one, so `_read` collects what the packet of the turn before asked for, and `_write`
 sends the force as soon as it is known; a position is one turn old. Several replies at once: the newest counts. None:
 nothing new, and what came last is never given twice. Force passes a gate: all arms homed, the grip pulled out once, and
-then half a second from none to all.
-
-A reply cannot be matched to its packet, so replies that are always late look like punctual ones after a loss. When more
-than ``MOST_OWED`` are owed, nothing but zero force is sent for two turns: what still comes then was late, and late
-positions are not given; else the owed ones are written off as lost.
+then half a second from none to all. Which replies are believed: see ``replies``.
 """
 
 from __future__ import annotations
 
+import math
 from functools import cache
 from typing import Any, Final
 
@@ -30,6 +27,7 @@ from study_app.devices.falcon.kinematics import (
     torques,
 )
 from study_app.devices.falcon.packets import PARSER, STATUS, feed, pack, strip
+from study_app.devices.falcon.replies import believe, settle, trust
 from study_app.devices.falcon.wire import (
     ENDPOINT_IN,
     ENDPOINT_OUT,
@@ -57,15 +55,11 @@ from study_app.haptics.compiled import kernel
 from study_app.haptics.layout import READING, records
 
 RAMP_S: Final = 0.5
+MOST_STEP_N: Final = 0.47
+"""The force at the grip steps by no more within a turn, however many turns the motors were not told anything new: the
+servo's 0.5 N, less what motion within a turn makes of torques."""
 LONGEST_GAP_NS: Final = 20_000_000
 """A reply that waited longer for the loop to look is too old to be given."""
-MOST_OWED: Final = 4
-TEST_TURNS: Final = 2
-RETEST_TURNS: Final = 20
-ALL_HOMED: Final = 0b111
-BELIEVED: Final = 3
-"""So many packets in a row must say that an arm is no longer homed: one may have been garbled."""
-
 _READS = 2  # a turn asks the bridge at most so often: one answer may be nothing but status bytes
 _TIMEOUT_MS = 1
 _DATA = 4 * USB_PACKET
@@ -91,8 +85,17 @@ FALCON = np.dtype(
         ("position_m", np.float64, (3,)),
         ("rates", np.float64, (3, 3)),
         ("force_n", np.float64, (3,)),  # as it passed the gate
+        ("held_n", np.float64, (3,)),  # what the motors push with, as told before
         ("torque_nm", np.float64, (3,)),
         ("units", np.int64, (3,)),  # what the motors were last told
+        # the motion of the arms, to tell garbled encoders
+        ("tracked", np.int64),  # 1 once encoders were believed
+        ("apart", np.int64),  # turns since then
+        ("counts", np.int64, (3,)),  # as last believed
+        ("pace", np.float64, (3,)),  # counts a turn
+        ("doubted", np.int64, (3,)),  # as last not believed,
+        ("doubted_at", np.int64),  # so many turns after the last believed
+        ("doubts", np.int64),  # in a row
         # the gate
         ("homed", np.int64),  # 1 while all arms are
         ("unhomed", np.int64),  # packets in a row that said otherwise
@@ -110,7 +113,7 @@ FALCON = np.dtype(
         ("fresh", np.int64),  # turns that gave a position
         ("missing", np.int64),  # turns without a reply
         ("late", np.int64),  # turns whose reply was too old, or may have been
-        ("refused", np.int64),  # turns whose reply was no pose of a homed Falcon
+        ("refused", np.int64),  # turns whose reply was no pose of a homed Falcon, or is doubted
         ("requests", np.int64),  # packets sent
         ("replies", np.int64),  # packets received
         ("written_off", np.int64),  # replies that were given up
@@ -177,19 +180,20 @@ def _read(context: int, now_ns: int, reading: int) -> int:
     elapsed_ns = now_ns - falcon.now_ns
     falcon.now_ns = now_ns
     falcon.turns += 1
+    falcon.apart += 1
     packets = _receive(falcon, context)
     if falcon.lost != 0:
         return READ_LOST
     gap = falcon.started == 0 or elapsed_ns <= 0 or elapsed_ns > LONGEST_GAP_NS
     falcon.started = 1
-    punctual = _settle(falcon, packets, gap)
+    punctual = settle(falcon, packets, gap)
     if packets == 0:
         falcon.missing += 1
         return READ_NOTHING_NEW
     if not punctual:
         falcon.late += 1
         return READ_NOTHING_NEW
-    if not _believe(falcon) or not _locate(falcon):
+    if not (believe(falcon) and trust(falcon) and _locate(falcon)):
         falcon.refused += 1
         return READ_NOTHING_NEW
     _open_gate(falcon, elapsed_ns * 1e-9)
@@ -227,8 +231,25 @@ def push(falcon: Any) -> None:
             falcon.units[i] = 0
         return
     jacobian(falcon.mechanism, falcon.theta, falcon.position_m, falcon.rates)
+    _limit_step(falcon)
     torques(falcon.rates, falcon.force_n, falcon.torque_nm)
     falcon.shortened += motor_units(falcon.mechanism, falcon.torque_nm, falcon.units)
+
+
+@kernel
+def _limit_step(falcon: Any) -> None:
+    """Shorten the step from what the motors push with at present, where the grip is now."""
+    square = 0.0
+    for axis in range(3):
+        held_n = 0.0
+        for i in range(3):
+            held_n -= falcon.units[i] / falcon.mechanism.units_per_nm * falcon.rates[i, axis]
+        falcon.held_n[axis] = held_n
+        square += (falcon.force_n[axis] - held_n) ** 2
+    if square > MOST_STEP_N * MOST_STEP_N:
+        share = MOST_STEP_N / math.sqrt(square)
+        for axis in range(3):
+            falcon.force_n[axis] = falcon.held_n[axis] + share * (falcon.force_n[axis] - falcon.held_n[axis])
 
 
 @kernel
@@ -268,61 +289,6 @@ def _receive(falcon: Any, context: int) -> Any:
             break
     falcon.replies += packets
     return packets
-
-
-@kernel
-def _settle(falcon: Any, packets: int, gap: bool) -> bool:
-    """Keep account of what is owed; return whether what came was asked for in the turn before."""
-    owed = falcon.owed + falcon.asked - packets
-    falcon.asked = 0
-    falcon.surplus += max(-owed, 0)
-    falcon.owed = max(owed, 0)
-    if gap:
-        _write_off(falcon)
-        return False
-    if falcon.testing > 0:
-        if packets == 0 and falcon.testing >= TEST_TURNS:
-            _write_off(falcon)
-        elif falcon.testing > TEST_TURNS:
-            falcon.testing = 0
-            falcon.retest = RETEST_TURNS
-        else:
-            falcon.testing += 1
-        return False
-    if falcon.owed <= MOST_OWED:
-        return True
-    if falcon.retest > 0:
-        falcon.retest -= 1
-    elif packets > 0:  # silence tells nothing about what is on its way
-        falcon.testing = 1
-    return False
-
-
-@kernel
-def _write_off(falcon: Any) -> None:
-    falcon.written_off += falcon.owed
-    falcon.owed = 0
-    falcon.testing = 0
-    falcon.retest = 0
-
-
-@kernel
-def _believe(falcon: Any) -> bool:
-    """Take buttons and homed arms from the newest packet; return whether its encoders count from their index."""
-    status = falcon.status
-    if status.homed != ALL_HOMED:
-        falcon.unhomed += 1
-        if falcon.unhomed >= BELIEVED:
-            falcon.homed = 0
-            falcon.pulled_out = 0
-            falcon.share = 0.0
-        return False
-    falcon.unhomed = 0
-    falcon.homed = 1
-    if status.buttons == falcon.seen_buttons:
-        falcon.buttons = status.buttons
-    falcon.seen_buttons = status.buttons
-    return True
 
 
 @kernel

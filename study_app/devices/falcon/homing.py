@@ -9,8 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Final
 
-from study_app.devices.falcon.exchange import ALL_HOMED
-from study_app.errors import DeviceError
+from study_app.devices.falcon.diagnosis import OPEN, Facts, sentence
+from study_app.devices.falcon.failures import FalconFailure
+from study_app.devices.falcon.replies import ALL_HOMED
 
 PATIENCE_S: Final = 120.0
 ADVICES: Final = 6  # so often, in that time, advice is given
@@ -20,21 +21,20 @@ STROKES: Final = "Homing (red light): pull the grip of the Falcon all the way ou
 PULL_OUT: Final = "Homed (blue light): now pull the grip all the way out once more."
 READY: Final = "The Falcon is ready (green light)."
 
-_REASONS: Final = {
-    "silent": "it does not answer: check its mains adapter, then unplug it, plug it in and start again",
-    "limp": "its encoders do not move: check its mains adapter; if the grip was moved, switch it off and on, then load "
-    "its firmware again",
-    "not-pushed-in": "not every arm has passed its index: push the grip fully in, as far as it goes, then pull it out",
-    "not-pulled-out": "it is homed, but its grip was not pulled out: pull it fully out, toward you",
+_SEEN: Final = {
+    "silent": Facts(usb=OPEN, replies=False),
+    "limp": Facts(usb=OPEN, replies=True, homed=0, moved=False),
+    "not-pushed-in": Facts(usb=OPEN, replies=True, homed=0, moved=True),
+    "not-pulled-out": Facts(usb=OPEN, replies=True, homed=ALL_HOMED, moved=True, pulled_out=False),
 }
 
 
-class NotHomed(DeviceError):
-    """Homing did not come to an end; ``kind`` is a key of the reasons, by which diagnosis knows it."""
+class NotHomed(FalconFailure):
+    """Homing did not come to an end; ``kind`` is a key of what can have been seen."""
 
     def __init__(self, kind: str) -> None:
         self.kind = kind
-        super().__init__(f"the Falcon was not homed: {_REASONS[kind]}")
+        super().__init__(f"the Falcon was not homed: {sentence(_SEEN[kind])}", _SEEN[kind])
 
 
 def home(
@@ -75,7 +75,7 @@ def home(
             raise NotHomed(kind)
         if now_s() - advised_s > patience_s / ADVICES:
             advised_s = now_s()
-            tell(f"Still homing: {_REASONS[kind]}.")
+            tell(f"Still homing: {sentence(_SEEN[kind])}.")
     tell(READY)
 
 

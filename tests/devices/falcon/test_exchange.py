@@ -7,9 +7,10 @@ from hypothesis import strategies as st
 if numba.config.DISABLE_JIT:
     pytest.skip("the exchange is made of C functions", allow_module_level=True)
 
-from study_app.devices.falcon.exchange import COUNTERS, MOST_OWED, RAMP_S
+from study_app.devices.falcon.exchange import COUNTERS, RAMP_S
 from study_app.devices.falcon.kinematics import REACHED, inverse
 from study_app.devices.falcon.packets import FLAGS_AT
+from study_app.devices.falcon.replies import MOST_OWED
 from study_app.devices.falcon.wire import (
     ERROR_IO,
     ERROR_NO_DEVICE,
@@ -24,7 +25,17 @@ from study_app.devices.falcon.wire import (
     quiet_packet,
 )
 from study_app.haptics.cfunctions import READ_LOST, READ_NEW, READ_NOTHING_NEW
-from tests.devices.falcon.turns import CENTRE_M, GEOMETRY, MODEM_STATUS, MS, OUT_M, UNITS_PER_NM, Turns, reply
+from tests.devices.falcon.turns import (
+    CENTRE_M,
+    GEOMETRY,
+    MODEM_STATUS,
+    MS,
+    OUT_M,
+    UNITS_PER_NM,
+    Turns,
+    counts_at,
+    reply,
+)
 
 PUSH_N = (1.0, -0.5, 2.0)
 SOMEWHERE_M = (0.02, -0.01, 0.015)
@@ -106,6 +117,42 @@ class TestAPosition:
         assert turns.falcon.refused == 1
         assert (turns.position_m == before).all()
 
+    def test_a_garbled_encoder_is_not_believed(self, turns):
+        turns.turn()
+        turns.turn(reply(SOMEWHERE_M))
+        before = turns.position_m
+        counts = counts_at(SOMEWHERE_M)
+        assert turns.turn(reply(counts=np.add(counts, [0, 0x40, 0])))[0] == READ_NOTHING_NEW
+        assert turns.turn(reply(counts=np.add(counts, [1, 0, 0])))[0] == READ_NEW
+        assert turns.position_m == pytest.approx(before, abs=1e-4)
+        assert turns.falcon.refused == 1
+
+    def test_a_leap_that_a_second_reply_confirms_is_believed(self, turns):
+        turns.turn()
+        turns.turn(reply(CENTRE_M))
+        assert turns.turn(reply(SOMEWHERE_M))[0] == READ_NOTHING_NEW
+        assert turns.turn(reply(SOMEWHERE_M))[0] == READ_NEW
+        assert turns.position_m == pytest.approx(SOMEWHERE_M, abs=60e-6)
+
+    def test_encoders_that_leap_on_and_on_are_believed_in_the_end(self, turns):
+        turns.turn()
+        turns.turn(reply(CENTRE_M))
+        counts = counts_at(CENTRE_M)
+        answers = [turns.turn(reply(counts=counts + k * 100))[0] for k in range(1, 10)]
+        assert answers[:3] == [READ_NOTHING_NEW, READ_NOTHING_NEW, READ_NEW]
+
+    @pytest.mark.parametrize("speed_mps", [0.5, 2.0])
+    def test_a_swift_hand_is_believed_though_replies_are_lost(self, turns, speed_mps):
+        turns.turn()
+        x, v = -0.035, 0.0
+        for turn in range(1000):
+            turns.turn(*[] if turn % 7 == 3 else [reply((x, 0.0, 0.0))] * turns.falcon.asked)
+            v = min(v + 0.1, speed_mps)  # 10 g
+            x += v / 1000
+            if x > 0.035:
+                break
+        assert turns.falcon.refused == 0
+
     def test_a_button_is_down_when_two_packets_say_so(self, turns):
         turns.turn()
         turns.turn(reply())
@@ -128,8 +175,7 @@ class TestTheGate:
 
     def test_the_force_comes_in_over_half_a_second(self, turns):
         turns.turn()
-        turns.turn(reply())
-        turns.turn(reply(OUT_M))
+        turns.pull_out()
         shares = []
         for _ in range(round(RAMP_S * 1000) + 10):
             turns.turn(reply(), force_n=PUSH_N)
@@ -141,7 +187,8 @@ class TestTheGate:
 
     def test_what_passes_is_the_force_that_was_asked_for(self, turns):
         turns.open_gate()
-        turns.turn(reply(SOMEWHERE_M), force_n=PUSH_N)
+        for _ in range(10):
+            turns.turn(reply(SOMEWHERE_M), force_n=PUSH_N)
         assert force_of(turns, turns.position_m) == pytest.approx(PUSH_N, abs=0.005)
 
     def test_homed_bits_that_are_gone_close_it_until_the_next_out_stroke(self, turns):
@@ -152,7 +199,8 @@ class TestTheGate:
         for _ in range(20):
             turns.turn(reply(), force_n=PUSH_N)
             assert turns.torques == [0, 0, 0]
-        turns.turn(reply(OUT_M), force_n=PUSH_N)
+        turns.pull_out()
+        turns.turn(reply(), force_n=PUSH_N)
         turns.turn(reply(), force_n=PUSH_N)
         assert turns.torques != [0, 0, 0]
 
@@ -163,13 +211,26 @@ class TestTheGate:
         assert turns.falcon.share == 1.0
         assert turns.torques != [0, 0, 0]
 
+    def test_the_force_steps_by_less_than_half_a_newton_whatever_is_asked_for(self, turns):
+        turns.open_gate()
+        before = np.zeros(3)
+        for turn in range(60):
+            turns.turn(reply(), force_n=(5.0, 0.0, 0.0) if turn < 30 else (-5.0, 1.0, 3.0))
+            given = force_of(turns, CENTRE_M)
+            assert np.linalg.norm(given - before) < 0.48
+            before = given
+        assert given == pytest.approx([-5.0, 1.0, 3.0], abs=0.01)
+        turns.turn(reply())  # but no force is no force at once
+        assert turns.torques == [0, 0, 0]
+
     def test_more_than_the_motors_give_keeps_its_direction(self, turns):
         turns.open_gate()
-        turns.turn(reply(), force_n=tuple(20 * np.array(PUSH_N)))
+        for _ in range(100):
+            turns.turn(reply(), force_n=tuple(20 * np.array(PUSH_N)))
         assert max(map(abs, turns.torques)) == MOST_TORQUE
         given = force_of(turns, CENTRE_M)
         assert given / np.linalg.norm(given) == pytest.approx(PUSH_N / np.linalg.norm(PUSH_N), abs=2e-3)
-        assert turns.falcon.shortened == 1
+        assert turns.falcon.shortened > 50
 
     @pytest.mark.parametrize("bad", [np.nan, np.inf])
     def test_a_force_that_is_no_number_is_none(self, turns, bad):
@@ -185,7 +246,7 @@ class TestTheGate:
         turns.turn()
         assert flags_after(reply(homed=0b011)) == FLAG_HOMING | FLAG_RED
         assert flags_after(reply()) == FLAG_HOMING | FLAG_BLUE
-        assert flags_after(reply(OUT_M)) == FLAG_HOMING | FLAG_GREEN
+        turns.pull_out()
         assert flags_after(reply()) == FLAG_HOMING | FLAG_GREEN
         for _ in range(3):
             flags = flags_after(reply(homed=0))

@@ -107,9 +107,14 @@ class Turns:
     def open_gate(self):
         """Home it, pull the grip out and wait until all force passes."""
         self.turn()
-        self.turn(reply(OUT_M))
+        self.pull_out()
         while self.falcon.share < 1.0:
             self.turn(reply())
+
+    def pull_out(self):
+        """Pull the grip out and let it go back, faster than any hand but seen twice at either end."""
+        for place_m in (OUT_M, OUT_M, CENTRE_M, CENTRE_M):
+            self.turn(reply(place_m))
 
     @property
     def position_m(self):
