@@ -211,7 +211,8 @@ def _write(context: int, fx: float, fy: float, fz: float) -> int:
     if falcon.lost != 0:
         return READ_LOST
     none = fx == 0.0 and fy == 0.0 and fz == 0.0
-    if falcon.testing != 0 and not none:
+    pushing = falcon.units[0] != 0 or falcon.units[1] != 0 or falcon.units[2] != 0
+    if falcon.testing != 0 and not (none and pushing):
         return 0
     falcon.force_n[0], falcon.force_n[1], falcon.force_n[2] = fx, fy, fz
     push(falcon)

@@ -1,7 +1,7 @@
 """Which replies of a Falcon count: those that were asked for in the turn before, and that a hand can have made.
 
 A reply cannot be matched to its packet, so replies that are always late look like punctual ones after a loss. When more
-than ``MOST_OWED`` are owed, nothing but zero force is sent for two turns: what still comes then was late, and late
+than ``MOST_OWED`` are owed, nothing but an end of force is sent for two turns: what still comes then was late, and late
 positions are not given; else the owed ones are written off as lost.
 
 There is no check sum, so a byte that was garbled into another that may stand there passes the parser. What a hand does
