@@ -13,11 +13,11 @@ from typing import Final
 import numpy as np
 
 from study_app.devices.falcon import wire
-from study_app.devices.falcon.failures import UsbFailure
+from study_app.devices.falcon.diagnosis import BY_ID, OPEN, Facts
+from study_app.devices.falcon.failures import FalconFailure, UsbFailure
 from study_app.devices.falcon.firmware import Firmware, check
 from study_app.devices.falcon.packets import PARSER, STATUS, feed, strip
 from study_app.devices.falcon.transport import Transport
-from study_app.errors import DeviceError
 from study_app.haptics.layout import records
 
 ATTEMPTS: Final = 10
@@ -30,39 +30,33 @@ _STEP_S: Final = 1.0
 _PROBE_S: Final = 0.05
 _BETWEEN_ATTEMPTS_S: Final = 0.2
 
-PORT_ADVICE: Final = (
-    "unplug cable and mains adapter for ten seconds, and use another port: of the machine itself on Linux and Windows, "
-    "of a hub with its own power on macOS"
-)
-_ADVICE: Final = {
-    "ping": "check that its mains adapter is plugged in, then " + PORT_ADVICE,
-    "autobaud": PORT_ADVICE,
-    "echo": PORT_ADVICE,
-    "start": "check that the file is a Falcon's firmware, then " + PORT_ADVICE,
-}
 
-
-class BootFailure(DeviceError):
+class BootFailure(FalconFailure):
     """The firmware could not be loaded.
 
     ``step`` is where the last attempt ended: "ping", "autobaud", "echo" or "start"; ``attempt`` its number; ``reason``
-    what was seen there.
+    what was seen there, ``silent`` whether that was nothing at all.
     """
 
-    def __init__(self, step: str, attempt: int, reason: str) -> None:
+    def __init__(self, step: str, attempt: int, reason: str, *, silent: bool) -> None:
         self.step = step
         self.attempt = attempt
         self.reason = reason
         attempts = "1 attempt" if attempt == 1 else f"{attempt} attempts"
-        super().__init__(f"the Falcon's firmware could not be loaded in {attempts}: {reason}; {_ADVICE[step]}")
+        facts = Facts(usb=OPEN, boot_step=step, replies=False if silent else None)
+        cure = BY_ID["upload"].cure(facts.platform)
+        if step == "start":
+            cure = f"check that the file is a Falcon's firmware, and {cure}"
+        super().__init__(f"the Falcon's firmware could not be loaded in {attempts}: {reason}; {cure}", facts)
 
 
 class _Ended(Exception):
     """A step of an attempt did not come to its end."""
 
-    def __init__(self, step: str, reason: str) -> None:
+    def __init__(self, step: str, reason: str, *, silent: bool = False) -> None:
         self.step = step
         self.reason = reason
+        self.silent = silent
         super().__init__(reason)
 
 
@@ -156,7 +150,7 @@ def boot(
     ------
     BootFailure
         None of the attempts succeeded.
-    DeviceError
+    FalconFailure
         The bytes are no firmware, or the bridge failed.
     """
     found = check(firmware)
@@ -165,7 +159,7 @@ def boot(
             _attempt(transport, firmware)
         except _Ended as ended:
             if attempt == attempts:
-                raise BootFailure(ended.step, attempt, ended.reason) from None
+                raise BootFailure(ended.step, attempt, ended.reason, silent=ended.silent) from None
             if tell is not None:
                 tell(f"Loading the firmware, attempt {attempt} of {attempts}: {ended.reason}; trying again.")
             transport.reopen()
@@ -200,7 +194,7 @@ def _ping(transport: Transport) -> None:
         if wire.PONG in came:
             return
     heard = f"answers with {came[:8].hex(' ')}" if came else "does not answer"
-    raise _Ended("ping", f"its boot loader {heard}")
+    raise _Ended("ping", f"its boot loader {heard}", silent=not came)
 
 
 def _time(transport: Transport) -> None:

@@ -12,8 +12,9 @@ import numpy as np
 from study_app.devices.base import Device
 from study_app.devices.falcon import boot, calibration
 from study_app.devices.falcon.bulk import BulkCalls
+from study_app.devices.falcon.diagnosis import OPEN, Facts, sentence
 from study_app.devices.falcon.exchange import COUNTERS, exchange_functions, new_exchange
-from study_app.devices.falcon.failures import usb_failure
+from study_app.devices.falcon.failures import ProgramMissing, usb_failure
 from study_app.devices.falcon.geometry import DEFAULT_GEOMETRY, WORKSPACE_M, geometry_named
 from study_app.devices.falcon.guard import Guard
 from study_app.devices.falcon.homing import PATIENCE_S, home
@@ -165,15 +166,14 @@ class FalconDevice(Device):
         if boot.is_running(transport):
             return "already running"
         if self._firmware is None:
-            raise DeviceError(
-                "the Falcon has no program since it was switched on, and none may be given away with this software: "
-                "give --firmware PATH, the file nvent_firmware.bin (8492 bytes) that came with your Falcon's software; "
-                "if it has one, check its mains adapter"
-            )
+            facts = Facts(usb=OPEN, program="needed")
+            raise ProgramMissing(f"the Falcon cannot be used: {sentence(facts)}", facts)
         try:
             program = Path(self._firmware).read_bytes()
         except OSError as error:
-            raise DeviceError(f"the firmware {self._firmware} cannot be read: {error.strerror}") from error
+            raise ProgramMissing(
+                f"the firmware {self._firmware} cannot be read: {error.strerror}", Facts(usb=OPEN, program="refused")
+            ) from error
         self._tell("Loading the Falcon's firmware.")
         return boot.boot(transport, program, tell=self._tell).sha256
 

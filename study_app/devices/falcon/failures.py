@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from study_app.devices.falcon import wire
+from study_app.devices.falcon.diagnosis import Facts, sentence
 from study_app.errors import DeviceError, DeviceLost, DeviceNotFound
 
 KINDS: Final = {
@@ -18,27 +19,27 @@ KINDS: Final = {
     wire.ERROR_PIPE: "pipe",
     wire.ERROR_NOT_SUPPORTED: "not-supported",
 }
-MEANINGS: Final = {
-    "io": "the transfer failed: check cable and port",
-    "access": "this account may not open it: give it the permission, then plug the Falcon in again",
-    "no-device": "it is no longer there: check the cable and plug it in again",
-    "not-found": "none is connected: plug it in, and its mains adapter",
-    "busy": "another program holds it: close that program",
-    "timeout": "it did not answer in time: check its mains adapter and cable",
-    "overflow": "it sent more than was asked for: plug it in again",
-    "pipe": "it refused the transfer: plug it in again",
-    "not-supported": "its present driver does not let programs open it: install WinUSB or FTDI's own driver for it",
-    "kernel-driver": "a driver of the system holds it and does not let go: unload ftdi_sio",
-    "no-backend": "libusb cannot be loaded: install libusb-package again",
-    "no-ftd2xx": "FTDI's driver library (ftd2xx) cannot be loaded: install FTDI's D2XX driver",
-}
+FURTHER_KINDS: Final = ("kernel-driver", "no-backend", "no-ftd2xx")
+"""What keeps it from being opened before libusb has a code for it."""
 
 
-class UsbFailure(DeviceError):
+class FalconFailure(DeviceError):
+    """Something keeps the Falcon from being used; ``facts`` are what was seen of it."""
+
+    def __init__(self, message: str, facts: Facts) -> None:
+        self.facts = facts
+        super().__init__(message)
+
+
+class ProgramMissing(FalconFailure):
+    """It needs its firmware, and none was given, or what was given is none."""
+
+
+class UsbFailure(FalconFailure):
     """A transfer, or the way to it, failed.
 
-    ``kind`` is the word by which diagnosis knows it (a key of ``MEANINGS``), ``where`` what was being done, ``code``
-    libusb's error, None where no transfer was tried.
+    ``kind`` is the word by which diagnosis knows it (of ``KINDS`` or ``FURTHER_KINDS``), ``where`` what was being
+    done, ``code`` libusb's error, None where no transfer was tried.
     """
 
     def __init__(self, kind: str, where: str, code: int | None = None) -> None:
@@ -46,7 +47,8 @@ class UsbFailure(DeviceError):
         self.where = where
         self.code = code
         libusb = "" if code is None else f", libusb error {code}"
-        super().__init__(f"the Falcon cannot be used ({where}{libusb}): {MEANINGS[kind]}")
+        facts = Facts(usb=kind)
+        super().__init__(f"the Falcon cannot be used ({where}{libusb}): {sentence(facts)}", facts)
 
 
 class FalconNotFound(UsbFailure, DeviceNotFound):

@@ -13,8 +13,9 @@ import struct
 from dataclasses import dataclass
 from typing import Final
 
+from study_app.devices.falcon.diagnosis import Facts
+from study_app.devices.falcon.failures import ProgramMissing
 from study_app.devices.falcon.wire import BOOT_KEY
-from study_app.errors import DeviceError
 
 _RESERVED_WORDS: Final = 8
 _HEADER_BYTES: Final = 2 * (1 + _RESERVED_WORDS + 2)
@@ -59,7 +60,7 @@ def check(data: bytes) -> Firmware:
 
     Raises
     ------
-    DeviceError
+    ProgramMissing
         It is no firmware, or not whole; the message says what it is instead.
     """
     _refuse_other_files(data)
@@ -118,5 +119,5 @@ def _blocks(data: bytes) -> tuple[Block, ...]:
     return tuple(blocks)
 
 
-def _refusal(reason: str) -> DeviceError:
-    return DeviceError(f"the file is not a Falcon's firmware: {reason}; {_ADVICE}")
+def _refusal(reason: str) -> ProgramMissing:
+    return ProgramMissing(f"the file is not a Falcon's firmware: {reason}; {_ADVICE}", Facts(program="refused"))

@@ -8,7 +8,7 @@ import pytest
 import usb.core
 
 from study_app.devices.falcon import wire
-from study_app.devices.falcon.failures import MEANINGS, FalconLost, FalconNotFound, UsbFailure, usb_failure
+from study_app.devices.falcon.failures import FURTHER_KINDS, KINDS, FalconLost, FalconNotFound, UsbFailure, usb_failure
 from study_app.devices.falcon.transport import PyUsbTransport, open_transport
 from study_app.devices.falcon.transport_ftdi import FtdiTransport
 from study_app.errors import DeviceError, DeviceLost, DeviceNotFound
@@ -237,7 +237,7 @@ def test_no_way_to_a_falcon_is_refused(name):
 
 
 def test_every_failure_is_one_line_that_says_what_to_do():
-    for kind in MEANINGS:
+    for kind in (*KINDS.values(), *FURTHER_KINDS):
         text = str(UsbFailure(kind, "trying"))
         assert text.startswith("the Falcon cannot be used (trying): ")
         assert "\n" not in text
