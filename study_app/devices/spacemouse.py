@@ -6,45 +6,25 @@ on the handle. A thread of its own reads the device and says where the pointer i
 
 from __future__ import annotations
 
-import sys
 import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from importlib import import_module
-from typing import Any, Final
+from typing import Any
 
 from study_app.devices.mouse import PointedDevice
+from study_app.devices.spacemouse_hid import choose, find_space_mice, load_hid, opened
 from study_app.devices.spacemouse_reports import (
     DEAD_DEFLECTION,
     FULL_DEFLECTION,
     FULL_SPEED_MPS,
     LED,
-    MODELS,
-    USAGE,
     Buttons,
     Displacement,
     Model,
     parse,
     program_buttons,
     velocity_mps,
-)
-from study_app.errors import DeviceError, DeviceNotFound
-
-UDEV_RULES: Final = (
-    'KERNEL=="hidraw*", KERNELS=="*:256F:*", TAG+="uaccess"',
-    'KERNEL=="hidraw*", KERNELS=="*:046D:C62[5679B].*", TAG+="uaccess"',
-)
-_CANNOT_OPEN: Final = {
-    "linux": "this account may not open it: put "
-    + " and ".join(f"'{rule}'" for rule in UDEV_RULES)
-    + " into /etc/udev/rules.d/60-spacemouse.rules, run 'sudo udevadm control --reload' and plug it in again",
-    "darwin": "3Dconnexion's helper may hold it: quit 3DconnexionHelper (Activity Monitor), or remove 3DxWare",
-    "win32": "another program holds it: close it, and 3DxWare",
-}
-_NO_MOTION_INTERFACE: Final = (
-    "is connected, but shows no interface that reports motion (usage page 1, usage 8): switch the mouse itself on and "
-    "pair it, or use its cable"
 )
 
 _REPORT_BYTES = 64
@@ -96,8 +76,8 @@ class SpaceMouseDevice(PointedDevice):
             return
         self.close()
         hid = self._hid if self._hid is not None else load_hid()
-        self._model, path = _choose(find_space_mice(hid))
-        self._open_hid = _opened(hid, self._model, path)
+        self._model, path = choose(find_space_mice(hid))
+        self._open_hid = opened(hid, self._model, path)
         self._light(on=True)
         self.point_to(*self.aim_m)
         self.release()
@@ -158,52 +138,3 @@ class SpaceMouseDevice(PointedDevice):
         if self._model is not None and self._model.light:
             with suppress(OSError, ValueError):  # one without a light, or gone
                 self._open_hid.write(bytes([LED, int(on)]))
-
-
-def load_hid() -> Any:
-    """Return hidapi's module: on Linux the one that leaves the kernel's driver in place.
-
-    Raises
-    ------
-    DeviceError
-        It cannot be loaded.
-    """
-    names = ("hidraw", "hid") if sys.platform.startswith("linux") else ("hid",)
-    reason = ""
-    for name in names:
-        try:
-            return import_module(name)
-        except (ImportError, OSError) as error:
-            reason = str(error)
-    raise DeviceError(f"a SpaceMouse needs the package hidapi, which cannot be loaded ({reason}): pip install hidapi")
-
-
-def find_space_mice(hid: Any) -> list[tuple[Model, dict[str, Any]]]:
-    """Return model and hidapi's description of every interface of every SpaceMouse that is connected."""
-    known = {(model.vendor, model.product): model for model in MODELS}
-    listed = [(known.get((one["vendor_id"], one["product_id"])), one) for one in hid.enumerate()]
-    return [(model, one) for model, one in listed if model is not None]
-
-
-def _choose(found: list[tuple[Model, dict[str, Any]]]) -> tuple[Model, bytes]:
-    """Return the first interface that reports motion; one that does not tell what it reports may be one."""
-    if not found:
-        raise DeviceNotFound(
-            "no SpaceMouse is connected: plug it in, or switch it on; known are " + ", ".join(m.name for m in MODELS)
-        )
-    usages = [(one.get("usage_page") or 0, one.get("usage") or 0) for _, one in found]
-    for wanted in (USAGE, (0, 0)):
-        if wanted in usages:
-            model, chosen = found[usages.index(wanted)]
-            return model, chosen["path"]
-    raise DeviceError(f"the {found[0][0].name} {_NO_MOTION_INTERFACE}")
-
-
-def _opened(hid: Any, model: Model, path: bytes) -> Any:
-    device = hid.device()
-    try:
-        device.open_path(path)
-    except OSError as error:
-        cure = _CANNOT_OPEN.get(sys.platform, _CANNOT_OPEN["win32"])
-        raise DeviceError(f"the {model.name} cannot be opened: {cure}") from error
-    return device

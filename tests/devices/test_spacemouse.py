@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 if numba.config.DISABLE_JIT:
     pytest.skip("devices are C functions", allow_module_level=True)
 
-from study_app.devices import is_simulated, list_devices, moves_by_itself
-from study_app.devices import spacemouse as spacemouse_module
-from study_app.devices.spacemouse import SpaceMouseDevice, find_space_mice
+from study_app.devices import is_simulated, list_devices, moves_by_itself, spacemouse_hid
+from study_app.devices.spacemouse import SpaceMouseDevice
+from study_app.devices.spacemouse_hid import find_space_mice
 from study_app.devices.spacemouse_reports import (
     FULL_SPEED_MPS,
     MODELS,
@@ -253,12 +253,12 @@ class TestComingAndGoing:
         def missing(name):
             raise ImportError(f"no {name} here")
 
-        monkeypatch.setattr(spacemouse_module, "import_module", missing)
+        monkeypatch.setattr(spacemouse_hid, "import_module", missing)
         with pytest.raises(DeviceError, match=r"no hid.* here.*pip install hidapi"):
             SpaceMouseDevice().open()
 
     def test_hidapi_itself_can_be_asked(self):
-        assert isinstance(find_space_mice(spacemouse_module.load_hid()), list)
+        assert isinstance(find_space_mice(spacemouse_hid.load_hid()), list)
 
 
 def test_a_participant_holds_it():

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 from study_app.devices.falcon.wire import PRODUCT_ID, VENDOR_ID
@@ -55,7 +55,7 @@ class Facts:
     step_n : largest step of the force between two turns [N]
     """
 
-    platform: str = sys.platform
+    platform: str = field(default_factory=lambda: sys.platform)
     usb: str | None = None
     listed: bool | None = None
     ftdi_sees: bool | None = None

@@ -1,0 +1,97 @@
+import subprocess
+import sys
+from types import SimpleNamespace
+
+import numba
+import pytest
+
+from study_app.devices import list_devices
+from study_app.devices.backends import NONE, NOT_HERE, READY, backends
+from study_app.devices.falcon.failures import UsbFailure
+from study_app.devices.spacemouse_reports import MODELS
+
+
+def hid(*models):
+    listed = [{"vendor_id": model.vendor, "product_id": model.product, "path": b"x"} for model in models]
+    return SimpleNamespace(enumerate=lambda: listed)
+
+
+def bus(*emulators):
+    from study_app.devices.falcon.emulator_backend import EmulatedBackend
+
+    return EmulatedBackend(*emulators)
+
+
+def by_name(**given):
+    return {(one.name, one.by.split()[0]): one for one in backends(**{"usb": bus(), "hid": hid(), **given})}
+
+
+pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="the emulated bus is compiled")
+
+
+def test_every_device_that_can_be_opened_is_listed():
+    named = {name.partition(":")[0] for name, _ in by_name()}
+    assert named == {*list_devices(), "falcon-socket"}
+
+
+def test_without_hardware_each_says_what_is_missing():
+    listed = by_name()
+    assert listed["mouse", "the"].state == READY
+    for key in (("falcon", "libusb"), ("spacemouse", "hidapi")):
+        assert listed[key].state == NONE
+        assert "plug" in listed[key].why
+
+
+def test_what_is_connected_is_named():
+    from study_app.devices.falcon.emulator import Emulator
+
+    listed = by_name(usb=bus(Emulator(serial="FT1"), Emulator(serial="FT2")), hid=hid(MODELS[1], MODELS[1]))
+    assert listed["falcon", "libusb"].state == "connected: FT1, FT2"
+    assert listed["falcon", "libusb"].why == ""
+    assert listed["spacemouse", "hidapi"].state == "connected: SpaceNavigator"
+
+
+@pytest.mark.parametrize(
+    ("platform", "words"), [("linux", "this account"), ("win32", "driver"), ("darwin", "driver of FTDI")]
+)
+def test_one_that_does_not_tell_its_number_says_why_that_may_be(platform, words):
+    from study_app.devices.falcon.emulator import Emulator
+
+    emulator = Emulator()
+    emulator.faults.on("access_denied")
+    falcon = by_name(usb=bus(emulator), platform=platform)["falcon", "libusb"]
+    assert falcon.state == "connected: unnamed"
+    assert words in falcon.why
+    assert "doctor" in falcon.why
+
+
+def test_ftdis_driver_is_for_windows(monkeypatch):
+    assert "Windows" in by_name(platform="linux")["falcon", "ftd2xx"].why
+    assert by_name(platform="win32", d2xx=object())["falcon", "ftd2xx"].state == READY
+
+    def missing():
+        raise UsbFailure("no-ftd2xx", "loading FTDI's driver library")
+
+    monkeypatch.setattr("study_app.devices.falcon.transport_ftdi.load_d2xx", missing)
+    assert "install FTDI's D2XX driver" in by_name(platform="win32")["falcon", "ftd2xx"].why
+
+
+def test_a_hidapi_that_does_not_load_is_told(monkeypatch):
+    from study_app.devices import spacemouse_hid
+
+    def missing(name):
+        raise OSError(f"no {name}")
+
+    monkeypatch.setattr(spacemouse_hid, "import_module", missing)
+    spacemouse = by_name(hid=None)["spacemouse", "hidapi"]
+    assert spacemouse.state == NOT_HERE
+    assert "pip install hidapi" in spacemouse.why
+
+
+def test_this_machine_can_be_asked_and_no_compiler_is_loaded():
+    program = (
+        "import sys; from study_app.devices.backends import backends; print(len(backends())); "
+        "sys.exit('numba' in sys.modules)"
+    )
+    finished = subprocess.run([sys.executable, "-c", program], check=False, capture_output=True, text=True)
+    assert (finished.returncode, finished.stdout.strip()) == (0, "7"), finished.stderr
