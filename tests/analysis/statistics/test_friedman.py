@@ -1,0 +1,218 @@
+from itertools import permutations, product
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.stats import friedmanchisquare, studentized_range
+
+from study_app.analysis.statistics import friedman as module
+from study_app.analysis.statistics.friedman import friedman
+from study_app.errors import AnalysisError
+
+# Times to first base of 22 players by three methods (Hollander & Wolfe 1973; R, friedman.test).
+TIMES = (
+    "5.40 5.50 5.55 5.85 5.70 5.75 5.20 5.60 5.50 5.55 5.50 5.40 5.90 5.85 5.70 5.45 5.55 5.60 "
+    "5.40 5.40 5.35 5.45 5.50 5.35 5.25 5.15 5.00 5.85 5.80 5.70 5.25 5.20 5.10 5.65 5.55 5.45 "
+    "5.60 5.35 5.45 5.05 5.00 4.95 5.50 5.50 5.40 5.45 5.55 5.50 5.55 5.55 5.35 5.45 5.50 5.55 "
+    "5.50 5.45 5.25 5.65 5.60 5.40 5.70 5.65 5.55 6.30 6.30 6.25"
+)
+BASES = np.array(TIMES.split(), dtype=float).reshape(22, 3)
+
+# scipy's documentation: ten people, three conditions, whole scores with ties.
+SCORES = np.array([[4, 6, 3, 4, 3, 2, 2, 7, 6, 5], [5, 6, 8, 7, 7, 8, 4, 6, 4, 5], [2, 4, 4, 3, 2, 2, 1, 4, 3, 2]]).T
+
+# R package rstatix, issues 264 and 265: six people, A, B, C.
+POST_HOC = np.array([[4, 6, 3, 5, 4, 5], [7, 8, 6, 7, 9, 6], [6, 9, 7, 8, 8, 9]]).T
+
+# Twenty people, three tasks done or not (pingouin, "cochran").
+COCHRAN = "111 101 100 001 010 101 101 100 101 001 011 111 000 110 101 001 100 101 110 101"
+
+# Upper tails of Friedman's statistic without ties: participants, settings, statistic, P.
+TAILS = [
+    (3, 3, 6.0, 0.02778),
+    (4, 3, 6.5, 0.04167),
+    (4, 3, 8.0, 0.00463),
+    (5, 3, 5.2, 0.09336),
+    (5, 3, 6.4, 0.03935),
+    (5, 3, 7.6, 0.02392),
+    (5, 3, 8.4, 0.00849),
+    (5, 3, 10.0, 0.00077),
+    (6, 3, 7.0, 0.02894),
+    (6, 3, 9.0, 0.00810),
+    (6, 3, 12.0, 0.00013),
+    (8, 3, 6.25, 0.04691),
+    (8, 3, 9.0, 0.00990),
+    (10, 3, 6.2, 0.04556),
+    (10, 3, 9.6, 0.00747),
+    (3, 4, 7.4, 0.03299),
+    (3, 4, 9.0, 0.00174),
+    (4, 4, 7.8, 0.03639),
+    (4, 4, 9.6, 0.00687),
+    (5, 4, 7.8, 0.04434),
+    (5, 4, 9.96, 0.00874),
+]
+
+answers = st.integers(2, 4).flatmap(
+    lambda n: st.lists(st.lists(st.integers(1, 7), min_size=3, max_size=3), min_size=n, max_size=n)
+)
+
+
+def test_published_times_to_first_base() -> None:
+    result = friedman(BASES)
+    assert result.statistic == pytest.approx(11.142857, abs=1e-6)
+    assert (result.df, result.n, result.dropped) == (2, 22, 0)
+    assert result.p_chi2 == pytest.approx(0.003805, abs=1e-6)
+    assert result.effect == pytest.approx(0.2532468, abs=1e-7)
+    assert result.f == pytest.approx(7.1217, abs=1e-4)
+    assert result.p_f == pytest.approx(0.002574, abs=1e-6)
+    assert result.method == "exact permutation"
+
+
+def test_published_parts_of_the_times() -> None:
+    assert friedman(BASES[:3]).effect == pytest.approx(0.111111, abs=1e-6)
+    first = friedman(BASES[:12])  # a public test suite has 11.143 here, the value of all 22
+    assert first.statistic == pytest.approx(4.9787, abs=1e-4)
+    assert first.p_chi2 == pytest.approx(0.0830, abs=1e-4)
+
+
+def test_published_whole_scores_with_ties() -> None:
+    result = friedman(SCORES)
+    assert result.statistic == pytest.approx(13.351351, abs=1e-6)
+    assert result.p_chi2 == pytest.approx(0.00126122, abs=1e-8)
+
+
+def test_five_people_with_ties_give_the_exact_p_and_not_the_approximate_one() -> None:
+    result = friedman([[2, 5, 6], [3, 3, 6], [1, 4, 4], [4, 5, 7], [2, 2, 5]])
+    assert result.statistic == pytest.approx(8.588235, abs=1e-6)
+    assert result.p == pytest.approx(48 / 7776, rel=1e-12)
+    assert result.p_chi2 == pytest.approx(0.01364861, abs=1e-8)
+
+
+@pytest.mark.parametrize(("n", "k", "statistic", "p"), TAILS)
+def test_published_exact_tails(n: int, k: int, statistic: float, p: float) -> None:
+    exact = module.distribution(((*range(2, 2 * k + 1, 2),),) * n)
+    assert exact is not None
+    support, tails = exact
+    spread = n * k * (k * k - 1) / 3  # of doubled ranks
+    at = np.flatnonzero(np.isclose((k - 1) * support / spread, statistic))
+    assert tails[at] == pytest.approx([p], abs=6e-6)
+
+
+@pytest.mark.parametrize(
+    ("n", "smallest"),
+    [(4, 0.00463), (5, 0.000772), (6, 0.000129), (7, 2.1e-5), (8, 3.6e-6), (10, 9.9e-8), (11, 1.7e-8)],
+)
+def test_the_smallest_p_of_so_many_people(n: int, smallest: float) -> None:
+    result = friedman([[1, 4, 7]] * n)
+    assert result.smallest_p == pytest.approx(smallest, rel=0.03)
+    assert result.p == result.smallest_p
+    assert result.effect == pytest.approx(1.0)
+
+
+def test_two_values_give_cochrans_q() -> None:
+    result = friedman([[int(digit) for digit in row] for row in COCHRAN.split()])
+    assert result.statistic == pytest.approx(6.705882, abs=1e-6)
+    assert result.p_chi2 == pytest.approx(0.0349813, abs=1e-7)
+
+
+def test_mean_ranks_give_the_published_nemenyi_and_conover_comparisons() -> None:
+    result = friedman(POST_HOC)
+    a, b, c = result.mean_ranks
+    error = np.sqrt(3 * 4 / (6 * result.n))
+    nemenyi = [studentized_range.sf(abs(x - y) / error * np.sqrt(2), 3, np.inf) for x, y in ((a, b), (a, c), (b, c))]
+    assert nemenyi == pytest.approx([0.0545, 0.0109, 0.8322], abs=1e-4)
+    n, k = 6, 3
+    spread = (np.argsort(np.argsort(POST_HOC)) + 1.0) ** 2
+    assert result.statistic is not None
+    left = (1 - result.statistic / (n * (k - 1))) * 2 * n * (spread.sum() - n * k * (k + 1) ** 2 / 4)
+    conover = [n * abs(x - y) / np.sqrt(left / ((n - 1) * (k - 1))) for x, y in ((a, b), (a, c))]
+    assert conover == pytest.approx([4.47, 5.59], abs=0.005)
+
+
+@given(answers)
+@settings(max_examples=40, deadline=None)
+def test_the_exact_p_is_that_of_all_rearrangements(rows: list[list[int]]) -> None:
+    result = friedman(rows)
+    if result.p is None:
+        assert result.note.startswith("no variation")
+        return
+    ranks = module.doubled_ranks(np.array(rows, dtype=float))
+
+    def squares(chosen: tuple[tuple[int, ...], ...]) -> float:
+        return float(((np.sum(chosen, axis=0) - len(rows) * 4) ** 2).sum())
+
+    found = squares(tuple(map(tuple, ranks)))
+    every = [squares(chosen) for chosen in product(*(list(permutations(row)) for row in ranks))]
+    assert result.p == pytest.approx(np.mean([value >= found for value in every]))
+    assert result.smallest_p == pytest.approx(np.mean([value == max(every) for value in every]))
+
+
+@given(answers, st.permutations([0, 1, 2]), st.randoms(use_true_random=False))
+@settings(max_examples=40, deadline=None)
+def test_labels_people_and_the_direction_of_the_scale_do_not_matter(rows, order, random) -> None:  # type: ignore[no-untyped-def]
+    first = friedman(rows)
+    shuffled = random.sample(rows, len(rows))
+    second = friedman([[8 - row[place] for place in order] for row in shuffled])
+    assert (first.statistic, first.p, first.effect) == pytest.approx((second.statistic, second.p, second.effect))
+
+
+@given(answers)
+@settings(max_examples=40, deadline=None)
+def test_ties_are_corrected_as_scipy_does(rows: list[list[int]]) -> None:
+    result = friedman(rows)
+    if result.statistic is not None:
+        expected = friedmanchisquare(*np.array(rows).T)
+        assert (result.statistic, result.p_chi2) == pytest.approx((expected.statistic, expected.pvalue))
+
+
+def test_missing_answers_drop_the_participant_and_nothing_else() -> None:
+    with_gaps = np.vstack([SCORES.astype(float), [1, np.nan, 7], [np.nan] * 3])
+    result = friedman(with_gaps)
+    assert (result.n, result.dropped) == (10, 2)
+    assert result.p == friedman(SCORES).p
+
+
+@pytest.mark.parametrize(("rows", "n"), [([[4, 4, 4], [2, 2, 2]], 2), (np.empty((0, 3)), 0), ([[1, np.nan, 2]], 0)])
+def test_nothing_to_compare_is_said_and_never_nan(rows: object, n: int) -> None:
+    result = friedman(rows)  # type: ignore[arg-type]
+    assert (result.n, result.statistic, result.p, result.effect) == (n, None, None, None)
+    assert result.note
+    assert not result.reaches(0.05)
+
+
+def test_one_person_cannot_show_anything() -> None:
+    result = friedman([[1, 4, 7]])
+    assert (result.p, result.smallest_p) == pytest.approx((1.0, 1.0))
+
+
+def test_two_settings_and_infinite_answers_are_refused() -> None:
+    with pytest.raises(AnalysisError, match="2 settings: at least 3 are needed"):
+        friedman([[1, 2], [2, 3]])
+    with pytest.raises(AnalysisError, match="infinite"):
+        friedman([[1, 2, np.inf]])
+    with pytest.raises(AnalysisError, match="2 axes"):
+        friedman([1, 2, 3])
+
+
+def test_a_drawn_p_is_repeatable_and_near_the_exact_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    exact = friedman(SCORES)
+    module.distribution.cache_clear()
+    monkeypatch.setattr(module, "WORK", 0)
+    drawn = friedman(SCORES[:, ::-1], seed=3)
+    assert drawn == friedman(SCORES[:, ::-1], seed=3)
+    module.distribution.cache_clear()
+    assert drawn.method == "Monte Carlo permutation, 9999 draws, seed 3"
+    assert exact.p is not None
+    assert drawn.p is not None
+    assert abs(drawn.p - exact.p) < 5 * np.sqrt(exact.p / 9999) + 1e-4
+
+
+def test_seven_settings_are_drawn_and_many_people_approximated() -> None:
+    rng = np.random.default_rng(0)
+    seven = friedman(rng.integers(1, 8, (5, 7)))
+    assert seven.method.startswith("Monte Carlo")
+    assert seven.smallest_p == 1 / 10000
+    many = friedman(rng.integers(1, 8, (module.DRAWN_UP_TO + 1, 3)))
+    assert many.method == "chi-square approximation"
+    assert many.p == many.p_chi2
