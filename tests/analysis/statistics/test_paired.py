@@ -1,0 +1,138 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.stats import PermutationMethod, wilcoxon
+
+from study_app.analysis.statistics.paired import cliffs_delta, paired
+from study_app.errors import AnalysisError
+
+# Depression scores at two visits (Hollander & Wolfe 1973; R, wilcox.test).
+FIRST = [1.83, 0.50, 1.62, 2.48, 1.68, 1.88, 1.55, 3.06, 1.30]
+SECOND = [0.878, 0.647, 0.598, 2.05, 1.06, 1.29, 1.06, 3.14, 1.29]
+
+levels = st.lists(st.tuples(st.integers(1, 7), st.integers(1, 7)), min_size=1, max_size=9)
+
+
+def test_published_depression_scores() -> None:
+    result = paired(FIRST, SECOND)
+    assert result.statistic == 40
+    assert result.p == pytest.approx(0.0390625, rel=1e-12)
+    assert paired(FIRST, SECOND, alternative="greater").p == pytest.approx(0.01953125, rel=1e-12)
+    assert result.effect == pytest.approx(0.777778, abs=1e-6)
+    assert result.interval is not None
+    assert (result.interval.low, result.interval.high) == pytest.approx((0.2953631, 0.9441559), abs=1e-6)
+
+
+def test_published_differences_with_ties_and_zeros() -> None:
+    result = paired([0, 1, 1, -1, 2, 2, 3, 0, 1, 1], np.zeros(10))
+    assert result.p == pytest.approx(0.046875, rel=1e-12)
+    assert (result.n, result.zeros) == (10, 2)
+    assert "equal pairs left out" in result.method
+
+
+@pytest.mark.parametrize(
+    ("n", "smallest"),
+    [(4, 0.125), (5, 0.0625), (6, 0.03125), (7, 0.015625), (8, 0.0078125), (10, 0.001953125), (11, 0.0009765625)],
+)
+def test_the_smallest_p_of_so_many_pairs(n: int, smallest: float) -> None:
+    result = paired(np.arange(n) + 2.0, np.ones(n))
+    assert result.smallest_p == pytest.approx(smallest, rel=1e-12)
+    assert result.p == result.smallest_p
+    assert result.reaches(0.05) == (n >= 6)
+    assert ("cannot reach p < .05" in result.note) == (n < 6)
+
+
+@pytest.mark.parametrize("zeros", ["wilcox", "pratt"])
+@given(pairs=levels)
+@settings(max_examples=25, deadline=None)
+def test_the_exact_p_is_that_of_all_signs(zeros: str, pairs: list[tuple[int, int]]) -> None:
+    x, y = np.array(pairs, dtype=float).T
+    for alternative in ("two-sided", "greater", "less"):
+        result = paired(x, y, zeros=zeros, alternative=alternative)  # type: ignore[arg-type]
+        if (x == y).all():
+            assert result.p is None
+            assert "equal" in result.note
+            continue
+        if np.count_nonzero(x - y) < 2:  # scipy refuses to permute a single pair
+            assert result.smallest_p == (1.0 if alternative == "two-sided" else 0.5)
+            continue
+        every = PermutationMethod(n_resamples=10_000)
+        expected = wilcoxon(x - y, zero_method=zeros, alternative=alternative, method=every)
+        assert result.p == pytest.approx(expected.pvalue)
+
+
+@given(levels)
+@settings(max_examples=25, deadline=None)
+def test_reversing_the_scale_turns_the_signs_round_and_nothing_else(pairs: list[tuple[int, int]]) -> None:
+    x, y = np.array(pairs, dtype=float).T
+    there, back = paired(x, y), paired(8 - x, 8 - y)
+    assert there.p == back.p
+    assert (there.effect is None and back.effect is None) or there.effect == pytest.approx(-(back.effect or 0.0))
+    assert there.superiority == pytest.approx(-(back.superiority or 0.0))
+
+
+def test_superiority_counts_people_and_not_ranks() -> None:
+    result = paired([5, 5, 1, 4], [4, 4, 7, 4])
+    assert result.superiority == pytest.approx((2 - 1) / 4)
+    assert result.effect == pytest.approx((1.5 + 1.5 - 3) / 6)
+    assert result.median_difference == pytest.approx(0.5)
+
+
+def test_missing_answers_drop_the_pair() -> None:
+    result = paired([*FIRST, 1.0, np.nan], [*SECOND, np.nan, 2.0])
+    assert (result.n, result.dropped, result.p) == (9, 2, paired(FIRST, SECOND).p)
+
+
+def test_there_is_no_interval_where_it_would_be_dishonest() -> None:
+    few = paired([2, 3, 4, 1, 6], [1, 1, 1, 3, 1])
+    assert few.interval is None
+    assert "below 6 pairs" in few.no_interval
+    alike = paired(np.arange(8) + 2, np.ones(8))
+    assert alike.interval is None
+    assert "same direction" in alike.no_interval
+    nothing = paired([3, 3], [3, 3])
+    assert (nothing.statistic, nothing.effect, nothing.no_interval) == (None, None, "no interval: no pair differs")
+    assert paired([], []).note == "no participant answered under both settings"
+
+
+def test_differences_that_are_equal_but_for_rounding_tie() -> None:
+    assert paired([1.3, 1.29, 2.0], [1.06, 1.05, 1.0]).statistic == 6
+    assert paired([1.3, 1.05, 2.0], [1.06, 1.29, 1.0]).statistic == 4.5
+
+
+def test_many_pairs_are_approximated_closely() -> None:
+    rng = np.random.default_rng(1)
+    x, y = rng.integers(1, 8, (2, 400)).astype(float)
+    result = paired(x, y)
+    assert "normal approximation" in result.method
+    assert result.smallest_p is None
+    assert result.p == pytest.approx(wilcoxon(x - y, method="asymptotic", correction=False).pvalue)
+
+
+def test_unequal_lengths_are_refused() -> None:
+    with pytest.raises(AnalysisError, match="3 and 2 answers are no pairs"):
+        paired([1, 2, 3], [1, 2])
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "delta"),
+    [
+        ([10, 10, 20, 20, 20, 30, 30, 30, 40, 50], [10, 20, 30, 40, 40, 50], -0.25),
+        ([48, 48, 77, 86, 85, 85], [14, 34, 34, 77], 0.7916667),
+        ([48, 48, 77, 86, 85, 85, 16], [14, 34, 34, 77], 0.6071429),
+        # The published rank-biserial correlation of the sleep data.
+        (
+            [0.7, -1.6, -0.2, -1.2, -0.1, 3.4, 3.7, 0.8, 0, 2],
+            [1.9, 0.8, 1.1, 0.1, -0.1, 4.4, 5.5, 1.6, 4.6, 3.4],
+            -0.49,
+        ),
+    ],
+)
+def test_published_cliffs_deltas(x: list[float], y: list[float], delta: float) -> None:
+    assert cliffs_delta(x, y) == pytest.approx(delta, abs=1e-7)
+    assert cliffs_delta([*x, np.nan], y) == pytest.approx(delta, abs=1e-7)
+
+
+def test_an_empty_group_has_no_delta() -> None:
+    assert cliffs_delta([np.nan], [1, 2]) is None
