@@ -1,0 +1,219 @@
+"""Page's test of a trend over ordered settings, and the lowest delay at which a trend can be shown.
+
+Page (1963), J. Am. Stat. Assoc. 58, 216–230. L is a sum over participants of one number each, so its exact
+distribution, with the ties as they are, is a convolution of the participants' own.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import pairwise
+from typing import Final, Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.stats import norm
+
+from study_app.analysis.statistics.lattice import Lattice, doubled_ranks, total
+from study_app.analysis.statistics.outcome import (
+    FEW,
+    NO_VARIATION,
+    TOO_FEW,
+    Array,
+    Interval,
+    Outcome,
+    Whole,
+    checked,
+    complete,
+    percentiles,
+    resamples,
+)
+from study_app.errors import AnalysisError
+
+Direction: TypeAlias = Literal["increasing", "decreasing"]
+
+EXACT_UP_TO: Final = 200
+"""Up to so many participants p is exact; beyond that normal, corrected for ties."""
+
+MOST: Final = 12
+"""Exact distributions over more settings take too long."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Page(Outcome):
+    """Page's L, one-sided in ``direction``; ``effect`` is the mean rank correlation of answers with the order.
+
+    ``p`` takes the ties as they are; ``p_untied`` is that of the printed tables and of R, which take every rank to be
+    different: the larger with ties, as a rule. A participant who answered alike everywhere has correlation 0.
+    """
+
+    direction: Direction
+    p_untied: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One step down: Page's test of all delays up to ``longest_ms``."""
+
+    longest_ms: float
+    page: Page
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StepDown:
+    """The steps taken, the longest delay first; the last may be the first that is not significant.
+
+    ``lowest_ms`` is the lowest delay up to which a trend was shown at ``alpha``: an upper bound of the noticeable
+    delay, biased upward. None: no trend was shown, which is not evidence that there is none. ``note`` says so.
+    """
+
+    steps: tuple[Step, ...]
+    lowest_ms: float | None
+    alpha: float
+    note: str
+
+
+def page(values: ArrayLike, direction: Direction = "increasing", *, seed: int | None = 1) -> Page:
+    """Test whether answers follow the order of the settings.
+
+    Parameters
+    ----------
+    values : (participants, settings) array
+        Settings in their order; NaN where an answer is missing: such participants are dropped.
+    direction : "increasing" | "decreasing"
+        Where answers go as the settings go up, stated before the study.
+    seed : int, optional
+        For the bootstrap interval of the effect, from ten participants; None: no interval.
+
+    Raises
+    ------
+    AnalysisError
+        There are fewer than two settings.
+    """
+    rows, dropped = complete(values, at_least=2, why=" for a trend")
+    ranks = doubled_ranks(rows if direction == "increasing" else -rows)
+    n, k = ranks.shape
+    scores = ranks @ np.arange(1, k + 1)
+    varies = bool(n) and bool((ranks != k + 1).any())
+    middle = k * (k + 1) ** 2 / 2
+    correlations = (scores - middle) / (k * (k * k - 1) / 6)
+    p, smallest, method = _p(ranks, int(scores.sum())) if varies else (None, None, "none")
+    note = "" if varies else "no participant answered under all settings" if n == 0 else NO_VARIATION
+    interval, reason = (None, note) if note else _interval(correlations, seed)
+    return Page(
+        test="Page's trend",
+        n=n,
+        dropped=dropped,
+        statistic_name="L",
+        statistic=float(scores.sum()) / 2 if varies else None,
+        p=p,
+        smallest_p=smallest,
+        method=f"{method}, one-sided ({direction})",
+        effect_name="mean rank correlation with the order",
+        effect=float(correlations.mean()) if varies else None,
+        interval=interval,
+        no_interval=reason,
+        note=note,
+        direction=direction,
+        # Without ties L is whole: half a rank is cut off, as in R and scipy.
+        p_untied=_p(np.tile(2 * np.arange(1, k + 1), (n, 1)), int(scores.sum()) // 2 * 2)[0] if varies else None,
+    )
+
+
+def _interval(correlations: Array, seed: int | None) -> tuple[Interval | None, str]:
+    if seed is None:
+        return None, "no interval: none was asked for"
+    if len(correlations) < FEW:
+        return None, TOO_FEW
+    if np.ptp(correlations) == 0.0:
+        return None, "no interval: all participants have the same correlation"
+    return percentiles(
+        np.concatenate([correlations[rows].mean(axis=1) for rows in resamples(len(correlations), seed)])
+    ), ""
+
+
+def step_down(
+    values: ArrayLike,
+    delays_ms: Sequence[float],
+    direction: Direction = "increasing",
+    *,
+    alpha: float = 0.05,
+) -> StepDown:
+    """Drop the longest delay as long as a trend is shown over those that are left.
+
+    The order of the tests is fixed and the first that fails ends them, so ``alpha`` holds for all of them together
+    (Tamhane, Hochberg & Dunnett 1996, Biometrics 52, 21–37). Participants who miss any answer are dropped from
+    all steps.
+
+    Parameters
+    ----------
+    values : (participants, delays) array
+        In the order of ``delays_ms``.
+    delays_ms : sequence
+        Ascending; the first is the control.
+
+    Raises
+    ------
+    AnalysisError
+        The delays do not ascend or are not as many as the columns.
+    """
+    array = checked(values, "participants, delays")
+    if len(delays_ms) != array.shape[1] or any(a >= b for a, b in pairwise(delays_ms)):
+        raise AnalysisError(
+            f"delays {list(delays_ms)} ms do not go up one by one for {array.shape[1]} columns of answers"
+        )
+    rows, dropped = complete(array, at_least=2, why=" for a trend")
+    steps: list[Step] = []
+    lowest: float | None = None
+    for last in range(len(delays_ms), 1, -1):
+        result = page(np.vstack([rows[:, :last], np.full((dropped, last), np.nan)]), direction, seed=None)
+        steps.append(Step(float(delays_ms[last - 1]), result))
+        if result.p is None or result.p > alpha:
+            break
+        lowest = float(delays_ms[last - 1])
+    return StepDown(steps=tuple(steps), lowest_ms=lowest, alpha=alpha, note=_note(steps[0], lowest))
+
+
+def _note(first: Step, lowest: float | None) -> str:
+    if lowest is None:
+        return (
+            f"no trend was shown up to {first.longest_ms:g} ms with {first.page.n} participants; "
+            "that is not evidence that there is none"
+        )
+    return (
+        f"{lowest:g} ms is an upper bound: the lowest delay at which {first.page.n} participants suffice to show a "
+        "trend; shorter delays may be noticed too"
+    )
+
+
+def _p(ranks: Whole, found: int) -> tuple[float, float | None, str]:
+    """Return P(L ≥ found) for (doubled) ranks (n, k), the smallest it could have been, and the method."""
+    n, k = ranks.shape
+    if n > EXACT_UP_TO or k > MOST:
+        mean = n * k * (k + 1) ** 2 / 2
+        spread = ((ranks - (k + 1.0)) ** 2).sum() / (k - 1) * k * (k * k - 1) / 12
+        return float(norm.sf((found - mean) / math.sqrt(spread))), None, "normal approximation, corrected for ties"
+    sums = total(_scores(tuple(sorted(row))) for row in ranks.tolist())
+    return sums.at_least(found), sums.highest, "exact permutation"
+
+
+@lru_cache(maxsize=1024)
+def _scores(ranks: tuple[int, ...]) -> Lattice:
+    """Return the distribution of Σ j·rank_j over all orders of one participant's (doubled) ranks (k,).
+
+    Filled setting by setting: what matters is which ranks are used up, not in which order.
+    """
+    k = len(ranks)
+    most = sum(place * rank for place, rank in enumerate(ranks, start=1))
+    ways = np.zeros((2**k, most + 1))
+    ways[0, 0] = 1.0
+    for used in range(2**k - 1):
+        setting = used.bit_count() + 1
+        for rank in (rank for rank in range(k) if not used >> rank & 1):
+            shift = setting * ranks[rank]
+            ways[used | 1 << rank, shift:] += ways[used, : most + 1 - shift]
+    reached = np.flatnonzero(ways[-1])
+    return Lattice(int(reached[0]), ways[-1, reached[0] : reached[-1] + 1] / math.factorial(k))

@@ -1,0 +1,179 @@
+from itertools import permutations, product
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.stats import page_trend_test, spearmanr
+
+from study_app.analysis.statistics import trend
+from study_app.analysis.statistics.trend import page, step_down
+from study_app.errors import AnalysisError
+
+# Siegel & Castellan, p. 186.
+SIEGEL_TEXT = "797 873 888 923 942 956 794 772 908 982 946 913 838 801 853 951 883 837 815 801 747 859 887 902"
+SIEGEL = np.array(SIEGEL_TEXT.split(), dtype=float).reshape(4, 6)
+
+# Sachs, p. 464: columns A B C D, expected B < C < D < A.
+SACHS_TEXT = "3214 4231 4123 4231 3214 4123 4321 3124 3142"
+SACHS = np.array([list(map(int, row)) for row in SACHS_TEXT.split()])
+
+# Duller, p. 236: weeks 1 to 10, falling.
+DULLER_TEXT = (
+    "72 72 71.5 69 70 69.5 68 68 67 68 83 81 81 82 82.5 81 79 80.5 80 81 95 92 91.5 89 89 90.5 89 89 88 88 "
+    "71 72 71 70.5 70 71 71 70 69.5 69 79 79 78.5 77 77.5 78 77.5 76 76.5 76 "
+    "80 78.5 78 77 77.5 77 76 76 75.5 75.5"
+)
+DULLER = np.array(DULLER_TEXT.split(), dtype=float).reshape(6, 10)
+
+# scipy's documentation (Statext): ten students rate three methods.
+STATEXT_TEXT = "343 224 335 132 232 245 124 344 245 134"
+STATEXT = np.array([list(map(int, row)) for row in STATEXT_TEXT.split()])
+
+# scipy's tests, made with R package cultevo.
+CULTEVO_TEXT = "1.5 4 8.3 5 19 11 5 4 3.5 10 20 21 8.4 3.2 10 12 14 15"
+CULTEVO = np.array(CULTEVO_TEXT.split(), dtype=float).reshape(3, 6)
+
+DELAYS = (0, 50, 75, 100, 125, 150, 200)
+
+answers = st.lists(st.lists(st.integers(1, 4), min_size=4, max_size=4), min_size=1, max_size=3)
+
+
+@pytest.mark.parametrize(
+    ("values", "direction", "statistic", "p", "tolerance"),
+    [
+        (SIEGEL, "increasing", 342, 0.0005661, 1e-4),
+        (SACHS[:, [1, 2, 3, 0]], "increasing", 252, 0.0007053, 1e-4),
+        (DULLER, "decreasing", 2226, 9.037e-14, 0.01),
+        (STATEXT, "increasing", 133.5, 0.00181912, 1e-5),
+        (CULTEVO, "increasing", 266, 4.121656e-05, 1e-6),
+    ],
+)
+def test_published_trends(values: np.ndarray, direction: str, statistic: float, p: float, tolerance: float) -> None:
+    result = page(values, direction)  # type: ignore[arg-type]
+    assert result.statistic == statistic
+    assert result.p_untied == pytest.approx(p, rel=tolerance)
+    assert "exact permutation" in result.method
+
+
+def test_without_ties_both_exact_p_are_one() -> None:
+    result = page(CULTEVO)
+    assert result.p == result.p_untied
+
+
+@given(answers)
+@settings(max_examples=40, deadline=None)
+def test_the_exact_p_is_that_of_all_rearrangements(rows: list[list[int]]) -> None:
+    result = page(rows)
+    if result.p is None:
+        assert result.note.startswith("no variation")
+        return
+    ranks = trend.doubled_ranks(np.array(rows, dtype=float))
+    sums = [sum(place * rank for place, rank in enumerate(row, start=1)) for row in ranks]
+    each = [[sum(p * r for p, r in enumerate(order, start=1)) for order in permutations(row)] for row in ranks]
+    every = np.array([sum(chosen) for chosen in product(*each)])
+    assert result.statistic == sum(sums) / 2
+    assert result.p == pytest.approx((every >= sum(sums)).mean())
+    assert result.smallest_p == pytest.approx((every == every.max()).mean())
+
+
+@given(answers)
+@settings(max_examples=40, deadline=None)
+def test_turning_scale_and_direction_round_changes_nothing(rows: list[list[int]]) -> None:
+    there, back = page(rows), page(8 - np.array(rows), "decreasing")
+    assert (there.statistic, there.p, there.effect, there.p_untied) == (
+        back.statistic,
+        back.p,
+        back.effect,
+        back.p_untied,
+    )
+
+
+def test_the_effect_is_the_mean_rank_correlation() -> None:
+    result = page(SIEGEL)
+    assert result.effect == pytest.approx(np.mean([spearmanr(row, range(6)).statistic for row in SIEGEL]))
+    assert result.interval is None
+    assert "below 10 participants" in result.no_interval
+    assert page([[1, 2, 3]] * 12).no_interval == "no interval: all participants have the same correlation"
+
+
+def test_ten_people_have_an_interval_that_can_be_repeated() -> None:
+    result = page(STATEXT, seed=4)
+    assert result.interval is not None
+    assert result.effect is not None
+    assert result.interval.low < result.effect < result.interval.high
+    assert result == page(STATEXT, seed=4)
+    assert page(STATEXT, seed=None).interval is None
+
+
+def test_many_people_are_approximated_as_scipy_does() -> None:
+    rng = np.random.default_rng(2)
+    values = np.argsort(rng.random((trend.EXACT_UP_TO + 1, 5)), axis=1).astype(float)
+    result = page(values)
+    expected = page_trend_test(values, method="asymptotic")
+    assert "normal approximation" in result.method
+    assert result.p == pytest.approx(expected.pvalue)
+    assert result.statistic == expected.statistic
+    exact = page(values[:-1])
+    approximate = page_trend_test(values[:-1], method="asymptotic").pvalue
+    assert exact.p == pytest.approx(approximate, rel=0.01)
+
+
+def test_missing_answers_drop_and_flat_answers_are_told() -> None:
+    result = page(np.vstack([STATEXT, [1, np.nan, 3]]))
+    assert (result.n, result.dropped, result.p) == (10, 1, page(STATEXT).p)
+    flat = page(np.full((5, 7), 4))
+    assert (flat.statistic, flat.p, flat.effect, flat.interval) == (None, None, None, None)
+    assert flat.note.startswith("no variation")
+    assert page(np.full((2, 3), np.nan)).note == "no participant answered under all settings"
+
+
+def test_step_down_finds_the_lowest_delay_that_shows() -> None:
+    rng = np.random.default_rng(0)
+    truth = np.array([1, 1, 1, 1, 2, 4, 6])
+    values = np.clip(truth + rng.integers(0, 2, (12, 7)), 1, 7)
+    result = step_down(values, DELAYS)
+    assert result.lowest_ms in {125, 150}
+    assert [step.longest_ms for step in result.steps][:2] == [200, 150]
+    for step in result.steps:
+        columns = DELAYS.index(step.longest_ms) + 1
+        assert step.page.p == page(values[:, :columns]).p
+        assert (step.page.p <= 0.05) == (step.longest_ms >= result.lowest_ms)  # type: ignore[operator]
+    assert "upper bound" in result.note
+
+
+def test_step_down_stops_at_the_first_failure_even_if_a_later_one_would_do() -> None:
+    # A clear rise up to 75 ms, and a fall after it that hides it.
+    values = np.tile([1, 3, 5, 4, 3, 2, 1], (10, 1))
+    result = step_down(values, DELAYS)
+    assert result.lowest_ms is None
+    assert len(result.steps) == 1
+    assert page(values[:, :3]).p < 0.001  # type: ignore[operator]
+    assert "not evidence that there is none" in result.note
+
+
+def test_step_down_goes_as_far_as_two_delays() -> None:
+    result = step_down([[1, 2, 3]] * 6, (0, 50, 100))
+    assert result.lowest_ms == 50
+    assert result.steps[-1].page.p == pytest.approx(0.5**6)
+
+
+def test_step_down_without_anybody_or_variation_finds_nothing() -> None:
+    assert step_down(np.full((3, 3), 4), (0, 50, 100)).lowest_ms is None
+    dropped = step_down([[1, 2, np.nan], [1, 2, 3]], (0, 50, 100))
+    assert (dropped.steps[0].page.n, dropped.steps[0].page.dropped) == (1, 1)
+
+
+def test_the_step_down_hardly_ever_finds_a_delay_where_there_is_none() -> None:
+    rng = np.random.default_rng(7)
+    found = [step_down(rng.integers(1, 8, (5, 7)), DELAYS).lowest_ms is not None for _ in range(300)]
+    assert np.mean(found) <= 0.05 + 3 * np.sqrt(0.05 * 0.95 / 300)
+
+
+def test_bad_delays_and_a_single_setting_are_refused() -> None:
+    with pytest.raises(AnalysisError, match="do not go up"):
+        step_down(np.ones((3, 2)), (50, 0))
+    with pytest.raises(AnalysisError, match="do not go up"):
+        step_down(np.ones((3, 2)), (0, 50, 100))
+    with pytest.raises(AnalysisError, match="at least 2"):
+        page(np.ones((3, 1)))
