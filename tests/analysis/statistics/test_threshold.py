@@ -1,0 +1,165 @@
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+from study_app.analysis.statistics.psychometric import Counts, Curve, fit, share
+from study_app.analysis.statistics.threshold import DROP, noticed, threshold
+from study_app.errors import AnalysisError
+
+DELAYS = (0, 50, 100, 125, 150, 200, 300)
+POOLED = [0, 0, 1, 2, 4, 5, 5]
+
+# psignifit's tests, made with its MATLAB version: guess rate, shape, right answers of ten, threshold, width, tolerance.
+LEVELS = [0.25, 0.41666667, 0.58333333, 0.75, 0.91666667, 1.08333333, 1.25, 1.41666667, 1.58333333, 1.75]
+PSIGNIFIT = [
+    (0.5, "normal", [4, 6, 3, 8, 7, 5, 8, 9, 9, 10], 1.19233664, 1.13590185, 0.01),
+    (0.0, "normal", [0, 2, 2, 3, 7, 7, 8, 8, 9, 10], 0.897273717, 1.43410261, 0.01),
+    (0.5, "logistic", [5, 5, 5, 6, 5, 7, 9, 9, 8, 10], 1.18954146, 1.34590649, 0.01),
+    (0.0, "logistic", [1, 1, 4, 6, 5, 6, 7, 9, 7, 10], 0.879924438, 2.05631136, 0.03),
+]
+FINE = [0.001, 0.0015, 0.002, 0.0025, 0.003, 0.0035, 0.004, 0.0045, 0.005, 0.006, 0.007, 0.008, 0.010]
+FINE_RIGHT = [45, 50, 44, 44, 52, 53, 62, 64, 76, 79, 88, 90, 90]
+
+# Beetles killed by carbon disulphide (Bliss 1935).
+DOSES = [1.6907, 1.7242, 1.7552, 1.7842, 1.8113, 1.8369, 1.8610, 1.8839]
+BEETLES = [59, 60, 62, 56, 63, 59, 62, 60]
+KILLED = [6, 13, 18, 28, 52, 53, 61, 60]
+
+
+@pytest.mark.parametrize(("guess", "shape", "right", "place", "width", "tolerance"), PSIGNIFIT)
+def test_published_fits_of_ten_trials(guess, shape, right, place, width, tolerance) -> None:  # type: ignore[no-untyped-def]
+    result = threshold(LEVELS, right, [10] * 10, shape=shape, guess=guess, lapse=0.0)
+    assert result.effect == pytest.approx(place, rel=tolerance)
+    assert result.width == pytest.approx(width, rel=tolerance)
+
+
+def test_published_fit_of_ninety_trials() -> None:
+    result = threshold(FINE, FINE_RIGHT, [90] * 13, shape="normal", guess=0.5)
+    assert result.effect == pytest.approx(0.00464485, abs=1e-4)
+    assert result.width == pytest.approx(0.00468384, abs=1e-4)
+    assert result.lapse == pytest.approx(0.0, abs=1e-3)
+    at = Curve(result.effect, result.width, 0.5, 0.0, 0.0)  # type: ignore[arg-type]
+    assert float(share(np.array([0.005839]), at, "normal")[0]) == pytest.approx(0.5 + 0.5 * 0.8, abs=0.005)
+
+
+def test_published_beetles() -> None:
+    logit = threshold(DOSES, KILLED, BEETLES, guess=0.0, lapse=0.0)
+    assert (logit.effect, logit.statistic) == pytest.approx((1.77172, 11.2322), rel=1e-5)
+    assert logit.width is not None
+    slope = 2 * np.log(19) / logit.width
+    assert slope == pytest.approx(34.2703, abs=1e-4)
+    assert -slope * (logit.effect or 0.0) == pytest.approx(-60.7175, abs=1e-4)
+    probit = threshold(DOSES, KILLED, BEETLES, shape="normal", guess=0.0, lapse=0.0)
+    assert (probit.effect, probit.statistic) == pytest.approx((1.77085, 10.1198), rel=1e-5)
+    # 20 published digits less: Wald's interval from the published errors of the coefficients is about as wide.
+    assert logit.interval is not None
+    assert logit.interval.high - logit.interval.low == pytest.approx(0.0152, rel=0.05)
+
+
+def test_five_people_pooled_over_delays() -> None:
+    result = threshold(DELAYS, POOLED, [5] * 7)
+    assert result.effect == pytest.approx(127.7, rel=0.01)
+    assert result.interval is not None
+    # psignifit, whose priors allow more, has 95 to 162 ms.
+    assert 95 < result.interval.low < 115
+    assert 142 < result.interval.high < 162
+    assert result.guess == pytest.approx(0.0, abs=1e-6)
+
+
+def test_the_profile_ends_where_the_likelihood_has_dropped() -> None:
+    result = threshold(DELAYS, POOLED, [5] * 7)
+    counts = Counts(np.array(DELAYS, dtype=float), np.array(POOLED, dtype=float), np.full(7, 5.0))
+    for end in (result.lower, result.upper):
+        held = fit(counts, "logistic", (0.0, 0.5), (0.0, 0.06), threshold=end)
+        assert result.log_likelihood is not None
+        assert result.log_likelihood - held.log_likelihood == pytest.approx(DROP, abs=1e-3)
+
+
+def test_the_fit_is_a_maximum() -> None:
+    yes, asked = np.array([2, 3, 6, 9, 15, 19, 19]), np.full(7, 20)
+    result = threshold(DELAYS, yes, asked)
+    assert result.effect is not None
+    assert result.width is not None
+    assert result.guess is not None
+    assert result.lapse is not None
+
+    def value(place: float, width: float, guess: float, lapse: float) -> float:
+        expected = share(np.array(DELAYS, dtype=float), Curve(place, width, guess, lapse, 0.0), "logistic")
+        return float((yes * np.log(expected) + (asked - yes) * np.log(1 - expected)).sum())
+
+    best = value(result.effect, result.width, result.guess, result.lapse)
+    assert best == pytest.approx(result.log_likelihood)
+    for factor in (0.98, 1.02):
+        assert value(result.effect * factor, result.width, result.guess, result.lapse) < best
+        assert value(result.effect, result.width * factor, result.guess, result.lapse) < best
+        assert value(result.effect, result.width, result.guess * factor, result.lapse) <= best
+
+
+def test_guesses_without_any_delay_raise_the_lower_end_and_not_the_threshold() -> None:
+    truth = Curve(130.0, 80.0, 0.3, 0.0, 0.0)
+    asked = np.full(7, 400)
+    yes = np.rint(asked * share(np.array(DELAYS, dtype=float), truth, "logistic"))
+    result = threshold(DELAYS, yes, asked)
+    assert (result.effect, result.width) == pytest.approx((130, 80), rel=0.03)
+    assert result.guess == pytest.approx(0.3, abs=0.01)
+    ignored = threshold(DELAYS, yes, asked, guess=0.0)
+    assert (ignored.effect or 0.0) < 115
+
+
+def test_the_interval_covers_the_truth_about_as_often_as_it_says() -> None:
+    rng = np.random.default_rng(3)
+    truth = Curve(130.0, 120.0, 0.05, 0.0, 0.0)
+    shares = share(np.array(DELAYS, dtype=float), truth, "logistic")
+    covered = 0
+    for _ in range(60):
+        counts = Counts(np.array(DELAYS, dtype=float), rng.binomial(20, shares).astype(float), np.full(7, 20.0))
+        best, held = (fit(counts, "logistic", (0.05, 0.05), (0.0, 0.0), threshold=place) for place in (None, 130.0))
+        covered += best.log_likelihood - held.log_likelihood < DROP
+    assert binom.ppf(0.001, 60, 0.95) <= covered < 60
+
+
+def test_agreement_from_five_on_is_noticing_and_missing_answers_do_not_count() -> None:
+    values = np.array([[1, 2, 3, 5, 6, 7, 7], [1, 1, 4, 4, 5, 6, np.nan], [np.nan] * 7])
+    result = noticed(values, DELAYS)
+    assert (result.yes, result.asked) == ((0, 0, 0, 1, 2, 2, 1), (2, 2, 2, 2, 2, 2, 1))
+    assert (result.n, result.dropped) == (2, 1)
+    assert "pooled" in result.note
+    assert result.effect == pytest.approx(125, abs=25)
+    assert noticed((values >= 3).astype(float), DELAYS, noticed_from=1).yes == (0, 0, 2, 2, 2, 2, 1)
+
+
+@pytest.mark.parametrize(
+    ("yes", "note"),
+    [
+        ([0] * 7, "nobody noticed anything up to 300"),
+        ([5] * 7, "everybody noticed"),
+        ([5, 4, 3, 2, 1, 0, 0], "does not grow"),
+    ],
+)
+def test_answers_without_a_threshold_are_told(yes: list[int], note: str) -> None:
+    result = threshold(DELAYS, yes, [5] * 7)
+    assert (result.effect, result.interval, result.statistic) == (None, None, None)
+    assert note in result.note
+    assert note in result.no_interval
+
+
+def test_an_open_interval_says_which_end_is_open() -> None:
+    result = threshold(DELAYS, [0, 0, 0, 0, 0, 1, 1], [5] * 7)
+    assert result.interval is None
+    assert result.lower is not None
+    assert result.upper is None
+    assert result.no_interval == "no interval: the answers leave it open above"
+
+
+def test_two_levels_are_too_few_and_unasked_levels_do_not_count() -> None:
+    assert threshold([0, 100], [0, 5], [5, 5]).note == "fewer than three levels were answered"
+    assert threshold([*DELAYS, 400], [*POOLED, 0], [*[5] * 7, 0]).effect == threshold(DELAYS, POOLED, [5] * 7).effect
+
+
+@pytest.mark.parametrize(
+    ("yes", "asked"),
+    [([0, 6, 5], [5, 5, 5]), ([0, -1, 5], [5, 5, 5]), ([0, 1], [5, 5, 5]), ([0, np.nan, 5], [5, 5, 5])],
+)
+def test_counts_that_cannot_be_are_refused(yes: list[float], asked: list[float]) -> None:
+    with pytest.raises(AnalysisError, match=r"cannot be|do not fit"):
+        threshold([0, 50, 100], yes, asked)
