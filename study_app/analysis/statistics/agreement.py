@@ -1,0 +1,119 @@
+"""How far raters agree on what they rate, and how far statements measure one thing.
+
+Kendall & Babington Smith (1939), Ann. Math. Stat. 10, 275–287. Cronbach (1951), Psychometrika 16, 297–334; interval:
+Feldt (1965), Psychometrika 30, 357–370. Cohen (1960), Educ. Psychol. Meas. 20, 37–46; its standard error: Fleiss,
+Cohen & Everitt (1969), Psychol. Bull. 72, 323–327.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.stats import f as f_distribution
+from scipy.stats import norm
+
+from study_app.analysis.statistics.friedman import Friedman, friedman
+from study_app.analysis.statistics.outcome import FEW, TOO_FEW, Array, Interval, checked, complete
+from study_app.errors import AnalysisError
+
+SURE: Final = 0.95
+
+
+@dataclass(frozen=True, slots=True)
+class Alpha:
+    """Cronbach's alpha over ``items`` statements; None with ``note`` where it does not exist."""
+
+    n: int
+    dropped: int
+    items: int
+    alpha: float | None
+    interval: Interval | None
+    no_interval: str
+    note: str
+
+
+@dataclass(frozen=True, slots=True)
+class Kappa:
+    """Cohen's kappa of ``n`` pairs of names; None with ``note`` where it does not exist.
+
+    ``interval`` takes the pairs to be independent.
+    """
+
+    n: int
+    kappa: float | None
+    agreement: float | None
+    expected: float | None
+    interval: Interval | None
+    note: str
+
+
+def kendall_w(ratings: ArrayLike) -> Friedman:
+    """Return Kendall's W (the ``effect``) and its test for (raters, rated) ratings, corrected for ties.
+
+    It is Friedman's test with raters for participants. Raters who miss a rating are dropped.
+    """
+    return replace(friedman(ratings), test="Kendall's W of raters")
+
+
+def cronbach_alpha(values: ArrayLike) -> Alpha:
+    """Return Cronbach's alpha of (participants, items) answers, all keyed in the same direction.
+
+    Participants who miss a statement are dropped.
+    """
+    rows, dropped = complete(values, at_least=2, why=" (statements) for their internal consistency")
+    n, items = rows.shape
+    whole = float(rows.sum(axis=1).var(ddof=1)) if n > 1 else 0.0
+    if whole == 0.0:
+        reason = "no variation between participants" if n > 1 else f"{n} participants answered all statements"
+        return Alpha(n, dropped, items, None, None, reason, reason)
+    alpha = items / (items - 1) * (1 - float(rows.var(axis=0, ddof=1).sum()) / whole)
+    if n < FEW:
+        return Alpha(n, dropped, items, alpha, None, TOO_FEW, "")
+    df = n - 1, (n - 1) * (items - 1)
+    low = 1 - (1 - alpha) * float(f_distribution.ppf((1 + SURE) / 2, *df))
+    high = 1 - (1 - alpha) * float(f_distribution.ppf((1 - SURE) / 2, *df))
+    return Alpha(n, dropped, items, alpha, Interval(low, high, SURE, "Feldt"), "", "")
+
+
+def kappa(table: ArrayLike) -> Kappa:
+    """Return Cohen's kappa of a square table of counts.
+
+    Raises
+    ------
+    AnalysisError
+        The table is not square or holds something else than counts.
+    """
+    counts = checked(table, "categories of one, categories of the other")
+    if counts.shape[0] != counts.shape[1] or not (counts >= 0).all():
+        raise AnalysisError(
+            f"a table of shape {counts.shape} is no square table of counts; give one row and column each"
+        )
+    n = int(counts.sum())
+    if n == 0:
+        return Kappa(0, None, None, None, None, "nothing was named")
+    shares = counts / n
+    agreed = float(np.trace(shares))
+    rows, columns = shares.sum(axis=1), shares.sum(axis=0)
+    expected = float(rows @ columns)
+    if expected == 1.0:
+        return Kappa(n, None, agreed, expected, None, "no variation: always the same name for the same thing")
+    found = (agreed - expected) / (1 - expected)
+    error = _kappa_error(shares, rows, columns, agreed, expected, n)
+    reach = float(norm.ppf((1 + SURE) / 2)) * error
+    interval = Interval(found - reach, min(1.0, found + reach), SURE, "normal, answers taken as independent")
+    return Kappa(n, found, agreed, expected, interval if error > 0.0 else None, "")
+
+
+def _kappa_error(shares: Array, rows: Array, columns: Array, agreed: float, expected: float, n: int) -> float:
+    """Return the standard error of kappa (Fleiss, Cohen & Everitt 1969, eq. 13)."""
+    found = (agreed - expected) / (1 - expected)
+    ends = columns[:, None] + rows[None, :]
+    off = shares * ends**2
+    np.fill_diagonal(off, 0.0)
+    diagonal = np.diag(shares) * (1 - (rows + columns) * (1 - found)) ** 2
+    variance = diagonal.sum() + (1 - found) ** 2 * off.sum() - (found - expected * (1 - found)) ** 2
+    return math.sqrt(max(0.0, float(variance))) / ((1 - expected) * math.sqrt(n))
