@@ -1,0 +1,219 @@
+"""The cumulative logit model of ordered answers, with or without a random intercept for each participant.
+
+logit P(answer ≤ j) = θ_j − x·β − σ u, u ~ N(0, 1); McCullagh (1980), J. R. Stat. Soc. B 42, 109–142. The integral over
+u is an adaptive Gauss-Hermite quadrature around each participant's mode; Liu & Pierce (1994), Biometrika 81, 624–629.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from scipy.optimize import minimize
+from scipy.special import expit, logsumexp
+
+from study_app.analysis.statistics.outcome import MINIMISER, Array, Whole
+
+NODES: Final = 10
+ENDLESS: Final = 1e6
+"""What lies below the first and above the last threshold: as good as infinite, and no infinity minus infinity."""
+
+NEAR: Final = 1e-3
+"""After a shorter step the curvature is still the same."""
+
+LOG_SD: Final = (-5.0, 3.0)
+"""Where the logarithm of the random intercept's spread may lie; at the lower end there is none."""
+
+
+@dataclass(frozen=True, slots=True)
+class Answers:
+    """Answers sorted by participant: ``level`` (n,) from 0, each level used; ``design`` (n, columns); ``starts``.
+
+    ``starts`` are the places of each participant's first answer; None for a model without participants. ``offset`` (n,)
+    is added to what the design predicts, for profiles.
+    """
+
+    level: Whole
+    design: Array
+    starts: Whole | None
+    offset: Array | None = None
+
+    @property
+    def cuts(self) -> int:
+        """The number of thresholds."""
+        return int(self.level.max())
+
+
+@dataclass(frozen=True, slots=True)
+class Model:
+    """A fit: parameters, their covariance (of θ, β and, with participants, σ; None if singular), log-likelihood."""
+
+    thresholds: Array
+    effects: Array
+    sd: float
+    log_likelihood: float
+    covariance: Array | None
+
+    @property
+    def errors(self) -> Array | None:
+        """The standard errors of (θ, β, σ); None where the likelihood has no curvature to tell them."""
+        return None if self.covariance is None else np.sqrt(np.diag(self.covariance))
+
+
+def fit(answers: Answers, nodes: int = NODES) -> Model:
+    """Return the model of maximum likelihood."""
+    cuts, columns = answers.cuts, answers.design.shape[1]
+    shares = np.cumsum(np.bincount(answers.level))[:-1] / len(answers.level)
+    first = np.log(shares / (1 - shares))
+    begun = np.concatenate(
+        [first[:1], np.log(np.diff(first)), np.zeros(columns), [] if answers.starts is None else [0.0]]
+    )
+    bounds = [(-30.0, 30.0)] + [(-12.0, 4.0)] * (cuts - 1) + [(-25.0, 25.0)] * columns
+    bounds += [] if answers.starts is None else [LOG_SD]
+    result = minimize(
+        _objective,
+        begun,
+        (answers, nodes),
+        MINIMISER,
+        jac=True,
+        bounds=bounds,
+        options={"ftol": 1e-13, "gtol": 1e-7, "maxfun": 2000},
+    )
+    natural = _natural(result.x, cuts, answers.starts is not None)
+    if answers.starts is not None and result.x[-1] <= LOG_SD[0] + 1e-3:
+        plain = fit(Answers(answers.level, answers.design, None, answers.offset), nodes)
+        return Model(plain.thresholds, plain.effects, 0.0, plain.log_likelihood, plain.covariance)
+    natural, covariance = _curvature(natural, answers, nodes)
+    sd = float(natural[-1]) if answers.starts is not None else 0.0
+    value, _ = log_likelihood(natural, answers, nodes)
+    return Model(natural[:cuts], natural[cuts : cuts + columns], sd, value, covariance)
+
+
+def log_likelihood(values: Array, answers: Answers, nodes: int = NODES) -> tuple[float, Array]:
+    """Return the log-likelihood and its gradient.
+
+    Parameters
+    ----------
+    values : (parameters,) array
+        θ ascending, β, and, with participants, σ > 0.
+    nodes : int
+        Quadrature nodes a participant; 1 is Laplace's approximation (its gradient is then that of the true integral
+        only roughly).
+    """
+    cuts = answers.cuts
+    cut, effects = values[:cuts], values[cuts : cuts + answers.design.shape[1]]
+    eta = answers.design @ effects + (0.0 if answers.offset is None else answers.offset)
+    if answers.starts is None:
+        parts = _cells(cut, eta[:, None], answers.level)
+        return float(parts[0].sum()), _gathered(parts, np.ones((len(eta), 1)), answers, None)
+    sd = float(values[-1])
+    counts = np.diff(np.append(answers.starts, len(eta)))
+    mode, curvature = _modes(cut, eta, sd, answers.level, answers.starts)
+    places, weights = np.polynomial.hermite.hermgauss(nodes)
+    u = mode[:, None] + np.sqrt(2 / curvature)[:, None] * places
+    at = np.repeat(u, counts, axis=0)
+    parts = _cells(cut, eta[:, None] + sd * at, answers.level)
+    joint = np.add.reduceat(parts[0], answers.starts, axis=0) - u**2 / 2 + places**2 + np.log(weights)
+    each = logsumexp(joint, axis=1)
+    total = float((each - 0.5 * np.log(curvature) - 0.5 * np.log(np.pi)).sum())
+    posterior = np.repeat(np.exp(joint - each[:, None]), counts, axis=0)
+    return total, _gathered(parts, posterior, answers, at)
+
+
+def _cells(cut: Array, eta: Array, level: Whole) -> tuple[Array, Array, Array, Array, Array]:
+    """Return log P of each answer (n, nodes) and its derivatives by η (first, second), upper and lower threshold.
+
+    P = F(u) − F(l) is formed as F(u) (1 − F(l)) (1 − e^(l − u)), which does not cancel.
+    """
+    ends = np.concatenate([[-ENDLESS], cut, [ENDLESS]])
+    low, up = ends[level][:, None] - eta, ends[level + 1][:, None] - eta
+    part = -np.expm1(-(ends[level + 1] - ends[level]))[:, None]
+    below, above = expit(low), expit(-up)
+    soft_low, soft_up = np.logaddexp(0.0, low), np.logaddexp(0.0, up)
+    log_p = up - soft_up - soft_low + np.log(part)
+    first = below - above
+    second = -(below * (1 - below) + above * (1 - above))
+    upper = np.exp(soft_low - soft_up) / part
+    lower = -np.exp(soft_up - up - soft_low + low) / part
+    return log_p, first, second, upper, lower
+
+
+def _modes(cut: Array, eta: Array, sd: float, level: Whole, starts: Whole) -> tuple[Array, Array]:
+    """Return the mode of u given each participant's answers and the negative curvature there, by Newton's steps."""
+    counts = np.diff(np.append(starts, len(eta)))
+    u: Array = np.zeros(len(counts))
+    curvature: Array = np.ones(len(counts))
+    for _ in range(50):
+        parts = _cells(cut, (eta + sd * np.repeat(u, counts))[:, None], level)
+        slope = sd * np.add.reduceat(parts[1][:, 0], starts) - u
+        curvature = 1 - sd * sd * np.add.reduceat(parts[2][:, 0], starts)
+        step = np.clip(slope / curvature, -2.0, 2.0)
+        u = u + step
+        if np.abs(step).max() < 1e-9:
+            break
+    return u, curvature
+
+
+def _gathered(parts: tuple[Array, ...], posterior: Array, answers: Answers, at: Array | None) -> Array:
+    """Return the gradient by (θ, β, σ): the derivatives of log P, weighted by what each node is worth."""
+    _, first, _, upper, lower = parts
+    cuts = answers.cuts
+    slope = (first * posterior).sum(axis=1)
+    by_cut = np.bincount(answers.level, (upper * posterior).sum(axis=1), cuts + 1)[:cuts]
+    by_cut = by_cut + np.bincount(answers.level, (lower * posterior).sum(axis=1), cuts + 1)[1:]
+    by_sd = [] if at is None else [(first * posterior * at).sum()]
+    return np.concatenate([by_cut, answers.design.T @ slope, by_sd])
+
+
+def _objective(values: Array, answers: Answers, nodes: int) -> tuple[float, Array]:
+    """Return −log-likelihood and gradient by (θ_1, log gaps of θ, β, log σ)."""
+    cuts, random = answers.cuts, answers.starts is not None
+    natural = _natural(values, cuts, random)
+    value, gradient = log_likelihood(natural, answers, nodes)
+    chained = gradient.copy()
+    chained[:cuts] = np.cumsum(gradient[:cuts][::-1])[::-1]
+    chained[1:cuts] *= np.exp(values[1:cuts])
+    if random:
+        chained[-1] *= natural[-1]
+    return -value, -chained
+
+
+def _natural(values: Array, cuts: int, random: bool) -> Array:
+    natural = values.copy()
+    natural[1:cuts] = np.exp(values[1:cuts])
+    natural[:cuts] = np.cumsum(natural[:cuts])
+    if random:
+        natural[-1] = np.exp(values[-1])
+    return natural
+
+
+def _curvature(natural: Array, answers: Answers, nodes: int) -> tuple[Array, Array | None]:
+    """Return the parameters after one more Newton step, and their covariance, None where there is no maximum."""
+    hessian = _hessian(natural, answers, nodes)
+    if np.linalg.eigvalsh(-hessian).min() <= 1e-8:
+        return natural, None
+    step = np.linalg.solve(-hessian, log_likelihood(natural, answers, nodes)[1])
+    better = natural + step
+    if (np.diff(better[: answers.cuts]) > 0).all() and np.abs(step).max() < 0.1:
+        natural = better
+        if np.abs(step).max() > NEAR:
+            hessian = _hessian(better, answers, nodes)
+    covariance = np.asarray(np.linalg.inv(-hessian), dtype=np.float64)
+    return natural, covariance if (np.diag(covariance) > 0).all() else None
+
+
+def _hessian(natural: Array, answers: Answers, nodes: int) -> Array:
+    """Return the second derivatives of the log-likelihood, by central differences of its gradient."""
+    size = len(natural)
+    hessian = np.empty((size, size))
+    gap = 1e-4
+    if answers.cuts > 1:
+        gap = min(gap, float(np.diff(natural[: answers.cuts]).min()) / 4)
+    for place in range(size):
+        moved = np.zeros(size)
+        moved[place] = gap
+        after = log_likelihood(natural + moved, answers, nodes)[1]
+        before = log_likelihood(natural - moved, answers, nodes)[1]
+        hessian[place] = (after - before) / (2 * gap)
+    return (hessian + hessian.T) / 2

@@ -1,0 +1,224 @@
+"""Settings compared by a cumulative logit model with a random intercept for each participant.
+
+Single missing answers are allowed. Settings are tested by the likelihood ratio; the standard errors come from the
+curvature of the quadrature, not from Laplace's approximation, whose are too small.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import brentq
+from scipy.stats import chi2 as chi_square
+from scipy.stats import norm
+
+from study_app.analysis.statistics.cumulative import NODES, Answers, Model, fit
+from study_app.analysis.statistics.outcome import FEW, Array, Interval, Outcome, Whole, checked
+from study_app.errors import AnalysisError
+
+SURE: Final = 0.95
+FAR: Final = 10.0
+"""Log odds, or an error of them, beyond this mean that a setting separates the answers: no finite estimate."""
+
+TOO_FEW: Final = f"no mixed model below {FEW} participants: its estimates and errors do not hold there"
+SEPARATED: Final = "the settings separate the answers, or there are too few of them: no finite estimate"
+
+
+@dataclass(frozen=True, slots=True)
+class Coefficient:
+    """A column's effect in log odds of a higher answer, its standard error, Wald's z interval; None without any."""
+
+    column: int
+    estimate: float
+    error: float | None
+    interval: Interval | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ordinal(Outcome):
+    """The likelihood ratio (``statistic``) of a model against the one without ``columns``, with ``df``.
+
+    ``effect`` is the coefficient where there is one column; otherwise they are in ``coefficients``, each against the
+    first setting. ``levels`` are the levels that were chosen at all, ``thresholds`` lie between them
+    (``threshold_errors``: theirs). ``sd`` is the spread of the participants' intercepts in log odds (None: a model
+    without). ``answers`` were given and ``missing`` were not.
+    """
+
+    df: int
+    coefficients: tuple[Coefficient, ...]
+    thresholds: tuple[float, ...]
+    threshold_errors: tuple[float, ...]
+    sd: float | None
+    log_likelihood: float | None
+    aic: float | None
+    levels: tuple[float, ...]
+    answers: int
+    missing: int
+
+
+def ordinal(
+    values: ArrayLike, columns: ArrayLike | None = None, *, intercepts: bool = True, nodes: int = NODES
+) -> Ordinal:
+    """Test whether settings move answers up or down.
+
+    Parameters
+    ----------
+    values : (participants, settings) array
+        NaN where an answer is missing; the others of that participant are used.
+    columns : (settings, columns) array, optional
+        What is tested: 0 and 1 for factors, numbers for amounts (a delay in units of 100 ms). Without, every setting is
+        compared with the first.
+    intercepts : bool
+        Whether each participant has an intercept of his or her own. Without, answers are taken as independent, which
+        shrinks the effects: for comparison only.
+
+    Raises
+    ------
+    AnalysisError
+        The columns do not fit the settings.
+    """
+    array = checked(values, "participants, settings")
+    design = _design(array.shape[1], columns)
+    used = np.asarray(~np.isnan(array).all(axis=1))
+    rows = array[used]
+    levels = np.unique(rows[~np.isnan(rows)])
+    reason = _impossible(rows, levels, intercepts)
+    if reason:
+        return _outcome(rows, used, levels, design.shape[1], intercepts, None, 0.0, reason, nodes)
+    answers = _answers(rows, levels, design, intercepts)
+    whole = fit(answers, nodes)
+    without = fit(Answers(answers.level, answers.design[:, :0], answers.starts), nodes)
+    ratio = max(0.0, 2 * (whole.log_likelihood - without.log_likelihood))
+    bad = whole.errors is None or bool((np.abs(whole.effects) > FAR).any() or (whole.errors > FAR).any())
+    return _outcome(rows, used, levels, design.shape[1], intercepts, whole, ratio, SEPARATED if bad else "", nodes)
+
+
+def profile_interval(
+    values: ArrayLike, columns: ArrayLike, column: int, *, intercepts: bool = True, nodes: int = NODES
+) -> Interval | None:
+    """Return the 95 % profile-likelihood interval of one column's coefficient, None where the likelihood stays flat.
+
+    About twenty models are fitted: slow, and better than Wald's where participants are few.
+    """
+    array = checked(values, "participants, settings")
+    rows = array[~np.isnan(array).all(axis=1)]
+    levels = np.unique(rows[~np.isnan(rows)])
+    answers = _answers(rows, levels, _design(array.shape[1], columns), intercepts)
+    best = fit(answers, nodes)
+    if best.errors is None:
+        return None
+    others = np.delete(answers.design, column, axis=1)
+    place, error = float(best.effects[column]), float(best.errors[answers.cuts + column])
+    drop = float(chi_square.ppf(SURE, 1)) / 2
+
+    def above(value: float) -> float:
+        held = fit(Answers(answers.level, others, answers.starts, answers.design[:, column] * value), nodes)
+        return held.log_likelihood - best.log_likelihood + drop
+
+    ends = []
+    for side in (-1.0, 1.0):
+        reach = 3 * error
+        while above(place + side * reach) > 0:
+            reach *= 2
+            if reach > 3 * FAR:
+                return None
+        ends.append(float(brentq(above, place, place + side * reach, xtol=1e-5)))
+    return Interval(ends[0], ends[1], SURE, "profile likelihood")
+
+
+def _design(settings: int, columns: ArrayLike | None) -> Array:
+    if columns is None:
+        return np.eye(settings)[:, 1:]
+    design = checked(columns, "settings, columns")
+    centred = design - design.mean(axis=0) if len(design) else design
+    if len(design) != settings or np.isnan(design).any() or np.linalg.matrix_rank(centred) < design.shape[1]:
+        raise AnalysisError(
+            f"columns of shape {design.shape} do not tell {settings} settings apart; give one row a setting, without "
+            "NaN, and columns of which none follows from the others"
+        )
+    return design
+
+
+def _impossible(rows: Array, levels: Array, intercepts: bool) -> str:
+    if len(rows) == 0:
+        return "no participant answered"
+    if len(levels) < 2:
+        return "no variation: all answers are equal"
+    if intercepts and len(rows) < FEW:
+        return TOO_FEW
+    if np.isnan(rows).all(axis=0).any():
+        return "a setting was not answered by anybody"
+    return ""
+
+
+def _answers(rows: Array, levels: Array, design: Array, intercepts: bool) -> Answers:
+    """Return the given answers in a row, participant by participant, with levels that were not chosen left out."""
+    there = ~np.isnan(rows)
+    people, settings = np.nonzero(there)
+    level: Whole = np.searchsorted(levels, rows[there]).astype(np.int64)
+    starts = np.flatnonzero(np.diff(people, prepend=-1)) if intercepts else None
+    return Answers(level, design[settings], starts)
+
+
+def _outcome(
+    rows: Array,
+    used: NDArray[np.bool_],
+    levels: Array,
+    columns: int,
+    intercepts: bool,
+    model: Model | None,
+    ratio: float,
+    note: str,
+    nodes: int,
+) -> Ordinal:
+    found = None if note else model
+    coefficients = () if found is None else _coefficients(found)
+    single = coefficients[0] if len(coefficients) == 1 else None
+    parameters = columns + max(0, len(levels) - 1) + intercepts
+    errors = None if found is None else found.errors
+    return Ordinal(
+        test="cumulative logit" + (" mixed model" if intercepts else " model"),
+        n=len(rows),
+        dropped=int((~used).sum()),
+        statistic_name="likelihood ratio",
+        statistic=None if found is None else ratio,
+        p=None if found is None else float(chi_square.sf(ratio, columns)),
+        smallest_p=None,
+        method=f"random intercepts, adaptive Gauss-Hermite quadrature, {nodes} nodes"
+        if intercepts
+        else "no intercepts",
+        effect_name="log odds of a higher answer",
+        effect=None if single is None else single.estimate,
+        interval=None if single is None else single.interval,
+        no_interval=note or ("" if single else "no single effect: one coefficient for each setting"),
+        note=note,
+        df=columns,
+        coefficients=coefficients,
+        thresholds=() if found is None else tuple(float(value) for value in found.thresholds),
+        threshold_errors=() if errors is None else tuple(float(value) for value in errors[: len(levels) - 1]),
+        sd=None if found is None or not intercepts else found.sd,
+        log_likelihood=None if found is None else found.log_likelihood,
+        aic=None if found is None else 2 * parameters - 2 * found.log_likelihood,
+        levels=tuple(float(level) for level in levels),
+        answers=int((~np.isnan(rows)).sum()),
+        missing=int(np.isnan(rows).sum()),
+    )
+
+
+def _coefficients(model: Model) -> tuple[Coefficient, ...]:
+    if model.errors is None:
+        return tuple(Coefficient(place, float(value), None, None) for place, value in enumerate(model.effects))
+    errors = model.errors[len(model.thresholds) :]
+    reach = float(norm.ppf((1 + SURE) / 2))
+    return tuple(
+        Coefficient(
+            place,
+            float(value),
+            float(error),
+            Interval(float(value - reach * error), float(value + reach * error), SURE, "Wald"),
+        )
+        for place, (value, error) in enumerate(zip(model.effects, errors, strict=False))
+    )
