@@ -16,17 +16,15 @@ from study_app.devices.falcon.diagnosis import OPEN, Facts, sentence
 from study_app.devices.falcon.exchange import COUNTERS, exchange_functions, new_exchange
 from study_app.devices.falcon.failures import ProgramMissing, usb_failure
 from study_app.devices.falcon.geometry import DEFAULT_GEOMETRY, WORKSPACE_M, geometry_named
-from study_app.devices.falcon.guard import Guard
+from study_app.devices.falcon.guard import Guard, quiet
 from study_app.devices.falcon.homing import PATIENCE_S, home
 from study_app.devices.falcon.kinematics import REACHED, inverse, new_mechanism
 from study_app.devices.falcon.transport import Transport, open_transport
-from study_app.devices.falcon.wire import ERROR_NO_DEVICE, FLAG_BLUE, FLAG_HOMING, quiet_packet
+from study_app.devices.falcon.wire import ERROR_NO_DEVICE
 from study_app.errors import DeviceError
 from study_app.haptics.layout import READING, records
 
 FORCE_LIMIT_N: Final = 8.0
-LAST_PACKETS: Final = 10
-"""Zero torque is sent so often at the end: the last one may persist, and one packet may be lost."""
 
 _FARTHEST = 1700  # counts, a little more than is known to be used
 _CLOSED = BulkCalls(0, 0)
@@ -118,9 +116,9 @@ class FalconDevice(Device):
         self._falcon.handle, self._falcon.transfer = _CLOSED
         if transport is None:
             return
-        quiet = _quieten(transport) if used else True
+        quieted = quiet(transport) > 0 if used else True
         transport.close()
-        if guard is not None and (quiet or gone):
+        if guard is not None and (quieted or gone):
             guard.stand_down()
         elif guard is not None:
             guard.release()
@@ -129,6 +127,11 @@ class FalconDevice(Device):
     def counters(self) -> dict[str, int]:
         """How many turns, packets and errors there were since it was homed: see ``exchange.FALCON``."""
         return {name: int(self._falcon[name]) for name in COUNTERS}
+
+    @property
+    def held(self) -> tuple[Any, Any]:
+        """The encoder counts of its last reply and the motor units it was last told, each (3,)."""
+        return self._falcon.status.encoders.copy(), self._falcon.units.copy()
 
     def describe(self) -> dict[str, Any]:
         """Return what the receipt says of it."""
@@ -235,19 +238,6 @@ class FalconDevice(Device):
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
-
-
-def _quieten(transport: Transport) -> bool:
-    """Send zero torque, several times; return whether any of it went out."""
-    sent = 0
-    for _ in range(LAST_PACKETS):
-        try:
-            transport.write(quiet_packet(FLAG_HOMING | FLAG_BLUE), 0.1)
-        except DeviceError:
-            continue
-        sent += 1
-        transport.pause(0.002)
-    return sent > 0
 
 
 def _say_nothing(_line: str) -> None:

@@ -222,7 +222,10 @@ def _load(e: Any) -> None:
 
 @kernel
 def _stroke(e: Any, now_ns: int) -> None:
-    """Pull out, push in, pull out and go to the middle, if homing wants it and nobody else wants anything."""
+    """Pull out, push in, pull out and go to the middle, if homing wants it and nobody else wants anything.
+
+    And again, as a person would, while an arm is not homed or the blue light still asks to pull out.
+    """
     run, hand = e.run, e.hand
     if hand.serial != hand.taken:
         if run.stroke > 0:
@@ -237,6 +240,7 @@ def _stroke(e: Any, now_ns: int) -> None:
         run.stroke_due = 0
     if run.stroke == len(STROKES_M):
         run.stroke = 0
+        run.stroke_due = 1 if run.homed != 0b111 or run.lights & wire.FLAG_BLUE else 0
         return
     run.stroke += 1
     hand.order.kind = REACH

@@ -232,7 +232,8 @@ class TestForce:
         assert opened.hand.torques != (0, 0, 0)
         opened.close()
         assert opened.hand.torques == (0, 0, 0)
-        assert opened.hand.lights == wire.FLAG_BLUE
+        assert opened.hand.lights == 0
+        assert opened.hand.homed == 0b111  # and stays so, for whoever opens it next
         assert turns.after(1, (1.0, 1.0, 1.0)) == READ_LOST
         assert opened.hand.torques == (0, 0, 0)
         opened.close()
