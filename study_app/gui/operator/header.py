@@ -1,4 +1,4 @@
-"""The head of the operator's window: which session, in which state, how long already."""
+"""The head of the operator's window: which session, in which state, how long already, how many trials are done."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from PySide6.QtCore import QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
-from study_app.gui.cards import Bar, Chip, Logo, Tone
+from study_app.gui.cards import Chip, Logo, Tone
 from study_app.gui.icons import draw_icon
 from study_app.gui.labels import figures, label
 from study_app.gui.operator.view import OperatorView, State, minutes
@@ -21,6 +21,8 @@ STATES: dict[State, tuple[Tone, str]] = {
     "ended": ("ok", "check"),
 }
 SAVED_RECENTLY_S = 2.0
+PARTS_WIDTH = 120
+PARTS_GAP = 4
 
 
 class ThemeButton(Themed, QPushButton):
@@ -40,6 +42,35 @@ class ThemeButton(Themed, QPushButton):
         draw_icon(QPainter(self), name, QRectF(10, 10, 20, 20), self.theme.text2)
 
 
+class PartsBar(Themed, QWidget):
+    """A bar for each part, as long as its share of all trials, filled as far as its trials are done."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.main_trials: tuple[tuple[int, int], ...] = ()
+        self.setFixedSize(PARTS_WIDTH, 14)
+
+    def show_trials(self, main_trials: tuple[tuple[int, int], ...]) -> None:
+        """Show (done, of) of every part."""
+        if main_trials != self.main_trials:
+            self.main_trials = main_trials
+            self.update()
+
+    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+        """Paint track and fill of each part."""
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setPen(Qt.PenStyle.NoPen)
+        room = self.width() - PARTS_GAP * (len(self.main_trials) - 1)
+        x = 0.0
+        for done, of in self.main_trials:
+            width = room * of / sum(trials for _, trials in self.main_trials)
+            for colour, filled in ((self.theme.sunk, width), (self.theme.accent, width * done / of)):
+                painter.setBrush(QColor(colour))
+                painter.drawRoundedRect(QRectF(x, 3, filled, 8), 4, 4)
+            x += width + PARTS_GAP
+
+
 class Header(Themed, QWidget):
     """The strip at the top; ``theme_asked`` when the operator wants the other theme."""
 
@@ -57,9 +88,8 @@ class Header(Themed, QWidget):
         self.clock.setAlignment(Qt.AlignmentFlag.AlignRight)
         self.expected = figures("", "small", "text2")
         self.expected.setAlignment(Qt.AlignmentFlag.AlignRight)
-        self.bar = Bar()
-        self.bar.setFixedWidth(120)
-        self.percent = figures("", "small", "text2")
+        self.bar = PartsBar()
+        self.trials = figures("", "small", "text2")
         self.theme_button = ThemeButton()
         self.theme_button.clicked.connect(self.theme_asked)
         self._lay_out()
@@ -75,7 +105,7 @@ class Header(Themed, QWidget):
             row.addWidget(chip)
         row.addStretch()
         row.addLayout(_column(self.clock, self.expected))
-        row.addLayout(_column(self.bar, self.percent))
+        row.addLayout(_column(self.bar, self.trials))
         row.addSpacing(8)
         row.addWidget(self.theme_button)
 
@@ -95,8 +125,8 @@ class Header(Themed, QWidget):
             self.saved.show_state("ok", "check", "Saved to disk now")
         self.clock.setText(minutes(view.elapsed_s))
         self.expected.setText(f"of about {max(1, round(view.expected_s / 60))} min")
-        self.bar.show_share(view.share)
-        self.percent.setText(f"{view.share:.0%}".replace("%", " %"))
+        self.bar.show_trials(view.main_trials)
+        self.trials.setText(view.trials_line)
 
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
         """Paint the strip and the hairline under it."""

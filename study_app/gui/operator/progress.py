@@ -21,7 +21,7 @@ Beyond: TypeAlias = tuple[str, float, float]
 
 @dataclass(frozen=True, slots=True)
 class NoteLine:
-    """A note or mark as the operator wrote it, ``at_s`` on the session's clock."""
+    """A note or mark as the operator wrote it, ``at_s`` in the time that was worked."""
 
     at_s: float
     kind: str
@@ -32,9 +32,10 @@ class NoteLine:
 class SessionProgress:
     """What the journal of a session of ``protocol`` says so far.
 
-    ``step`` indexes the schedule's steps (−1 before the first); ``durations_s`` holds the steps left behind;
-    ``answers`` counts the answered items of each trial, ``trials_done`` says of each trial what was measured in it
-    that broke the protocol's limits: column, value and limit.
+    ``step`` indexes the schedule's steps (−1 before the first); ``durations_s`` holds the steps left behind; ``away_s``
+    is how long no program held the session, which no duration counts; ``answers`` counts the answered items of each
+    trial, ``trials_done`` says of each trial what was measured in it that broke the protocol's limits: column, value
+    and limit.
     """
 
     protocol: Protocol
@@ -54,6 +55,7 @@ class SessionProgress:
     ended: str = ""
     ended_s: float = 0.0
     saved_s: float | None = None
+    away_s: float = 0.0
 
     @property
     def trial(self) -> Trial | None:
@@ -72,6 +74,16 @@ class SessionProgress:
     def trials_within_limits(self) -> int:
         """How many finished trials kept the protocol's limits of lateness, gap and delay error."""
         return sum(not beyond for beyond in self.trials_done.values())
+
+    @property
+    def main_trials(self) -> tuple[tuple[int, int], ...]:
+        """Of each part: how many of its main trials were left behind, and how many it has."""
+        counts: dict[int | None, tuple[int, int]] = {}
+        for index, step in enumerate(self.schedule.steps):
+            if isinstance(step, Trial) and step.phase == "main":
+                done, of = counts.get(step.part, (0, 0))
+                counts[step.part] = (done + (index < self.step or self.ended == "completed"), of + 1)
+        return tuple(counts.values())
 
     def after(self, event: str, at_s: float, fields: Mapping[str, Any]) -> SessionProgress:
         """Return the progress once ``event`` is on disk; events that say nothing about progress only count as saved."""
@@ -129,15 +141,27 @@ def _responses(progress: SessionProgress, _at_s: float, fields: Mapping[str, Any
 
 
 def _note(progress: SessionProgress, at_s: float, fields: Mapping[str, Any]) -> SessionProgress:
-    return replace(progress, notes=(*progress.notes, NoteLine(at_s, fields["kind"], fields["text"])))
+    note = NoteLine(at_s - progress.away_s, fields["kind"], fields["text"])
+    return replace(progress, notes=(*progress.notes, note))
 
 
 def _repeat(progress: SessionProgress, _at_s: float, fields: Mapping[str, Any]) -> SessionProgress:
     return replace(_without(progress, fields["trial"]), repeats=progress.repeats + 1)
 
 
-def _resumed(progress: SessionProgress, _at_s: float, _fields: Mapping[str, Any]) -> SessionProgress:
-    return replace(progress, paused=False, force_off=False, broke="", trial_since_s=None, trial_lasted_s=None)
+def _resumed(progress: SessionProgress, at_s: float, _fields: Mapping[str, Any]) -> SessionProgress:
+    """Go on after a gap, which the session's clock counts and nobody worked in."""
+    gap_s = 0.0 if progress.saved_s is None else max(0.0, at_s - progress.saved_s)
+    return replace(
+        progress,
+        paused=False,
+        force_off=False,
+        broke="",
+        trial_since_s=None,
+        trial_lasted_s=None,
+        step_since_s=progress.step_since_s + gap_s,
+        away_s=progress.away_s + gap_s,
+    )
 
 
 def _ended(progress: SessionProgress, at_s: float, fields: Mapping[str, Any]) -> SessionProgress:

@@ -78,7 +78,9 @@ class DeviceView:
 class OperatorView:
     """Everything on the operator's window except the two plots' points.
 
-    ``trial`` is the number of the trial under way or answered. ``waits`` says that the trouble is a disk that takes
+    ``elapsed_s`` is the time that was worked: not the gap before a session was resumed. ``main_trials`` has a pair for
+    each part, of its main trials left behind and of all. ``trial`` is the number of the trial under way or answered.
+    ``waits`` says that the trouble is a disk that takes
     nothing: the session goes on when it does again. ``beyond`` says of each trial out of limits which it broke, the
     newest first.
     """
@@ -91,6 +93,7 @@ class OperatorView:
     saved_ago_s: float | None
     elapsed_s: float
     expected_s: float
+    main_trials: tuple[tuple[int, int], ...]
     part_line: str
     heading: str
     setting_line: str
@@ -110,11 +113,10 @@ class OperatorView:
     beyond: tuple[str, ...] = ()
 
     @property
-    def share(self) -> float:
-        """Share of the expected time that has passed, 0 to 1; a complete session is whole however long it took."""
-        if self.over and self.state_word == "Complete":
-            return 1.0
-        return min(1.0, self.elapsed_s / self.expected_s) if self.expected_s > 0 else 0.0
+    def trials_line(self) -> str:
+        """How far the session is: "2 of 10 trials"."""
+        done, of = (sum(counts) for counts in zip(*self.main_trials, strict=True)) if self.main_trials else (0, 0)
+        return f"{done} of {of} {'trial' if of == 1 else 'trials'}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,8 +169,9 @@ def operator_view(
         state_word="Waiting for the disk" if waits and state == "trouble" else _state_word(state, progress),
         trouble=trouble,
         saved_ago_s=None if progress.saved_s is None else max(0.0, now_s - progress.saved_s),
-        elapsed_s=progress.ended_s if progress.ended else now_s,
+        elapsed_s=(progress.ended_s if progress.ended else now_s) - progress.away_s,
         expected_s=session.expected_s,
+        main_trials=progress.main_trials,
         part_line=_part_line(session, trial),
         heading=_heading(session, progress),
         setting_line=_setting_line(session, progress, answering=answering),

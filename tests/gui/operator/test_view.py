@@ -135,7 +135,47 @@ def test_a_complete_session_has_every_step_done(told):
     told.welcome()
     told.tell("session_ended", 4.0, status="completed", reason="")
     assert {row.state for row in told.view().steps} == {"done"}
-    assert told.view().share == 1.0
+    assert told.view().trials_line == "4 of 4 trials"
+
+
+def test_progress_counts_trials_that_were_left_behind_part_by_part(told):
+    told.welcome()
+    told.now_s += 3600.0  # however long it took
+    assert (told.view().main_trials, told.view().trials_line) == (((0, 2), (0, 2)), "0 of 4 trials")
+    told.start(1)
+    told.end(1)
+    assert told.view().trials_line == "0 of 4 trials"
+    told.answer(1)
+    told.start(2)
+    assert (told.view().main_trials, told.view().trials_line) == (((1, 2), (0, 2)), "1 of 4 trials")
+    told.end(2)
+    told.answer(2)
+    told.tell("page_shown", 1.0, page="reaching")
+    told.start(3)
+    told.end(3)
+    told.answer(3)
+    told.tell("repeat", trial=3, reason="phone rang")
+    assert (told.view().main_trials, told.view().trials_line) == (((2, 2), (0, 2)), "2 of 4 trials")
+    told.tell("session_ended", 1.0, status="withdrawn", reason="")
+    assert told.view().trials_line == "2 of 4 trials"
+
+
+def test_a_resumed_session_counts_what_was_worked_and_not_the_gap(told):
+    told.welcome()  # at 1 s
+    told.tell("note", 2.0, kind="note", text="before")
+    told.tell("session_resumed", 1020.0, gap_s=1020.0)
+    told.tell("page_shown", 0.5, page="welcome")
+    told.tell("note", 0.5, kind="mark", text="")
+    told.now_s += 1.0
+    view = told.view()
+    assert view.elapsed_s == 5.0
+    assert [note.at_s for note in view.notes] == [4.0, 3.0]
+    told.start(1)  # at 15 s of work; the page was there since 1 s
+    assert told.view().steps[0].note == "0:14"
+    told.tell("session_resumed", 300.0)
+    told.tell("session_ended", 2.0, status="aborted", reason="")
+    told.now_s += 60.0
+    assert told.view().elapsed_s == 17.0
 
 
 def test_counts_are_of_what_is_on_disk(told):

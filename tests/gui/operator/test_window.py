@@ -8,6 +8,7 @@ from itertools import pairwise
 import pyqtgraph as pg
 import pytest
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QColor
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
@@ -40,11 +41,27 @@ def running(window, told, health):
 def test_a_view_becomes_texts(running):
     assert running.header.study.text() == "demo"
     assert running.header.state.word == "Running"
+    assert running.header.trials.text() == "0 of 4 trials"
     assert running.rail.heading.text() == "Trial 1 of 4"
     assert running.rail.elapsed.text() == "0:00 of 0:30"
     assert [card.value.text() for card in running.tiles.cards[:2]] == ["1000.0", "15"]
     assert len(running.rail.lines) == len(running._view.steps)
     assert running.stop.word.text() == "Force is on"
+
+
+@pytest.mark.parametrize("done", range(5))
+def test_the_bar_is_filled_as_far_as_the_line_below_it_says(window, told, done):
+    told.welcome()
+    for trial in told.schedule.trials[: done + 1]:
+        told.start(trial.number)
+    if done == len(told.schedule.trials):
+        told.tell("session_ended", 1.0, status="completed", reason="")
+    window.show_view(told.view())
+    assert window.header.trials.text() == f"{done} of 4 trials"
+    picture = window.header.bar.grab().toImage()
+    middle = [picture.pixelColor(x, picture.height() // 2).name() for x in range(picture.width())]
+    filled = middle.count(QColor(window.theme.accent).name()) / picture.width()
+    assert filled == pytest.approx(done / 4, abs=0.08)  # gaps and round ends
 
 
 def test_the_limit_a_trial_broke_can_be_read_in_the_smallest_window(window, told, health, qtbot):
