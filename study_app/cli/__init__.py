@@ -13,6 +13,7 @@ import click
 
 from study_app import __version__
 from study_app.cli import falcon, model, results, running, soak
+from study_app.cli.devices import devices
 from study_app.cli.words import EXIT_USER_ERROR
 from study_app.errors import StudyError
 
@@ -36,6 +37,7 @@ for module in (running, results, model, soak, falcon):
     for command in vars(module).values():
         if isinstance(command, click.Command):
             commands.add_command(command)
+commands.add_command(devices)  # with commands of its own
 
 
 def main() -> None:

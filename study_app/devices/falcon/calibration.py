@@ -27,6 +27,8 @@ UNCALIBRATED_UNITS_PER_NM: Final = 6616.0
 
 FOLDER_VARIABLE: Final = "LIQUID_STUDY_CONFIG"
 LEAST_POSES: Final = 5
+MOST_RESIDUAL_N: Final = 0.5
+"""Weights that leave more unexplained do not fit together."""
 _GAINS: Final = (1000.0, 100_000.0)  # no Falcon's is outside
 _OFFSETS_RAD: Final = math.radians(15)  # nor its arms' offset
 _STEPS: Final = 20
@@ -101,6 +103,12 @@ def fit(geometry: Geometry, poses: Any, forces_n: Any, units: Any, *, measured: 
     residual_n = math.sqrt(float(left @ left) / len(counts))
     day = (measured or date.today()).isoformat()
     return Calibration(geometry.name, gain, offset_rad, float(own_n), residual_n, len(counts), day)
+
+
+def left_over(found: Calibration, poses: Any, forces_n: Any, units: Any) -> Any:
+    """Return what ``found`` leaves unexplained of the forces it was fitted to, (n, 3) [N]; arguments as of `fit`."""
+    counts, pulled_n, held = (np.asarray(given, np.float64) for given in (poses, forces_n, units))
+    return _solve(geometry_named(found.geometry), found.arm_offset_rad, counts, pulled_n, held)[1].reshape(-1, 3)
 
 
 def _solve(geometry: Geometry, offset_rad: float, counts: Any, pulled_n: Any, held: Any) -> tuple[Any, Any]:

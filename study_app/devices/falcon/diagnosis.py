@@ -80,7 +80,7 @@ class Mode:
     """One way to fail.
 
     ``symptom`` is what a user sees, ``cause`` a clause that fits after "because", ``cures`` what to do by platform
-    ("" for all others), ``detected`` by what it is known.
+    ("" for all others), ``detected`` by what it is known, ``paste`` what a terminal on Linux takes.
     """
 
     id: str
@@ -89,6 +89,7 @@ class Mode:
     cures: Mapping[str, str]
     detected: str
     shown_by: Shows
+    paste: str = ""
 
     def cure(self, platform: str) -> str:
         """Return what to do on this system."""
@@ -195,6 +196,7 @@ MODES: Final = (
         },
         "libusb's error -3",
         _usb("access", but="darwin win32"),
+        paste=f"echo '{UDEV_RULE}' | sudo tee {RULES_FILE} && sudo udevadm control --reload",
     ),
     Mode(
         "windows-driver",
@@ -313,6 +315,7 @@ MODES: Final = (
         {"linux": "run 'sudo modprobe -r ftdi_sio', and take '0403 cb48' out of what writes to its new_id", _ANY: ""},
         "the kernel's driver is active on its interface and cannot be detached",
         _usb("kernel-driver"),
+        paste="sudo modprobe -r ftdi_sio",
     ),
     Mode(
         "busy",

@@ -1,0 +1,200 @@
+"""The commands about what is felt with: what is connected, what is wrong with it, and how strong it is."""
+
+from __future__ import annotations
+
+import queue
+import sys
+import threading
+from collections.abc import Callable
+from math import degrees
+from pathlib import Path
+from textwrap import fill
+from typing import TYPE_CHECKING
+
+import click
+
+from study_app.cli.words import EXIT_FOUND
+
+if TYPE_CHECKING:
+    from study_app.devices.falcon.calibration import Calibration
+    from study_app.devices.falcon.device import FalconDevice
+    from study_app.devices.falcon.doctor import Examined
+    from study_app.devices.falcon.emulator import Emulator
+    from study_app.devices.falcon.weighing import Ask, Notes
+
+_WIDTH = 100
+FIRMWARE = click.option("--firmware", type=click.Path(path_type=Path), metavar="PATH", help="Its program.")
+DEVICE = click.option("--device", "name", default="falcon", show_default=True, metavar="NAME", help="Which Falcon.")
+
+
+@click.group(invoke_without_command=True)
+@click.pass_context
+def devices(context: click.Context) -> None:
+    """List what can be felt with; look a Falcon over; calibrate it."""
+    if context.invoked_subcommand is None:
+        context.invoke(list_devices)
+
+
+@devices.command("list")
+def list_devices() -> None:
+    """List every device, what of it is connected, what it can do, and why it cannot be used."""
+    from study_app.devices.backends import backends
+
+    for backend in backends():
+        click.echo(f"{backend.name:<19} {backend.state}  ({backend.by})")
+        for line in (backend.can, backend.why):
+            if line:
+                click.echo(_indented(line, 20))
+
+
+@devices.command()
+@DEVICE
+@FIRMWARE
+@click.option("--fault", "faults", multiple=True, metavar="NAME", help="Of falcon-emulated: frozen, drop=0.01 …")
+def doctor(name: str, firmware: Path | None, faults: tuple[str, ...]) -> None:
+    """Look a Falcon over: find, open, load, home and turn it, without force; say what is wrong, why, and the cure.
+
+    NAME is falcon, falcon:SERIAL, falcon-emulated or falcon-socket:PATH. Exit code 3 where something is wrong.
+    """
+    from study_app.devices.falcon.diagnosis import diagnose
+    from study_app.devices.falcon.doctor import examine
+
+    examined = examine(name, firmware=firmware, faults=faults, tell=click.echo)
+    for line in report(examined):
+        click.echo(line)
+    if diagnose(examined.facts) or examined.failure is not None:
+        click.get_current_context().exit(EXIT_FOUND)
+
+
+def report(examined: Examined) -> list[str]:
+    """Return what was found, mode for mode."""
+    from study_app.devices.falcon.diagnosis import MODES
+
+    facts = examined.facts
+    lines = ["", *(f"seen: {words}" for words in examined.seen), ""]
+    found = 0
+    for number, mode in enumerate(MODES, start=1):
+        shown = mode.shown_by(facts)
+        word = "not looked at" if shown is None else "FOUND" if shown else "ok"
+        lines.append(f"{number:>2}  {word:<13}  {mode.symptom}")
+        if shown:
+            found += 1
+            lines.append(_indented(f"cause: {mode.cause}", 19))
+            lines.append(_indented(f"cure: {mode.cure(facts.platform)}", 19))
+            lines.append(_indented(f"known by: {mode.detected}", 19))
+            if mode.paste and facts.platform == "linux":
+                lines += ["", mode.paste, ""]  # in one line, to be copied
+    lines.append("")
+    if examined.failure is not None:
+        lines.append(_indented(examined.failure, 0))
+    lines.append("Nothing is wrong with it." if not found and examined.failure is None else f"Found: {found}.")
+    return lines
+
+
+@devices.command()
+@DEVICE
+@FIRMWARE
+@click.option("--grams", type=click.FloatRange(110, 600), metavar="G", help="Hang a weight, 110 to 600.")
+@click.option("--scale", is_flag=True, help="Pull with a luggage scale instead.")
+@click.option("--geometry", metavar="NAME", help="libnifalcon (default), zm-redux or martin-hillier.")
+def calibrate(name: str, firmware: Path | None, grams: float | None, *, scale: bool, geometry: str | None) -> None:
+    """Measure how many motor units a newton takes, with a known weight or a luggage scale; kept by serial number.
+
+    The Falcon holds its grip at five places, first with nothing on it, then with the weight. Exit code 3 where what was
+    weighed does not fit together: then nothing is kept.
+    """
+    if scale == (grams is not None):
+        raise click.UsageError("calibrate needs either --grams G, a weight to hang on the grip, or --scale")
+    from study_app.devices.falcon import calibration, weighing
+    from study_app.devices.falcon.geometry import DEFAULT_GEOMETRY, geometry_named
+
+    measures = geometry_named(geometry or DEFAULT_GEOMETRY)
+    device, emulator = _falcon(name, firmware, grams)
+    with device:
+        grip = weighing.Grip(device, virtual=emulator is not None)
+        weight_n = (grams or 0.0) / 1000 * weighing.GRAVITY_MPS2
+        ask = _ask_operator if emulator is None else _ask_emulator(emulator, weight_n)
+        notes = weighing.pull(grip, ask) if grams is None else weighing.hang(grip, weight_n, ask)
+        serial = device.describe()["serial"]
+    found = calibration.fit(measures, notes.counts, notes.forces_n, notes.units)
+    for line in _calibrated(found, notes):
+        click.echo(line)
+    if found.residual_n > calibration.MOST_RESIDUAL_N:
+        click.echo(f"More than {calibration.MOST_RESIDUAL_N} N is unexplained: nothing was kept. Weigh again.")
+        click.get_current_context().exit(EXIT_FOUND)
+    click.echo(f"Kept in {calibration.save(serial or '', found)}.")
+
+
+def _falcon(name: str, firmware: Path | None, grams: float | None) -> tuple[FalconDevice, Emulator | None]:
+    """Return the Falcon, not yet open, and the emulator behind it, if there is one."""
+    from study_app.devices import kind_of
+    from study_app.devices.falcon.device import FalconDevice
+    from study_app.devices.falcon.emulated import EmulatedFalcon
+    from study_app.devices.falcon.emulator import Emulator
+    from study_app.errors import DeviceError
+
+    kind = kind_of(name)
+    if not kind.startswith("falcon"):
+        raise DeviceError(f"'{name}' has no motors to calibrate: only a Falcon has")
+    if kind != "falcon-emulated":
+        return FalconDevice(name, firmware=firmware, tell=click.echo), None
+    if grams is None:
+        raise DeviceError("nobody pulls an emulated Falcon with a scale: hang a weight on it with --grams")
+    # A serial number of its own: no rehearsal shall find this calibration.
+    emulator = Emulator(running=firmware is None, serial="EMULATED-WEIGHED")
+    return EmulatedFalcon(firmware=firmware, tell=click.echo, emulator=emulator), emulator
+
+
+def _calibrated(found: Calibration, notes: Notes) -> list[str]:
+    """Return what was found, and what it leaves of each rest."""
+    from study_app.devices.falcon.calibration import UNCALIBRATED_UNITS_PER_NM, left_over
+
+    lines = ["", "rest  load [N]  unexplained x, y, z [N]"]
+    for number, (load, left) in enumerate(
+        zip(-notes.forces_n[:, 1], left_over(found, notes.counts, notes.forces_n, notes.units), strict=True), start=1
+    ):
+        lines.append(f"{number:>4}  {load:>8.2f}  {left[0]:+.3f} {left[1]:+.3f} {left[2]:+.3f}")
+    share = found.units_per_nm / UNCALIBRATED_UNITS_PER_NM
+    lines += [
+        "",
+        f"{found.units_per_nm:.0f} motor units for a newton metre, {share:.2f} times those of one without calibration",
+        f"arms' offset {degrees(found.arm_offset_rad):+.2f} degrees; the grip's own weight {found.own_weight_n:.2f} N",
+        f"unexplained {found.residual_n:.3f} N in the mean square, friction for the most part",
+    ]
+    return lines
+
+
+def _ask_operator(kind: str, words: str) -> Callable[[], str | None]:
+    """Ask on the terminal, while the grip is held; an end of input gives up."""
+    click.echo(words + (" " if kind == "reading" else " Then press Enter."))
+    answers: queue.SimpleQueue[str] = queue.SimpleQueue()
+    threading.Thread(target=lambda: answers.put(sys.stdin.readline()), daemon=True).start()
+
+    def answered() -> str | None:
+        try:
+            line = answers.get_nowait()
+        except queue.Empty:
+            return None
+        if not line:
+            raise click.Abort
+        return line.strip()
+
+    return answered
+
+
+def _ask_emulator(emulator: Emulator, weight_n: float) -> Ask:
+    """Let the emulated hand do what is asked for."""
+
+    def ask(kind: str, words: str) -> Callable[[], str | None]:
+        click.echo(words)
+        if kind in {"hang", "take-off"}:
+            emulator.weight_n = weight_n if kind == "hang" else 0.0
+        emulator.held = kind == "take-off"
+        return lambda: ""
+
+    return ask
+
+
+def _indented(words: str, by: int) -> str:
+    space = " " * by
+    return fill(words, _WIDTH, initial_indent=space, subsequent_indent=space, break_long_words=False)

@@ -1,0 +1,124 @@
+"""``liquid-study devices``: list, doctor and calibrate, as they are typed."""
+
+import json
+import os
+
+import numba
+import pytest
+from click.testing import CliRunner
+
+if numba.config.DISABLE_JIT:
+    pytest.skip("devices are C functions", allow_module_level=True)
+
+from study_app.cli import commands
+from study_app.devices import list_devices
+from study_app.devices.falcon.calibration import calibration_file, load
+from study_app.devices.falcon.diagnosis import MODES, UDEV_RULE
+from study_app.devices.falcon.doctor import examine
+from study_app.devices.falcon.emulator import Emulator
+
+
+def liquid_study(*words, **options):
+    return CliRunner().invoke(commands, ["devices", *words], **options)
+
+
+@pytest.fixture(autouse=True)
+def own_settings(tmp_path, monkeypatch):
+    monkeypatch.setenv("LIQUID_STUDY_CONFIG", str(tmp_path / "settings"))
+
+
+@pytest.mark.parametrize("words", [(), ("list",)])
+def test_the_list_names_every_device_with_what_it_can_do(words):
+    listed = liquid_study(*words)
+    assert listed.exit_code == 0
+    for name in (*list_devices(), "falcon-socket:PATH"):
+        assert f"\n{name} " in "\n" + listed.output
+    assert "seen, not felt" in listed.output
+    assert "libusb" in listed.output
+
+
+class TestDoctor:
+    def test_a_falcon_in_order_is_told_so(self):
+        told = liquid_study("doctor", "--device", "falcon-emulated")
+        assert told.exit_code == 0, told.output
+        assert "Nothing is wrong with it." in told.output
+        assert told.output.count(" ok ") >= 15
+        assert "FOUND" not in told.output
+
+    def test_modes_stand_in_their_order_with_cause_and_cure(self):
+        told = liquid_study("doctor", "--device", "falcon-emulated", "--fault", "never-homes")
+        assert told.exit_code == 3
+        places = [told.output.index(f"{number:>2}  ") for number in range(1, len(MODES) + 1)]
+        assert places == sorted(places)
+        found = told.output.split("FOUND")
+        assert len(found) == 2
+        assert "does not home" in found[1]
+        assert "cause: not every arm has passed its index" in found[1]
+        assert "cure: push the grip fully in" in found[1]
+
+    def test_the_rule_to_paste_stands_in_one_line(self, monkeypatch):
+        monkeypatch.setattr("sys.platform", "linux")
+        told = liquid_study("doctor", "--device", "falcon-emulated", "--fault", "access-denied")
+        assert told.exit_code == 3
+        assert f"\necho '{UDEV_RULE}' | sudo tee /etc/udev/rules.d/60-falcon.rules && " in told.output
+
+    def test_two_faults_at_once_are_both_found(self):
+        told = liquid_study("doctor", "--device", "falcon-emulated", "--fault", "drop=0.02", "--fault", "corrupt=0.02")
+        assert told.exit_code == 3
+        assert "FOUND          it trembles" in told.output
+
+    def test_a_device_without_wires_is_not_looked_at(self):
+        refused = liquid_study("doctor", "--device", "scripted")
+        assert "'scripted' is none" in str(refused.exception)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no Unix sockets")
+class TestDoctorOverASocket:
+    def serving(self, tmp_path, *faults):
+        from study_app.devices.falcon.emulator_server import EmulatorServer
+
+        emulator = Emulator(running=True)
+        for fault in faults:
+            emulator.take(fault)
+        return EmulatorServer(emulator, tmp_path / "falcon")
+
+    def test_one_that_is_refused(self, tmp_path):
+        with self.serving(tmp_path, "busy"):
+            told = liquid_study("doctor", "--device", f"falcon-socket:{tmp_path / 'falcon'}")
+        assert told.exit_code == 3
+        assert "cause: another program holds it" in told.output
+
+    def test_nobody_there(self, tmp_path):
+        told = liquid_study("doctor", "--device", f"falcon-socket:{tmp_path / 'falcon'}")
+        assert told.exit_code == 3
+        assert "cause: none is connected" in told.output
+
+    def test_one_that_answers_is_homed_and_turned(self, tmp_path):
+        with self.serving(tmp_path):
+            examined = examine(f"falcon-socket:{tmp_path / 'falcon'}", tell=str, seconds=0.25)
+        assert examined.facts.program == "running"
+        assert examined.facts.homed == 0b111
+        assert examined.facts.rate_hz > 0  # how fast is this machine's affair
+
+
+class TestCalibrate:
+    def test_what_an_emulated_one_weighs_is_kept_by_its_number(self, tmp_path):
+        told = liquid_study("calibrate", "--device", "falcon-emulated", "--grams", "400")
+        assert told.exit_code == 0, told.output
+        assert "Hang the weight of 400 g" in told.output
+        assert "motor units for a newton metre" in told.output
+        assert len([line for line in told.output.splitlines() if " +0.0" in line or " -0.0" in line]) >= 20
+        file = calibration_file("EMULATED-WEIGHED")
+        assert str(file) in told.output
+        assert json.loads(file.read_text())["poses"] == 20
+        assert load("EMULATED-WEIGHED").units_per_nm == pytest.approx(6616, rel=0.01)
+        assert load("EMULATED") is None  # rehearsals do not use it
+
+    @pytest.mark.parametrize("words", [(), ("--grams", "400", "--scale"), ("--grams", "4000"), ("--grams", "heavy")])
+    def test_what_cannot_be_weighed_with_is_refused_at_once(self, words):
+        assert liquid_study("calibrate", "--device", "falcon-emulated", *words).exit_code == 2
+
+    def test_only_a_falcon_is_calibrated(self):
+        assert "no motors" in str(liquid_study("calibrate", "--device", "mouse", "--grams", "400").exception)
+        refused = liquid_study("calibrate", "--device", "falcon-emulated", "--scale")
+        assert "--grams" in str(refused.exception)
