@@ -61,7 +61,7 @@ def design(protocol: str, participants: int, seed: int) -> None:
     default="mouse",
     show_default=True,
     metavar="NAME",
-    help="mouse, falcon, scripted, falcon-emulated or falcon-socket:PATH.",
+    help="mouse, falcon, falcon:SERIAL, spacemouse, scripted, falcon-emulated or falcon-socket:PATH; see devices.",
 )
 @FIRMWARE
 @click.option("--language", metavar="LANG", help="Default: the protocol's first.")
