@@ -106,7 +106,7 @@ def signed(differences: Array, zeros: Zeros = "wilcox") -> tuple[Whole, Array]:
     """Return the (doubled) ranks and the signs of the differences that are not 0."""
     kept = differences != 0.0
     ranked = differences[kept] if zeros == "wilcox" else differences
-    # Differences of decimals that should tie differ in the last bit: 1.3 - 1.06 and 1.29 - 1.05.
+    # Differences of decimals that should tie differ in the last bit: 0.3 - 0.1 and 0.2.
     ranks = (
         np.rint(2 * rankdata(np.round(np.abs(ranked), 9))).astype(np.int64) if len(ranked) else np.zeros(0, np.int64)
     )

@@ -83,23 +83,22 @@ def fit(
     gap = float(np.diff(np.unique(counts.levels)).min())
     middle = (-1.0, 2.0) if threshold is None else ((threshold - low) / span,) * 2
     bounds = [middle, (np.log(gap / span / 10), np.log(10.0)), guess, lapse]
-    best: tuple[float, Array] | None = None
-    for start in _starts(counts, guess, lapse, near, low):
-        begun = np.clip(start, [bound[0] for bound in bounds], [bound[1] for bound in bounds])
-        result = minimize(
+    lows, highs = ([bound[end] for bound in bounds] for end in (0, 1))
+    results = [
+        minimize(
             _objective,
-            begun,
+            np.clip(start, lows, highs),
             (counts, shape, low, span),
             MINIMISER,
             jac=True,
             bounds=bounds,
             options={"ftol": 1e-11, "gtol": 1e-7, "maxfun": 500},
         )
-        if best is None or result.fun < best[0]:
-            best = float(result.fun), result.x
-    assert best is not None  # noqa: S101 (there is always a start)
-    place, log_width, guessed, lapsed = (float(value) for value in best[1])
-    return Curve(low + place * span, float(np.exp(log_width)) * span, guessed, lapsed, -best[0])
+        for start in _starts(counts, guess, lapse, near, low)
+    ]
+    best = min(results, key=lambda result: float(result.fun))
+    place, log_width, guessed, lapsed = (float(value) for value in best.x)
+    return Curve(low + place * span, float(np.exp(log_width)) * span, guessed, lapsed, -float(best.fun))
 
 
 def _starts(counts: Counts, guess: Bounds, lapse: Bounds, near: Curve | None, low: float) -> list[list[float]]:
