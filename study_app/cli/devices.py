@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import queue
 import sys
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from math import degrees
 from pathlib import Path
 from textwrap import fill
@@ -113,7 +115,7 @@ def calibrate(name: str, firmware: Path | None, grams: float | None, *, scale: b
     with device:
         grip = weighing.Grip(device, virtual=emulator is not None)
         weight_n = (grams or 0.0) / 1000 * weighing.GRAVITY_MPS2
-        ask = _ask_operator if emulator is None else _ask_emulator(emulator, weight_n)
+        ask = _Terminal(sys.stdin.fileno()).ask if emulator is None else _ask_emulator(emulator, weight_n)
         notes = weighing.pull(grip, ask) if grams is None else weighing.hang(grip, weight_n, ask)
         serial = device.describe()["serial"]
     found = calibration.fit(measures, notes.counts, notes.forces_n, notes.units)
@@ -122,7 +124,10 @@ def calibrate(name: str, firmware: Path | None, grams: float | None, *, scale: b
     if found.residual_n > calibration.MOST_RESIDUAL_N:
         click.echo(f"More than {calibration.MOST_RESIDUAL_N} N is unexplained: nothing was kept. Weigh again.")
         click.get_current_context().exit(EXIT_FOUND)
-    click.echo(f"Kept in {calibration.save(serial or '', found)}.")
+    if name.startswith("falcon-socket"):
+        click.echo("Nothing is kept of what answers at a socket.")
+    else:
+        click.echo(f"Kept in {calibration.save(serial or '', found)}.")
 
 
 def _falcon(name: str, firmware: Path | None, grams: float | None) -> tuple[FalconDevice, Emulator | None]:
@@ -164,22 +169,43 @@ def _calibrated(found: Calibration, notes: Notes) -> list[str]:
     return lines
 
 
-def _ask_operator(kind: str, words: str) -> Callable[[], str | None]:
-    """Ask on the terminal, while the grip is held; an end of input gives up."""
-    click.echo(words + (" " if kind == "reading" else " Then press Enter."))
-    answers: queue.SimpleQueue[str] = queue.SimpleQueue()
-    threading.Thread(target=lambda: answers.put(sys.stdin.readline()), daemon=True).start()
+class _Terminal:
+    """Lines that the operator types while the grip is held.
 
-    def answered() -> str | None:
-        try:
-            line = answers.get_nowait()
-        except queue.Empty:
-            return None
-        if not line:
-            raise click.Abort
-        return line.strip()
+    Read without Python's own buffer, whose lock a thread that still waits at the program's end would keep.
+    """
 
-    return answered
+    def __init__(self, descriptor: int) -> None:
+        self._descriptor = descriptor
+        self._lines: queue.SimpleQueue[str | None] = queue.SimpleQueue()
+        threading.Thread(target=self._listen, daemon=True).start()
+
+    def ask(self, kind: str, words: str) -> Callable[[], str | None]:
+        """Ask for an answer; the end of the input gives up. What was typed before the question does not count."""
+        if os.isatty(self._descriptor):
+            with suppress(queue.Empty):
+                while self._lines.get_nowait() is not None:
+                    pass
+        click.echo(words if kind == "reading" else f"{words} Then press Enter.")
+
+        def answered() -> str | None:
+            try:
+                line = self._lines.get_nowait()
+            except queue.Empty:
+                return None
+            if line is None:
+                raise click.Abort
+            return line.strip()
+
+        return answered
+
+    def _listen(self) -> None:
+        typed = b""
+        while more := os.read(self._descriptor, 1024):
+            *lines, typed = (typed + more).split(b"\n")
+            for line in lines:
+                self._lines.put(line.decode(errors="replace"))
+        self._lines.put(None)
 
 
 def _ask_emulator(emulator: Emulator, weight_n: float) -> Ask:

@@ -2,7 +2,10 @@
 
 import json
 import os
+import subprocess
+import sys
 
+import click
 import numba
 import pytest
 from click.testing import CliRunner
@@ -11,6 +14,7 @@ if numba.config.DISABLE_JIT:
     pytest.skip("devices are C functions", allow_module_level=True)
 
 from study_app.cli import commands
+from study_app.cli.devices import _Terminal
 from study_app.devices import list_devices
 from study_app.devices.falcon.calibration import calibration_file, load
 from study_app.devices.falcon.diagnosis import MODES, UDEV_RULE
@@ -101,6 +105,33 @@ class TestDoctorOverASocket:
         assert examined.facts.rate_hz > 0  # how fast is this machine's affair
 
 
+class TestTheTerminal:
+    @pytest.fixture
+    def pipe(self):
+        reading, writing = os.pipe()
+        with os.fdopen(writing, "wb", buffering=0) as typing:
+            yield _Terminal(reading), typing
+        os.close(reading)
+
+    def until(self, answered):
+        while (answer := answered()) is None:
+            pass
+        return answer
+
+    def test_an_answer_is_a_line_and_its_end_gives_up(self, pipe, capsys):
+        terminal, typing = pipe
+        answered = terminal.ask("reading", "What did it show?")
+        assert answered() is None
+        typing.write(b" 41")
+        typing.write(b"2 \r\n\n")
+        assert self.until(answered) == "412"
+        assert self.until(terminal.ask("hang", "Hang it.")) == ""
+        assert capsys.readouterr().out == "What did it show?\nHang it. Then press Enter.\n"
+        typing.close()
+        with pytest.raises(click.Abort):
+            self.until(answered)
+
+
 class TestCalibrate:
     def test_what_an_emulated_one_weighs_is_kept_by_its_number(self, tmp_path):
         told = liquid_study("calibrate", "--device", "falcon-emulated", "--grams", "400")
@@ -113,6 +144,20 @@ class TestCalibrate:
         assert json.loads(file.read_text())["poses"] == 20
         assert load("EMULATED-WEIGHED").units_per_nm == pytest.approx(6616, rel=0.01)
         assert load("EMULATED") is None  # rehearsals do not use it
+
+    @pytest.mark.skipif(os.name == "nt", reason="no Unix sockets")
+    def test_an_operator_who_goes_away_ends_it_without_torque(self, tmp_path):
+        from study_app.devices.falcon.emulator_server import EmulatorServer
+
+        emulator = Emulator(running=True)
+        with EmulatorServer(emulator, tmp_path / "falcon"):
+            words = ["devices", "calibrate", "--device", f"falcon-socket:{tmp_path / 'falcon'}", "--grams", "400"]
+            command = [sys.executable, "-m", "study_app", *words]
+            ended = subprocess.run(command, input="", capture_output=True, text=True, check=False)
+        assert ended.returncode == 130, ended.stderr
+        assert ended.stderr == ""
+        assert "Let go of the grip" in ended.stdout
+        assert emulator.torques == (0, 0, 0)
 
     @pytest.mark.parametrize("words", [(), ("--grams", "400", "--scale"), ("--grams", "4000"), ("--grams", "heavy")])
     def test_what_cannot_be_weighed_with_is_refused_at_once(self, words):

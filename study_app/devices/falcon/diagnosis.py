@@ -129,7 +129,7 @@ def _not_supported(facts: Facts) -> bool | None:
 def _two_drivers(facts: Facts) -> bool | None:
     if facts.platform != "win32" or facts.usb == OPEN:
         return False
-    if facts.listed is None or facts.ftdi_sees is None:
+    if facts.usb not in {"not-supported", "not-found"} or facts.listed is None or facts.ftdi_sees is None:
         return None
     return facts.listed and not facts.ftdi_sees
 

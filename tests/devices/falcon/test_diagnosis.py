@@ -71,6 +71,7 @@ class TestModes:
                 {"usb": "not-supported", "platform": "win32", "listed": True, "ftdi_sees": False},
                 ["two-drivers"],
             ),
+            ({"usb": "busy", "platform": "win32", "listed": True, "ftdi_sees": False}, ["busy"]),
             ({"usb": "busy", "platform": "linux"}, ["busy"]),
             ({"usb": "no-backend"}, ["no-libusb"]),
             ({"usb": "no-ftd2xx"}, ["no-ftd2xx"]),
