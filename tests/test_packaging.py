@@ -31,6 +31,8 @@ def test_the_wheel_contains_the_protocols_and_the_typeface(installed: Path) -> N
     assert shipped == {path.name for path in (ROOT / "protocols").glob("*.toml")}
     assert list((package / "gui" / "assets" / "fonts").glob("Inter-*"))
     assert (package / "py.typed").is_file()
+    limits = "haptics/slope_limits.csv"
+    assert (package / limits).read_bytes() == (ROOT / "study_app" / limits).read_bytes()
 
 
 def test_check_works_far_from_the_checkout(installed: Path, tmp_path: Path) -> None:

@@ -130,7 +130,7 @@ def _assume(safety: Any, sample: Any) -> None:
     safety.turn_ns = safety.usable_ns = sample.time_ns
     safety.fade = 0.0 if fades else 1.0
     safety.fade_s = START_FADE_S if fades else SCENE_FADE_S
-    safety.sent_n[:] = sample.device_force_n
+    safety.slewed_n[:] = sample.device_force_n
 
 
 @kernel

@@ -9,16 +9,23 @@ The account E begins at 0 with a scene and holds at most what the liquid can ret
     E ← min(E - f·Δp, reserve),    reserve = (4/27) c |v_wake|³ N T / scale + m |v - v_current|² / (2 scale)
 
 A wake of speed u gives a body of speed v the power c (u - v)² v, at most that at v = u/3, and it lasts for N ticks of
-T. m is the added mass and, with a history, its inertia in a sway of 1 Hz, 3πR² √(2µρ/ω) (Landau & Lifshitz, §24).
+T. m is the added mass and, with a history, its inertia in a sway of 1 Hz, 3πR² √(2µρ/ω) (Landau & Lifshitz, §24), as
+far as they are sent (`pack`).
 
-A filter that lags, a loop that is late, a force held for too long all show as E < 0. From -1 mJ on the debt D =
--1 mJ - E is paid back: what pushes along the last step is taken from the force, and damping is added until the next
-step, if it is like the last, pays D, but no stronger than the loop bears. And the whole force is kept within
+A filter that lags, a loop that is late, a force held for too long all show as E < 0. E is kept twice, for a force that
+acts at once and for one that acts as late as the loop is believed to be; the lower counts. The liquid may owe 1 mJ;
+with D = -1 mJ - E, its debt beyond that:
 
-    |f| ≤ F (1 - D / (F R)),    F, R: the strongest force and the longest step so far,
+- `weaken`: a debt of 0.25 mJ halves the force, one of 0.75 mJ halves it again, and it comes back at 50 % a second: a
+  loop that swings has its gain lowered until it does not, instead of being caught at every swing;
+- `settle`: what pushes the hand along its way may not spend in 10 ms more than is left; in debt it is let go, and
+  damping added until the next step would pay the debt, up to half the damping that the loop bears, weakened likewise.
+  The way is taken from the last 2 ms; what is slower than 40 mm/s may be a count of the encoder, and is no way yet;
+- the whole force is kept within F - D / R, F and R being the strongest force and the longest step so far. So E ≥ -1 mJ
+  - F R on any path of the hand: even the worst next step leaves D at F R.
 
-so that E ≥ -1 mJ - F R on any path of the hand: even the worst next step leaves the debt at F R. A debt is forgiven at
-1 mW, less than a hand's own damping takes at 15 mm/s: without any force none could ever be paid.
+Letting go and damping come at once, past the slew limit. A debt is forgiven at 1 mW, less than a hand's own damping
+takes at 15 mm/s: without any force none could be paid.
 """
 
 from __future__ import annotations
@@ -35,25 +42,38 @@ from study_app.haptics.layout import (
     EFFECT_LOCAL_WAKE,
     EFFECT_WAKE,
     LIMITER_ENERGY,
+    MOST_DELAY,
     Record,
 )
-from study_app.haptics.vector import clear, distance, norm
+from study_app.haptics.vector import clear, copy, distance, norm, square
 
 ALLOWANCE_J = 1e-3
+SPENDING_S = 10e-3
+HALVING_J = 0.25e-3
 FORGIVEN_W = 1e-3
 HISTORY_PERIOD_S = 1.0
+SMOOTHING_S = 2e-3
+SURE_MPS = 0.04
+BRAKE = 0.5
+RECOVERY_PER_S = 0.5
 
 
 @kernel
 def open_account(account: Record) -> None:
     """Begin at 0, with nothing sent: what came before was another liquid's."""
     account.balance_j = 0.0
+    account.late_balance_j = 0.0
+    account.turn = 0
+    for turn in range(MOST_DELAY + 1):
+        clear(account.sent_n[turn])
     clear(account.impulse_ns)
+    clear(account.late_impulse_ns)
     account.impulse_s = 0.0
-    clear(account.step_m)
-    account.interval_s = 0.0
+    clear(account.velocity_mps)
     account.longest_m = 0.0
     account.strongest_n = 0.0
+    account.gain = 1.0
+    account.settling = 0
     clear(account.lift_n)
     clear(account.lift_before_n)
 
@@ -65,23 +85,44 @@ def observe(model: Any, safety: Record, interval_s: float) -> None:
     Where several forces were sent between two samples, their mean over time counts.
     """
     parameters, state, account = model.parameters[0], model.state[0], safety.account
+    late = account.turn - parameters.delay_ticks
+    sent_n, late_n = account.sent_n[account.turn], account.sent_n[late if late >= 0 else late + MOST_DELAY + 1]
     for axis in range(3):
-        account.impulse_ns[axis] += (safety.sent_n[axis] - account.lift_n[axis]) * safety.turn_s
+        account.impulse_ns[axis] += sent_n[axis] * safety.turn_s
+        account.late_impulse_ns[axis] += late_n[axis] * safety.turn_s
     account.impulse_s += safety.turn_s
     if interval_s == 0.0:
         return
-    work_j = 0.0
+    if account.impulse_s == 0.0:  # two samples at once: no time to average over
+        account.impulse_s = 1.0
+        copy(sent_n, account.impulse_ns)
+        copy(late_n, account.late_impulse_ns)
+    share = interval_s / SMOOTHING_S
+    weight = share / (1.0 + share * (0.5 + share / 12.0))  # 1 - exp(-share), to 1 % over four milliseconds
+    per_scale, per_s = 1.0 / parameters.scale, 1.0 / interval_s
+    work_j = late_work_j = square_m2 = 0.0
     for axis in range(3):
         moved_m = state.position_m[axis] - state.previous_m[axis] - state.drift_mps[axis] * interval_s
-        account.step_m[axis] = moved_m / parameters.scale
-        if account.impulse_s > 0.0:
-            work_j -= account.impulse_ns[axis] / account.impulse_s * account.step_m[axis]
-    account.interval_s = interval_s
-    account.longest_m = max(account.longest_m, norm(account.step_m))
-    forgiven_j = FORGIVEN_W * interval_s if account.balance_j < -ALLOWANCE_J else 0.0
-    account.balance_j = min(account.balance_j + work_j + forgiven_j, reserve(model))
+        step_m = moved_m * per_scale
+        square_m2 += step_m * step_m
+        work_j -= account.impulse_ns[axis] * step_m
+        late_work_j -= account.late_impulse_ns[axis] * step_m
+        account.velocity_mps[axis] += weight * (step_m * per_s - account.velocity_mps[axis])
+    work_j /= account.impulse_s
+    late_work_j /= account.impulse_s
+    if square_m2 > account.longest_m * account.longest_m:
+        account.longest_m = math.sqrt(square_m2)
+    most_j, forgiven_j = reserve(model), FORGIVEN_W * interval_s
+    account.balance_j = min(_forgive(account.balance_j, forgiven_j) + work_j, most_j)
+    account.late_balance_j = min(_forgive(account.late_balance_j, forgiven_j) + late_work_j, most_j)
     clear(account.impulse_ns)
+    clear(account.late_impulse_ns)
     account.impulse_s = 0.0
+
+
+@part
+def _forgive(balance_j: float, forgiven_j: float) -> float:
+    return min(balance_j + forgiven_j, -ALLOWANCE_J) if balance_j < -ALLOWANCE_J else balance_j
 
 
 @part
@@ -92,16 +133,17 @@ def reserve(model: Any) -> float:
     for i in range(parameters.liquids):
         liquid, local = model.liquids[i], model.liquid_states[i]
         if local.share > 0.0:
-            speed_mps = norm(local.motion_mps)
             if liquid.effects & EFFECT_WAKE:
                 most_j += _wake_power(liquid, local) * liquid.wake.length * parameters.period_s
             if liquid.effects & EFFECT_LOCAL_WAKE:
                 most_j += _wake_power(liquid, local) * liquid.local_wake.length * parameters.period_s
             if liquid.effects & EFFECT_ADDED_MASS:
-                most_j += 0.5 * liquid.added_mass.mass_kg * local.share * speed_mps * speed_mps
+                most_j += (
+                    0.5 * liquid.inertia_share * liquid.added_mass.mass_kg * local.share * square(local.motion_mps)
+                )
             if liquid.effects & EFFECT_HISTORY:
                 inertia_kg = 0.5 * liquid.history.factor_kg_rs * local.share * math.sqrt(HISTORY_PERIOD_S)
-                most_j += 0.5 * inertia_kg * speed_mps * speed_mps
+                most_j += 0.5 * liquid.inertia_share * inertia_kg * square(local.motion_mps)
     return float(most_j / parameters.scale)
 
 
@@ -117,38 +159,81 @@ def _wake_power(liquid: Record, local: Record) -> float:
 
 
 @part
-def settle(parameters: Record, account: Record, sample: Record) -> None:
-    """Change the force about to be sent so that a debt is paid back, and cannot grow beyond one step's work."""
-    force_n, lift_n = sample.device_force_n, account.lift_n
-    debt_j = -ALLOWANCE_J - account.balance_j
-    if debt_j <= 0.0:
-        return
-    step_m = norm(account.step_m)
-    if step_m > 0.0:
-        bearable_n = parameters.slope_limit_nspm * parameters.scale * step_m / account.interval_s
-        damping_n = min(debt_j / step_m, bearable_n)
-        along_n = 0.0
+def weaken(parameters: Record, account: Record, sample: Record) -> None:
+    """Send a share of the force, halved by every halving debt, and all of it again only seconds after the last."""
+    left_j = ALLOWANCE_J + min(account.balance_j, account.late_balance_j)
+    account.gain = min(account.gain * (1.0 + RECOVERY_PER_S * parameters.period_s), 1.0)
+    if left_j < 0.0:
+        account.gain = min(account.gain, HALVING_J / (HALVING_J - left_j))
+    if account.gain < 1.0:
+        sample.limiters |= LIMITER_ENERGY
         for axis in range(3):
-            along_n += (force_n[axis] - lift_n[axis]) * account.step_m[axis] / step_m
-        if along_n > -damping_n:
-            sample.limiters |= LIMITER_ENERGY
-            for axis in range(3):
-                force_n[axis] -= (along_n + damping_n) * account.step_m[axis] / step_m
-    most_n = max(account.strongest_n - debt_j / account.longest_m, 0.0)
-    _keep_within(most_n, force_n, lift_n, sample)
+            lift_n = account.lift_n[axis]
+            sample.device_force_n[axis] = lift_n + (sample.device_force_n[axis] - lift_n) * account.gain
 
 
 @part
-def _keep_within(most_n: float, force_n: Any, lift_n: Any, sample: Record) -> None:
-    """Shorten the force, buoyancy aside, to ``most_n``."""
-    size_n = distance(force_n, lift_n)
-    if size_n > most_n:
+def settle(parameters: Record, account: Record, sample: Record) -> None:
+    """Change the force about to be sent so that a debt is paid back, and cannot grow beyond one step's work."""
+    left_j = ALLOWANCE_J + min(account.balance_j, account.late_balance_j)
+    given = _give_way(parameters, account, left_j, sample.device_force_n)
+    kept = left_j < 0.0 and _keep_within(
+        max(account.strongest_n + left_j / account.longest_m, 0.0), account, sample.device_force_n
+    )
+    changed = given or kept
+    if changed or account.settling:  # the turn after, too: the force comes back
         sample.limiters |= LIMITER_ENERGY
-        for axis in range(3):
-            force_n[axis] = lift_n[axis] + (force_n[axis] - lift_n[axis]) * most_n / size_n
+    account.settling = changed
+
+
+@part
+def _keep_within(most_n: float, account: Record, force_n: Any) -> bool:
+    """Shorten the force, buoyancy aside, to ``most_n``; return whether it was longer."""
+    lift_n = account.lift_n
+    size_n = distance(force_n, lift_n)
+    if size_n <= most_n:
+        return False
+    for axis in range(3):
+        force_n[axis] = lift_n[axis] + (force_n[axis] - lift_n[axis]) * most_n / size_n
+    return True
+
+
+@part
+def _give_way(parameters: Record, account: Record, left_j: float, force_n: Any) -> bool:
+    """Let go of what pushes the hand along its way faster than what is left may be spent; in debt, add damping.
+
+    Return whether the force was changed.
+    """
+    v_mps, lift_n = account.velocity_mps, account.lift_n
+    square_mps2 = square(v_mps)
+    if square_mps2 <= SURE_MPS * SURE_MPS:
+        return False
+    power_w = 0.0
+    for axis in range(3):
+        power_w += (force_n[axis] - lift_n[axis]) * v_mps[axis]
+    if left_j >= 0.0 and power_w * SPENDING_S <= left_j:
+        return False
+    speed_mps = math.sqrt(square_mps2)
+    along_n = power_w / speed_mps
+    if left_j >= 0.0:
+        wanted_n = left_j / (SPENDING_S * speed_mps)
+    else:
+        bearable_n = BRAKE * account.gain * parameters.slope_limit_nspm * parameters.scale * speed_mps
+        wanted_n = -min(-left_j / (parameters.period_s * speed_mps), bearable_n)
+    if along_n <= wanted_n:
+        return False
+    excess_n = min(speed_mps / SURE_MPS - 1.0, 1.0) * (along_n - wanted_n)
+    for axis in range(3):
+        force_n[axis] -= excess_n * v_mps[axis] / speed_mps
+    return True
 
 
 @part
 def remember(account: Record, force_n: Any) -> None:
-    """Keep the strongest force that was ever sent, buoyancy aside."""
-    account.strongest_n = max(account.strongest_n, distance(force_n, account.lift_n))
+    """Keep the force that is sent, buoyancy aside."""
+    account.turn = account.turn + 1 if account.turn < MOST_DELAY else 0
+    sent_n = account.sent_n[account.turn]
+    for axis in range(3):
+        sent_n[axis] = force_n[axis] - account.lift_n[axis]
+    if square(sent_n) > account.strongest_n * account.strongest_n:
+        account.strongest_n = norm(sent_n)

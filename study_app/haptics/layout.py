@@ -128,6 +128,7 @@ PARAMETERS = np.dtype(
         ("knee_threshold_mps", np.float64),
         ("slope_limit_nspm", np.float64),  # greatest |drag| / |relative velocity| [N·s/m, scene]
         ("force_limit_n", np.float64),
+        ("delay_ticks", np.int64),  # how many turns late a force is believed to act
     ],
     align=True,
 )
@@ -144,6 +145,7 @@ REGION = np.dtype(
 LIQUID = np.dtype(
     [
         ("effects", np.int64),
+        ("inertia_share", np.float64),  # how much of added mass and history the loop bears
         ("region", REGION),
         ("drag", DRAG),
         ("wake", WAKE),
@@ -209,15 +211,22 @@ LIQUID_STATE = np.dtype(
 )
 
 # The energy that hand and liquid owe each other, at the hand (haptics.energy).
+MOST_DELAY = 4  # turns that a force may be late
+
 ACCOUNT = np.dtype(
     [
-        ("balance_j", np.float64),  # E: what the hand put in and did not get back yet
-        ("impulse_ns", np.float64, (3,)),  # force sent · time since the last sample, without buoyancy and weight [N·s]
-        ("impulse_s", np.float64),  # that time
-        ("step_m", np.float64, (3,)),  # the hand's last step, in the frame of the current
-        ("interval_s", np.float64),  # how long it took
+        ("balance_j", np.float64),  # E: what the hand put in and did not get back yet, were forces to act at once
+        ("late_balance_j", np.float64),  # the same, if they act as late as the loop is believed to be
+        ("turn", np.int64),  # the row of the newest force below
+        ("sent_n", np.float64, (MOST_DELAY + 1, 3)),  # forces of the last turns, without buoyancy and weight
+        ("impulse_ns", np.float64, (3,)),  # such a force times time, summed since the last sample [N·s]
+        ("late_impulse_ns", np.float64, (3,)),  # the same of late forces
+        ("impulse_s", np.float64),  # the time since then
+        ("velocity_mps", np.float64, (3,)),  # the hand's in the frame of the current, smoothed over 2 ms
         ("longest_m", np.float64),  # the longest step so far
-        ("strongest_n", np.float64),  # the strongest force sent so far, without buoyancy and weight
+        ("strongest_n", np.float64),  # the strongest force so far
+        ("gain", np.float64),  # share of the force that is sent
+        ("settling", np.int64),  # 1 if the force of the last turn was changed to pay a debt
         ("lift_n", np.float64, (3,)),  # buoyancy and weight in the force that is sent
         ("lift_before_n", np.float64, (3,)),  # the same of the turn before
     ],
@@ -237,7 +246,7 @@ SAFETY = np.dtype(
         ("fade", np.float64),  # share of the force that is sent, 0 … 1
         ("fade_s", np.float64),  # how long a fade from 0 to 1 takes at present
         ("device_limit_n", np.float64),  # the device's own force limit
-        ("sent_n", np.float64, (3,)),  # the force of the last turn
+        ("slewed_n", np.float64, (3,)),  # the force of the last turn, before the energy account changed it
         ("account", ACCOUNT),  # begins anew with each scene
     ],
     align=True,

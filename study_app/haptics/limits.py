@@ -1,40 +1,119 @@
-"""What damping a sampled loop bears: the table behind the slope limit, which knows nothing of compiled code."""
+"""What damping a sampled loop bears: the table behind the slope limit, which knows nothing of compiled code.
+
+The table is ``slope_limits.csv`` beside this file, measured by ``evaluation.stability_boundary`` on the servo's own
+tick; how its numbers follow from the measurement is said there.
+"""
 
 from __future__ import annotations
 
-from typing import Final
+import csv
+from functools import cache
+from importlib import resources
+from typing import Final, NamedTuple
 
 from study_app.errors import StudyError
+from study_app.haptics.scene import Ewma, Velocity
 
-# Greatest damping a free 0.1 kg handle bears [N·s/m at the hand], over tick period [s] and delay [ticks].
-SLOPE_LIMITS: Final = (
-    (0.5e-3, 4, 40.0),
-    (1e-3, 1, 60.0),
-    (1e-3, 2, 40.0),
-    (1e-3, 4, 20.0),
-    (2e-3, 1, 30.0),
-    (2e-3, 2, 20.0),
-    (2e-3, 4, 10.0),
-    (4e-3, 1, 15.0),
-    (4e-3, 2, 10.0),
-    (4e-3, 4, 6.0),
-)
+SLOWEST_HZ: Final = 500.0
+"""Slower servos are for trying out: what participants would feel there is the limits rather than the liquids."""
 
 
-def slope_limit(period_s: float, delay_ticks: int) -> float:
-    """Return the greatest damping at the hand [N·s/m] for a tick period [s] and a delay of the loop [ticks].
+INERTIA_SHARE: Final = 0.3
+"""Of the limit on drag, for added mass and history, where they need not be felt as they are."""
 
-    The best of the table's entries that are no faster and no less delayed: between two, the worse one counts.
+_THESIS: Final = Ewma()
+_SAME: Final = 1e-9  # of two periods that differ by rounding alone
+
+
+class Bearable(NamedTuple):
+    """The greatest damping [N·s/m at the hand] that a loop bears of drag, and of added mass and history beside it."""
+
+    drag_nspm: float
+    inertia_nspm: float
+
+
+class Entry(NamedTuple):
+    """One line of the table: a velocity estimator, a tick period and a delay, and what a loop of that kind bears."""
+
+    estimator: str
+    period_s: float
+    delay_ticks: int
+    bearable: Bearable
+
+
+def slope_limit(period_s: float, delay_ticks: int, velocity: Velocity = _THESIS) -> float:
+    """Return the greatest damping of drag [N·s/m at the hand]; see `bearable`."""
+    return bearable(period_s, delay_ticks, velocity).drag_nspm
+
+
+def bearable(period_s: float, delay_ticks: int, velocity: Velocity = _THESIS) -> Bearable:
+    """Return what a loop bears that has a tick period [s], a delay [ticks] and a velocity estimator.
+
+    Between two entries of the table the worse one counts, and of delays the next longer; beyond the fastest, less in
+    the ratio of the periods. The table holds each estimator as it comes; one that is set to smooth less is also held to
+    what the raw difference bears. A given velocity comes from no estimator; it is taken as the thesis' own, "ewma".
 
     Raises
     ------
     StudyError
         A loop slower or more delayed than any entry.
     """
-    known = [limit for period, delay, limit in SLOPE_LIMITS if period >= period_s * (1 - 1e-9) and delay >= delay_ticks]
-    if not known:
+    found = [one for name in _names(velocity) for one in _neighbours(name, period_s, delay_ticks)]
+    if not found:
         raise StudyError(
             f"no stable force is known for {1 / period_s:g} ticks a second with {delay_ticks} ticks of delay: "
             "run at 250 Hz or more, with a delay of 4 ticks at most"
         )
-    return max(known)
+    beyond = min(1.0, period_s / min(entry.period_s for entry in table()))
+    return Bearable(*(beyond * min(limits) for limits in zip(*found, strict=True)))
+
+
+def _names(velocity: Velocity) -> tuple[str, ...]:
+    """Return the estimators of the table that bound this one."""
+    if velocity.kind == "given":
+        return ("ewma",)
+    usual = type(velocity)()
+    noisier = (
+        getattr(velocity, "alpha", 0.0) > getattr(usual, "alpha", 0.0)
+        or getattr(velocity, "samples", 0) < getattr(usual, "samples", 0)
+        or getattr(velocity, "tolerance_m", 0.0) < getattr(usual, "tolerance_m", 0.0)
+    )
+    return (velocity.kind, "raw") if noisier else (velocity.kind,)
+
+
+def _neighbours(name: str, period_s: float, delay_ticks: int) -> list[Bearable]:
+    """Return what an estimator bears at the next longer delay, at the next slower and the next faster rate."""
+    known = [entry for entry in table() if entry.estimator == name and entry.delay_ticks >= delay_ticks]
+    delay_ticks = min((entry.delay_ticks for entry in known), default=0)
+    periods_s = {entry.period_s for entry in known}
+    slower_s = [known_s for known_s in periods_s if known_s >= period_s * (1 - _SAME)]
+    faster_s = [known_s for known_s in periods_s if known_s <= period_s * (1 + _SAME)]
+    if not slower_s:
+        return []
+    beside_s = {min(slower_s), max(faster_s, default=min(slower_s))}
+    return [entry.bearable for entry in known if entry.delay_ticks == delay_ticks and entry.period_s in beside_s]
+
+
+@cache
+def table() -> tuple[Entry, ...]:
+    """Return the table as it ships."""
+    with (resources.files("study_app.haptics") / "slope_limits.csv").open(encoding="utf-8") as file:
+        return tuple(
+            Entry(
+                row["estimator"],
+                float(row["period_ms"]) * 1e-3,
+                int(row["delay_ticks"]),
+                Bearable(float(row["drag_nspm"]), float(row["inertia_nspm"])),
+            )
+            for row in csv.DictReader(file)
+        )
+
+
+def refuses(rate_hz: float) -> str | None:
+    """Return why a servo of this rate must not run a participant, in a sentence; None where it may."""
+    if rate_hz >= SLOWEST_HZ:
+        return None
+    return (
+        f"the servo turns {rate_hz:g} times a second, and below {SLOWEST_HZ:g} the limits that keep it stable are felt "
+        "instead of the liquids: set device.rate_hz to 1000"
+    )

@@ -12,7 +12,7 @@ from study_app.errors import StudyError
 from study_app.haptics.compiled import kernel
 from study_app.haptics.door import clamp, place
 from study_app.haptics.layout import ESTIMATOR_GIVEN, SAMPLE, Record, records
-from study_app.haptics.limits import slope_limit
+from study_app.haptics.limits import bearable
 from study_app.haptics.motion import Motion, read
 from study_app.haptics.pack import pack
 from study_app.haptics.safety import guard, new_safety
@@ -47,11 +47,12 @@ def simulate(scene: Scene, path: Motion | str | os.PathLike[str]) -> Table:
         The motion cannot be read, or the scene wants a given velocity and there is none.
     """
     motion = path if isinstance(path, Motion) else read(Path(path))
+    estimator = scene.velocity
     if motion.velocity_mps is not None:
         scene = scene.model_copy(update={"velocity": Given()})
     elif isinstance(scene.velocity, Given):
         raise StudyError("the scene takes the velocity as given, but the motion has no vx_mps, vy_mps, vz_mps")
-    model = pack(scene, slope_limit_nspm=slope_limit(1e-3, 1))
+    model = pack(scene, limits=bearable(1e-3, 1, estimator))
     safety = new_safety()
     safety[0].fade = 1.0
     samples = records(SAMPLE, len(motion.t_s))

@@ -13,7 +13,7 @@ from study_app.haptics import layout
 from study_app.haptics.effects import records
 from study_app.haptics.effects.fill import GRAVITY_MPS2, WAKE_RATE_HZ, Rows, fill, most_rows, rows_of, volume_m3
 from study_app.haptics.gate import resolve
-from study_app.haptics.limits import slope_limit
+from study_app.haptics.limits import INERTIA_SHARE, Bearable, bearable
 from study_app.haptics.scene import MAX_LIQUIDS, MAX_WINDOW, Ewma, Foaw, Given, Line, Scene
 
 _ESTIMATORS = {
@@ -54,12 +54,13 @@ def window_needed(scene: Scene) -> int:
     return scene.velocity.samples if isinstance(scene.velocity, Line | Foaw) else 0
 
 
-def pack(scene: Scene, *, capacity: int | None = None, slope_limit_nspm: float | None = None) -> Model:
+def pack(scene: Scene, *, capacity: int | None = None, limits: Bearable | None = None, delay_ticks: int = 1) -> Model:
     """Return the memory of ``scene``; where it leaves the choice of effects, ``gate`` makes it.
 
     ``capacity`` is the least number of wake rows to own, with room for any number of liquids, so that other scenes fit
-    in later (`pack_into`); by default the model owns exactly what the scene calls for. ``slope_limit_nspm`` is the
-    greatest damping at the hand; by default that of one tick of delay at the scene's rate.
+    in later (`pack_into`); by default the model owns exactly what the scene calls for. ``delay_ticks`` is how late a
+    force is believed to act, ``limits`` the greatest damping at the hand; by default what a loop of the scene's rate,
+    estimator and this delay bears.
     """
     scene = resolve(scene)
     rows = _rows_needed(scene)
@@ -78,7 +79,7 @@ def pack(scene: Scene, *, capacity: int | None = None, slope_limit_nspm: float |
         intervals=layout.records(records.INTERVAL, rows.intervals),
         exponentials=layout.records(records.EXPONENTIAL, rows.exponentials),
     )
-    _fill(model, scene, slope_limit(1 / scene.rate_hz, 1) if slope_limit_nspm is None else slope_limit_nspm)
+    _fill(model, scene, limits or bearable(1 / scene.rate_hz, delay_ticks, scene.velocity), delay_ticks)
     return model
 
 
@@ -109,14 +110,14 @@ def pack_into(model: Model, scene: Scene, *, delay_ticks: int = 1) -> None:
             f"the scene needs {rows.cells} cells of local wakes and {rows.intervals} intervals of histories; the model "
             f"was packed with room for {len(model.cells)} and {len(model.intervals)}: pack it with a capacity"
         )
-    _fill(model, scene, slope_limit(1 / scene.rate_hz, delay_ticks))
+    _fill(model, scene, bearable(1 / scene.rate_hz, delay_ticks, scene.velocity), delay_ticks)
 
 
 def _rows_needed(scene: Scene) -> Rows:
     return reduce(Rows.plus, (rows_of(liquid, scene.rate_hz) for liquid in scene.liquids), Rows())
 
 
-def _fill(model: Model, scene: Scene, slope_limit_nspm: float) -> None:
+def _fill(model: Model, scene: Scene, limits: Bearable, delay_ticks: int) -> None:
     """Write constants and a fresh state."""
     for rows in (model.parameters, model.liquids, model.state, model.liquid_states):
         rows.view(np.uint8)[:] = 0
@@ -136,10 +137,28 @@ def _fill(model: Model, scene: Scene, slope_limit_nspm: float) -> None:
         parameters.tolerance_m = scene.velocity.tolerance_m * scene.scale
     parameters.knee_law = _KNEES[scene.knee.law]
     parameters.knee_threshold_mps = scene.knee.threshold_mps
-    parameters.slope_limit_nspm = slope_limit_nspm / scene.scale
+    parameters.slope_limit_nspm = limits.drag_nspm / scene.scale
     parameters.force_limit_n = scene.force_limit_n
+    parameters.delay_ticks = delay_ticks
     first = Rows()
     for record, liquid in zip(model.liquids, scene.liquids, strict=False):
         fill(record, liquid, scene, first)
+        record.inertia_share = _inertia_share(record, limits, scene.scale)
         first = first.plus(rows_of(liquid, scene.rate_hz))
         parameters.effects |= record.effects
+
+
+def _inertia_share(record: layout.Record, limits: Bearable, scale: float) -> float:
+    """Return how much of added mass and history the loop bears, as the damper that fast motion meets in them.
+
+    An added mass M smoothed over τ is a damper M/τ, a history H smoothed likewise one of about 0.4 H/√τ at the
+    frequency where a loop becomes unstable. What does not fit whole is cut down to what any loop bears. [choice]
+    """
+    damping_nspm = 0.0
+    if record.effects & layout.EFFECT_ADDED_MASS and math.isfinite(record.added_mass.filter_per_s):
+        damping_nspm += record.added_mass.mass_kg * record.added_mass.filter_per_s
+    if record.effects & layout.EFFECT_HISTORY and math.isfinite(record.history.filter_per_s):
+        damping_nspm += 0.7 * record.history.factor_kg_rs * math.sqrt(record.history.filter_per_s)
+    if damping_nspm * scale <= limits.inertia_nspm:
+        return 1.0
+    return min(limits.inertia_nspm, INERTIA_SHARE * limits.drag_nspm) / (damping_nspm * scale)

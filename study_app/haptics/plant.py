@@ -24,9 +24,7 @@ import numpy as np
 
 from study_app.errors import StudyError
 from study_app.haptics.compiled import kernel
-from study_app.haptics.layout import records
-
-MOST_DELAY = 4
+from study_app.haptics.layout import MOST_DELAY, records
 
 HANDLE = np.dtype(
     [

@@ -1,7 +1,9 @@
 """What is sent to the hand: always the last step of a turn, in the hand frame [N].
 
-Order: slope limit on drag, finite, norm, fade, slew, energy, norm; a force stop or a fault goes past all of them to
-zero. ``lift_n``, what of the force is buoyancy and weight, is shortened along with it: the energy account needs it.
+Order: slope limits on drag and inertia, finite, norm, fade, the energy account's weakening, slew, its settling, norm; a
+force stop or a fault goes past all of them to zero. The slew limit counts from the force of the turn before as it was
+without the settling: a brake that it remembered would go on acting after its time, and drive what it should damp.
+``lift_n``, what of the force is buoyancy and weight, is shortened along with it: the energy account needs it.
 """
 
 from __future__ import annotations
@@ -10,9 +12,12 @@ import math
 from typing import Any
 
 from study_app.haptics.compiled import kernel, part
-from study_app.haptics.energy import observe, open_account, remember, settle
+from study_app.haptics.energy import observe, open_account, remember, settle, weaken
 from study_app.haptics.layout import (
+    EFFECT_ADDED_MASS,
     EFFECT_DRAG,
+    EFFECT_HISTORY,
+    LIMITER_ENERGY,
     LIMITER_FADE,
     LIMITER_NON_FINITE,
     LIMITER_NORM,
@@ -24,18 +29,20 @@ from study_app.haptics.layout import (
     Record,
     records,
 )
-from study_app.haptics.vector import clear, copy, distance, is_finite, norm, square, square_distance
+from study_app.haptics.vector import clear, copy, distance, dot, is_finite, norm, square, square_distance
 
 START_FADE_S = 0.5
 SCENE_FADE_S = 0.05
 FADE_OUT_S = 0.045
 SLEW_N = 0.5
+SLEW_S = 1e-3
 
 
 def new_safety(device_limit_n: float = math.inf) -> Any:
     """Return one SAFETY record, shape (1,), for a servo that is about to start: no force yet, 500 ms to full force."""
     safety = records(SAFETY, 1)
     safety[0].fade_s = START_FADE_S
+    open_account(safety[0].account)
     safety[0].device_limit_n = device_limit_n
     return safety
 
@@ -61,6 +68,7 @@ def guard(model: Any, safety: Record, sample: Record, interval_s: float) -> None
     copy(state.force_n, force_n)
     copy(state.lift_n, lift_n)
     _limit_slope(model, sample)
+    _limit_inertia(model, sample)
     if not (is_finite(force_n) and is_finite(lift_n)):
         sample.limiters |= LIMITER_NON_FINITE
         sample.status = STATUS_NON_FINITE
@@ -69,13 +77,15 @@ def guard(model: Any, safety: Record, sample: Record, interval_s: float) -> None
     limit_n = min(parameters.force_limit_n, safety.device_limit_n)
     _limit_norm(force_n, lift_n, limit_n, sample)
     _fade(force_n, lift_n, safety, sample)
-    _limit_slew(force_n, account, safety, sample)
+    weaken(parameters, account, sample)
+    _limit_slew(force_n, parameters, state, safety, sample)
+    copy(force_n, safety.slewed_n)
     settle(parameters, account, sample)
     _limit_norm(force_n, lift_n, limit_n, sample)
     if safety.stop != 0 or safety.fault != 0:
         _let_go(force_n, safety, sample)
         clear(lift_n)
-    copy(force_n, safety.sent_n)
+        clear(safety.slewed_n)
     remember(account, force_n)
 
 
@@ -98,6 +108,21 @@ def _limit_slope(model: Any, sample: Record) -> None:
                 excess = 1.0 - most_nspm * norm(local.relative_mps) / norm(local.drag.force_n)
                 for axis in range(3):
                     sample.device_force_n[axis] -= excess * local.drag.force_n[axis]
+
+
+@part
+def _limit_inertia(model: Any, sample: Record) -> None:
+    """Weaken added mass and history to what the loop bears (`pack`): fast motion meets them as dampers, too."""
+    for i in range(model.parameters[0].liquids):
+        liquid, local = model.liquids[i], model.liquid_states[i]
+        excess = 1.0 - liquid.inertia_share
+        if excess > 0.0 and local.share > 0.0:
+            sample.limiters |= LIMITER_SLOPE
+            for axis in range(3):
+                if liquid.effects & EFFECT_ADDED_MASS:
+                    sample.device_force_n[axis] -= excess * local.added_mass.force_n[axis]
+                if liquid.effects & EFFECT_HISTORY:
+                    sample.device_force_n[axis] -= excess * local.history.force_n[axis]
 
 
 @part
@@ -131,15 +156,29 @@ def _fade(force_n: Any, lift_n: Any, safety: Record, sample: Record) -> None:
 
 
 @part
-def _limit_slew(force_n: Any, account: Record, safety: Record, sample: Record) -> None:
-    """Let the force move by at most 0.5 N from the one sent before."""
-    if square_distance(force_n, safety.sent_n) > SLEW_N * SLEW_N:
-        sample.limiters |= LIMITER_SLEW
-        share = SLEW_N / distance(force_n, safety.sent_n)
-        lift_n, before_n = account.lift_n, account.lift_before_n
+def _limit_slew(force_n: Any, parameters: Record, state: Record, safety: Record, sample: Record) -> None:
+    """Let the force move by at most 0.5 N from the one sent before, but never push the hand on for that reason alone.
+
+    A loop slower than 1 kHz gets 0.5 N a millisecond. A force that is late to let go at a reversal would do work on the
+    hand: what of it lies along the motion, and is not wanted there, is dropped at once.
+    """
+    most_n = SLEW_N * max(parameters.period_s / SLEW_S, 1.0)
+    if square_distance(force_n, safety.slewed_n) <= most_n * most_n:
+        return
+    sample.limiters |= LIMITER_SLEW
+    account = safety.account
+    v_mps, lift_n, before_n = state.estimate_mps, account.lift_n, account.lift_before_n
+    wanted_nmps = dot(force_n, v_mps)
+    share = most_n / distance(force_n, safety.slewed_n)
+    for axis in range(3):
+        force_n[axis] = safety.slewed_n[axis] + (force_n[axis] - safety.slewed_n[axis]) * share
+        lift_n[axis] = before_n[axis] + (lift_n[axis] - before_n[axis]) * share
+    excess_nmps = dot(force_n, v_mps) - max(wanted_nmps, 0.0)
+    if excess_nmps > 0.0:
         for axis in range(3):
-            force_n[axis] = safety.sent_n[axis] + (force_n[axis] - safety.sent_n[axis]) * share
-            lift_n[axis] = before_n[axis] + (lift_n[axis] - before_n[axis]) * share
+            force_n[axis] -= excess_nmps * v_mps[axis] / square(v_mps)
+        if square_distance(force_n, safety.slewed_n) > most_n * most_n:
+            sample.limiters |= LIMITER_ENERGY
 
 
 @part

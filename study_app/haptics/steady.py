@@ -31,7 +31,11 @@ def steady(scene: Scene, hand_mps: float = HAND_MPS) -> Steady:
     if "drag" not in liquid.effects:
         return Steady(0.0, 0.0, None)
     drag_n = resistance_n(scene, liquid, lowered_mps(scene.scale * hand_mps, scene.knee), liquid.drag.law)
-    slope_n = slope_limit(1 / scene.rate_hz, 1) * lowered_mps(scene.scale * hand_mps, scene.knee) / scene.scale
+    slope_n = (
+        slope_limit(1 / scene.rate_hz, 1, scene.velocity)
+        * lowered_mps(scene.scale * hand_mps, scene.knee)
+        / scene.scale
+    )
     force_n = min(drag_n, slope_n, scene.force_limit_n)
     if force_n == drag_n:
         return Steady(force_n, drag_n, None)

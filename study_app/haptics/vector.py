@@ -43,6 +43,12 @@ def square(vector: Any) -> float:
 
 
 @part
+def dot(a: Any, b: Any) -> float:
+    """Return a · b."""
+    return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
+
+
+@part
 def distance(a: Any, b: Any) -> float:
     """Return the length of a − b."""
     x, y, z = a[0] - b[0], a[1] - b[1], a[2] - b[2]

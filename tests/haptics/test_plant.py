@@ -12,8 +12,9 @@ if numba.config.DISABLE_JIT:
     pytest.skip("too many sub-steps for plain Python", allow_module_level=True)
 
 from study_app.errors import StudyError
+from study_app.haptics.layout import MOST_DELAY
 from study_app.haptics.pace import new_pace, next_turn
-from study_app.haptics.plant import MOST_DELAY, SUB_STEP_S, let_go, measure, move, new_handle, push
+from study_app.haptics.plant import SUB_STEP_S, let_go, measure, move, new_handle, push
 
 STILL = np.zeros(3)
 

@@ -55,7 +55,7 @@ def test_the_limits_that_the_cases_above_meet():
 
 def test_tar_is_clipped_by_the_slope_limit():
     tar = steady(scene_of("tar", 3))
-    assert (tar.force_n, tar.limit) == (pytest.approx(6.0), "slope")
+    assert (tar.force_n, tar.limit) == (pytest.approx(5.3), "slope")
     assert tar.drag_n > 19
 
 
