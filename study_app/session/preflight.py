@@ -9,6 +9,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
+from study_app.haptics.limits import refuses
 from study_app.haptics.telemetry import Timing
 from study_app.protocol.describe import expected_duration_s
 from study_app.protocol.model import Protocol
@@ -87,6 +88,9 @@ def _device(facts: Facts) -> Check:
 
 def _rate(facts: Facts, protocol: Protocol) -> Check:
     asked, achieved = protocol.device.rate_hz, facts.timing.rate_hz
+    unfelt = refuses(asked)
+    if unfelt is not None:
+        return Check("Servo rate", "failure", unfelt)
     error = abs(achieved / asked - 1)
     verdict: Verdict = "failure" if error > RATE_FAILURE else "warning" if error > RATE_WARNING else "ok"
     hint = "" if verdict == "ok" else ": close other programs"

@@ -67,6 +67,14 @@ def test_each_fact_has_its_limit(changed: dict[str, Any], name: str, verdict: st
     assert (name.lower() in reason) == (verdict == "failure")
 
 
+def test_a_servo_below_500_hz_is_refused_whatever_it_achieves() -> None:
+    slow = small.protocol().model_copy(update={"device": small.protocol().device.model_copy(update={"rate_hz": 400.0})})
+    found = checks(replace(WELL, timing=Timing(800, 400.0, 1e-4, 2e-3, 0)), slow)
+    assert "servo rate: the servo turns 400 times a second" in refused(found)
+    enough = slow.model_copy(update={"device": slow.device.model_copy(update={"rate_hz": 500.0})})
+    assert refused(checks(replace(WELL, timing=Timing(1000, 500.0, 1e-4, 2e-3, 0)), enough)) == ""
+
+
 def test_less_room_is_enough_without_recordings() -> None:
     free_bytes = 60_500_000
     assert verdicts(free_bytes=free_bytes, recordings=True)["Free space"] == "failure"
