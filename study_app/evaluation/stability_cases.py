@@ -1,0 +1,182 @@
+"""The cases of the stability sweep: which liquid, loop, device and hand, each a line of words that reproduces it."""
+
+from __future__ import annotations
+
+import difflib
+import itertools
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields
+from functools import cache
+from random import Random
+from typing import Any, Final
+
+from study_app.errors import StudyError
+from study_app.haptics.scene import Ewma, Foaw, Line, Liquid, Raw, Scene, Velocity
+from study_app.protocol.load import load
+
+REACHES: Final = "reaches"
+CIRCLES: Final = "circles"
+STROKE: Final = "stroke"
+MOTIONS: Final = (REACHES, CIRCLES, STROKE)
+
+THROWN: Final = "thrown"
+LETS_GO: Final = "lets-go"
+
+
+@dataclass(frozen=True, slots=True)
+class Grip:
+    """A hand as mass, spring and damper that hold the handle (van Beek et al. 2015; Hasser & Cutkosky 2002)."""
+
+    mass_kg: float
+    stiffness_npm: float
+    damping_nspm: float
+
+
+GRIPS: Final[Mapping[str, Grip]] = {
+    "light": Grip(0.1, 50.0, 2.0),
+    "middle": Grip(0.554, 135.0, 6.45),
+    "firm": Grip(1.0, 800.0, 25.0),
+    LETS_GO: Grip(0.554, 135.0, 6.45),
+    THROWN: Grip(0.554, 135.0, 6.45),
+}
+
+RANGES: Final[Mapping[str, tuple[float, float]]] = {
+    "scale": (0.1, 100.0),
+    "rate_hz": (250.0, 5000.0),
+    "delay": (0, 4),
+    "speed_mps": (0.01, 5.0),
+    "mass_kg": (0.02, 5.0),
+    "viscous_nspm": (0.0, 50.0),
+    "coulomb_n": (0.0, 5.0),
+    "quantum_um": (0.0, 1000.0),
+    "noise_um": (0.0, 1000.0),
+    "jitter": (0.0, 0.5),
+    "missed": (0.0, 0.5),
+}
+"""What a case may be made of; the sweep's own choices lie within."""
+
+ESTIMATORS: Final[Mapping[str, Velocity]] = {"ewma": Ewma(), "line": Line(), "foaw": Foaw(), "raw": Raw()}
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """One closed loop. ``delay`` is in ticks, ``jitter`` in periods, ``missed`` a share of turns; sizes as named.
+
+    ``hand`` is a grip of `GRIPS`: "thrown" is let go from the start, "lets-go" after 0.6 s. ``speed_mps`` is the
+    greatest speed of the hand along its ``motion``.
+    """
+
+    liquid: str = "water"
+    scale: float = 10.0
+    rate_hz: float = 1000.0
+    delay: int = 1
+    estimator: str = "ewma"
+    hand: str = "middle"
+    motion: str = REACHES
+    speed_mps: float = 0.3
+    mass_kg: float = 0.1
+    viscous_nspm: float = 0.5
+    coulomb_n: float = 0.0
+    quantum_um: float = 38.0
+    noise_um: float = 0.0
+    jitter: float = 0.0
+    missed: float = 0.0
+
+    def __str__(self) -> str:
+        return " ".join(f"{field.name}={_word(getattr(self, field.name))}" for field in fields(self))
+
+
+def parse(line: str) -> Case:
+    """Return the case that a line of ``name=value`` words describes; what it leaves out has the default.
+
+    Raises
+    ------
+    StudyError
+        A word of another form, an unknown name, or a value that is not permitted.
+    """
+    usual = Case()
+    kinds: dict[str, type] = {field.name: type(getattr(usual, field.name)) for field in fields(Case)}
+    values: dict[str, Any] = {}
+    for word in line.split():
+        name, separator, value = word.partition("=")
+        if not separator:
+            raise StudyError(f'a case is made of words such as "scale=10"; {word!r} is none')
+        if name not in kinds:
+            near = difflib.get_close_matches(name, kinds, n=1)
+            meant = f"did you mean {near[0]!r}? " if near else ""
+            raise StudyError(f"a case has no {name!r}: {meant}it has {', '.join(kinds)}")
+        try:
+            values[name] = kinds[name](value)
+        except ValueError as error:
+            raise StudyError(
+                f"{name}={value} must be {'a number' if kinds[name] is float else 'a whole number'}"
+            ) from error
+    case = Case(**values)
+    for name, (low, high) in RANGES.items():
+        if not low <= getattr(case, name) <= high:
+            raise StudyError(f"{name}={getattr(case, name):g} must lie between {low:g} and {high:g}")
+    for name, permitted in (("liquid", liquids()), ("hand", GRIPS), ("motion", MOTIONS), ("estimator", ESTIMATORS)):
+        if getattr(case, name) not in permitted:
+            raise StudyError(f"{name}={getattr(case, name)} is none of {', '.join(permitted)}")
+    return case
+
+
+@cache
+def liquids() -> Mapping[str, Scene]:
+    """Return every liquid of the shipped studies, tar among them, and one far denser, each with its scene."""
+    found: dict[str, Scene] = {}
+    for protocol, prefix in (("rek2024", ""), ("physical_liquids", "physical_")):
+        study = load(protocol)
+        found |= {f"{prefix}{name}": study.scene_of(name) for name in study.liquids}
+    dense = Liquid(id="dense", density_kg_m3=10_000)
+    found["dense"] = Scene(liquids=(dense,))
+    return found
+
+
+def scene_of(case: Case) -> Scene:
+    """Return what the case presents."""
+    changed = {"scale": case.scale, "rate_hz": case.rate_hz, "velocity": ESTIMATORS[case.estimator]}
+    return Scene.model_validate(liquids()[case.liquid].model_copy(update=changed).model_dump())
+
+
+def sweep(seed: str = "stability") -> tuple[Case, ...]:
+    """Return the cases of the sweep: each liquid at each scale, rate, delay and grip; the rest from a fixed seed."""
+    return tuple(_sweep(seed))
+
+
+def _sweep(seed: str) -> Iterator[Case]:
+    draw = Random(seed)  # noqa: S311 - the same cases in every run
+    grid = itertools.product(liquids(), (1.0, 3.0, 10.0, 20.0, 40.0), (250.0, 500.0, 1000.0, 2000.0), range(5), GRIPS)
+    for liquid, scale, rate_hz, delay, hand in grid:
+        yield Case(
+            liquid=liquid,
+            scale=scale,
+            rate_hz=rate_hz,
+            delay=delay,
+            hand=hand,
+            estimator=_one(draw, ("ewma", "ewma", "ewma", "line", "foaw", "raw")),
+            motion=_one(draw, MOTIONS),
+            speed_mps=_one(draw, (0.1, 0.3, 0.6, 1.0)),
+            mass_kg=_one(draw, (0.1, 0.25, 0.6)),
+            viscous_nspm=_one(draw, (0.0, 0.5)),
+            coulomb_n=_one(draw, (0.0, 0.3)),
+            quantum_um=_one(draw, (20.0, 38.0, 60.0)),
+            noise_um=_one(draw, (0.0, 30.0)),
+            jitter=_one(draw, (0.0, 0.2)),
+            missed=_one(draw, (0.0, 0.02)),
+        )
+
+
+def some(cases: tuple[Case, ...], count: int | None) -> tuple[Case, ...]:
+    """Return ``count`` of the cases, spread over all of them: the same in every run."""
+    if count is None or count >= len(cases):
+        return cases
+    return tuple(Random(count).sample(cases, count))  # noqa: S311 - no secret
+
+
+def _one(draw: Random, choices: tuple[Any, ...]) -> Any:
+    return choices[int(draw.random() * len(choices))]
+
+
+def _word(value: object) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
