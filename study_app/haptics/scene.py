@@ -84,7 +84,13 @@ class Body(Frozen):
 
 
 class Ewma(Frozen):
-    """Exponentially weighted velocity; ``alpha`` is the weight of the newest difference at 1 kHz."""
+    """Exponentially weighted velocity; ``alpha`` is the weight of the newest difference at 1 kHz.
+
+    The default. [choice] `Line` has less lag and less noise while the hand leads (7.0 ms and 0.64 mm/s against 9.5 ms
+    and 1.37 mm/s), but at 1 kHz with one tick of delay a free handle of 0.1 kg bears only 23 N·s/m through it, and 71
+    through this: its lag is all delay, a filter's mostly gain lost where a loop would swing. Honey asks for 31, light
+    oil for 55 at 8 N.
+    """
 
     kind: Literal["ewma"] = "ewma"
     alpha: float = Field(default=0.1, gt=0, le=1)
