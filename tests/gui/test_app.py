@@ -115,7 +115,17 @@ def rows(results: Path, name: str):
 @pytest.mark.parametrize("device", ["scripted", "falcon-emulated"])
 def test_a_session_runs_from_the_first_page_to_the_last_in_its_windows(short_demo, results, device):
     person = Person()
-    code = app.run(short_demo, participant="P001", seed=5, device=device, windowed=True, operator="AK", results=results)
+    lines = []
+    code = app.run(
+        short_demo,
+        participant="P001",
+        seed=5,
+        device=device,
+        windowed=True,
+        operator="AK",
+        results=results,
+        tell=lines.append,
+    )
     person.deleteLater()
     assert code == 0
     told = events(results)
@@ -133,6 +143,7 @@ def test_a_session_runs_from_the_first_page_to_the_last_in_its_windows(short_dem
     assert receipt["screens"]["participant"]["number"] == 1
     assert receipt["operator"] == "AK"
     assert receipt["device"]["name"] == device
+    assert ("The Falcon is ready (green light)." in lines) == (device == "falcon-emulated")
     assert receipt["status"] == "completed"
 
 

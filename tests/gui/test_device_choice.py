@@ -1,0 +1,54 @@
+"""What choosing a Falcon asks of the windows: where results go, firmware, and what to do while it is homed."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from study_app.errors import DeviceError, DeviceNotFound
+from study_app.gui.beginning import check
+from study_app.gui.choices import NewSession, study_results
+from study_app.gui.opening import FIRST_TIME, OpeningWindow
+from study_app.protocol.load import load
+
+CHOSEN = NewSession("demo", "P001", 1, 7, "", "en", "mouse", True, None, Path("nowhere"))
+
+
+@pytest.mark.parametrize(
+    ("device", "folder"),
+    [
+        ("mouse", "demo"),
+        ("falcon", "demo"),
+        ("falcon:FT123", "demo"),
+        ("scripted", "demo-scripted"),
+        ("falcon-emulated", "demo-falcon-emulated"),
+        ("falcon-socket:/run/falcon", "demo-falcon-socket"),
+    ],
+)
+def test_what_nobody_felt_is_kept_apart(tmp_path, device, folder):
+    assert study_results(tmp_path, "demo", device) == tmp_path / folder
+
+
+def test_firmware_is_for_falcons_alone(tmp_path):
+    study = load("demo")
+    chosen = replace(CHOSEN, results=tmp_path, firmware=tmp_path / "file.bin")
+    with pytest.raises(DeviceError, match="only a Falcon takes firmware, not device 'mouse'"):
+        check(chosen, study)
+    check(replace(chosen, device="falcon"), study)
+    with pytest.raises(DeviceNotFound, match="falcon-socket:PATH"):
+        check(replace(chosen, device="falcon-socket"), study)
+
+
+def test_the_note_says_what_the_device_asks_for_and_goes_on_saying_it(qtbot):
+    note = OpeningWindow("Preparing demo", "Participant P001")
+    qtbot.addWidget(note)
+    note.say("Pull the grip out.")
+    assert note.step.text() == "Pull the grip out."
+    note._since = type("Long", (), {"elapsed": lambda _self: 60_000})()
+    note._tell()
+    assert note.step.text() == "Pull the grip out."
+    other = OpeningWindow("Preparing demo", "Participant P001")
+    qtbot.addWidget(other)
+    other._since = note._since
+    other._tell()
+    assert other.step.text() == FIRST_TIME
