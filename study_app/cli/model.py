@@ -41,12 +41,13 @@ def _assignment(change: str) -> tuple[str, str]:
 @click.argument("scene", metavar="FILE")
 @click.option("--liquid", metavar="NAME", help="Only this one; default: every liquid of the file.")
 def scene(scene: str, liquid: str | None) -> None:
-    """Print which effects a scene calls for, why, and the measured cost of each."""
+    """Print which effects a scene calls for, why, the measured cost of each, and how wrong the force is to expect."""
     from study_app.evaluation.cost import report
+    from study_app.evaluation.expected import foretold
     from study_app.protocol.load import load_scene, load_scenes
 
     chosen = [load_scene(scene, liquid)] if liquid else list(load_scenes(scene).values())
-    click.echo("\n\n".join(report(one) for one in chosen))
+    click.echo("\n\n".join(f"{report(one)}\n{foretold(one)}" for one in chosen))
 
 
 @click.command()

@@ -1,7 +1,8 @@
 """The force model by the letter of its definition: slow, plain, and what the product must equal.
 
 Every element of the wake is kept in a list and decays by itself; segments are summed anew each tick. Written from the
-definition, not from ``haptics.effects``, which it shares no code with.
+definition, not from ``haptics.effects``, which it shares no code with. `exact_wakes` says the same without the rounding
+of long sums.
 """
 
 from __future__ import annotations
@@ -25,8 +26,11 @@ class Response(NamedTuple):
     size_mps: Floats  # (n,): Σ|e| / S, the measure that rounding errors are compared with
 
 
-def respond(scene: Scene, motion: Motion) -> Response:
-    """Return velocity, wake and force along ``motion`` in a scene of one liquid that is everywhere."""
+def respond(scene: Scene, motion: Motion, *, exact: bool = False) -> Response:
+    """Return velocity, wake and force along ``motion`` in a scene of one liquid that is everywhere.
+
+    Drag and wake alone; with ``exact`` the wake is summed without rounding errors (`exact_wakes`).
+    """
     liquid = scene.liquids[0]
     interval_s = np.clip(np.diff(motion.t_s, prepend=motion.t_s[0] - 1 / scene.rate_hz), 0.2e-3, 20e-3)
     interval_s[0] = 1 / scene.rate_hz
@@ -35,7 +39,7 @@ def respond(scene: Scene, motion: Motion) -> Response:
     wake_mps, size_mps = np.zeros_like(velocity_mps), np.zeros(len(velocity_mps))
     if liquid.wake is not None and "wake" in liquid.effects:
         length = max(1, math.floor(liquid.wake.length * scene.rate_hz / 1000))
-        wake_mps, size_mps = wakes(
+        wake_mps, size_mps = (exact_wakes if exact else wakes)(
             velocity_mps * np.array([1.0, 1.0 if liquid.wake.axes == "xyz" else 0.0, 1.0]),
             motion.position_m,
             interval_s,
@@ -48,10 +52,28 @@ def respond(scene: Scene, motion: Motion) -> Response:
             liquid.wake.resolution_m,
         )
     relative_mps = velocity_mps - wake_mps
-    area_m2 = math.pi * (scene.body.diameter_m / 2) ** 2
-    pressure = 0.5 * liquid.density_kg_m3 * scene.body.drag_coefficient * area_m2
-    force_n = -pressure * np.linalg.norm(relative_mps, axis=1, keepdims=True) * relative_mps
+    slopes_nspm = [resistance_nspm(scene, speed) for speed in np.linalg.norm(relative_mps, axis=1).tolist()]
+    force_n = -np.array(slopes_nspm)[:, np.newaxis] * relative_mps
     return Response(velocity_mps, wake_mps, force_n, size_mps)
+
+
+def resistance_nspm(scene: Scene, speed_mps: float) -> float:
+    """Return |F|/|w| [N·s/m] by the liquid's law of drag, from C_d itself; at rest its limit."""
+    liquid, diameter_m = scene.liquids[0], scene.body.diameter_m
+    pressure_kg_m = 0.5 * liquid.density_kg_m3 * math.pi * (diameter_m / 2) ** 2
+    if liquid.drag.law == "constant":
+        return pressure_kg_m * scene.body.drag_coefficient * speed_mps
+    viscosity_pa_s = liquid.viscosity_pa_s or 0.0
+    reynolds = liquid.density_kg_m3 * speed_mps * diameter_m / viscosity_pa_s
+    if reynolds < 1e-12:
+        return 3 * math.pi * viscosity_pa_s * diameter_m
+    held = min(reynolds, 2e5)
+    coefficient = {
+        "schiller-naumann": max(24 / held * (1 + 0.15 * held**0.687), 0.44),
+        "haider-levenspiel": 24 / held * (1 + 0.1806 * held**0.6459) + 0.4251 / (1 + 6880.95 / held),
+        "brown-lawler": 24 / held * (1 + 0.150 * held**0.681) + 0.407 / (1 + 8710 / held),
+    }[liquid.drag.law]
+    return float(pressure_kg_m * coefficient * speed_mps)
 
 
 def _filtered(scene: Scene, motion: Motion, interval_s: Floats) -> Floats:
@@ -119,6 +141,88 @@ def wakes(
         count = min(count + 1, length)
         stored_at[:], stored = position_m[k], True
     return wake_mps, size_mps
+
+
+@workings
+def exact_wakes(
+    h_mps: Any,
+    position_m: Any,
+    interval_s: Any,
+    length: int,
+    scaling: float,
+    exponent: float,
+    breaking_cosine: float,
+    breaking_span_m: float,
+    decay: float,
+    resolution_m: float,
+) -> Any:
+    """Return what `wakes` returns, but for its rounding: nothing is carried on from tick to tick.
+
+    Which ticks store an element, and in which segment, is settled first. Then every tick sums its N elements anew, each
+    by the λ^age of its own age, with the rounding errors of the sums made good (Neumaier 1974).
+    """
+    ticks = len(h_mps)
+    wake_mps, size_mps = np.zeros((ticks, 3)), np.zeros(ticks)
+    taken, segment, arc = np.zeros(ticks, np.int64), np.zeros(ticks, np.int64), np.zeros(ticks)
+    speed_mps, clock_s = np.zeros(ticks), np.cumsum(interval_s)
+    stored, current, arc_m = 0, 0, 0.0
+    before = np.zeros(ticks, np.int64)  # how many elements were stored when a tick's drag asked
+    for k in range(ticks):
+        before[k] = stored
+        speed_mps[k] = _size(h_mps[k])
+        arc_m += speed_mps[k] * interval_s[k]
+        rests = speed_mps[k] < 1e-3
+        if not rests and stored > 0 and _size(position_m[k] - position_m[taken[stored - 1]]) < resolution_m:
+            continue
+        if not rests:
+            reference = -1
+            for j in range(stored - 1, max(stored - 1 - length, -1), -1):
+                if segment[j] == current:
+                    reference = taken[j]
+                    if arc_m - arc[j] >= breaking_span_m:
+                        break
+            along = np.sum(h_mps[k] * h_mps[reference])
+            if reference < 0 or along < (breaking_cosine - 1e-12) * speed_mps[k] * speed_mps[reference]:
+                current += 1
+        taken[stored], segment[stored], arc[stored] = k, -1 if rests else current, arc_m
+        stored += 1
+
+    per_s = math.log(decay) * 1e3
+    tail, speeds, squares, summed = np.zeros((3, 2)), np.zeros((1, 2)), np.zeros((1, 2)), np.zeros((1, 2))
+    for k in range(ticks):
+        tail[:], speeds[:], squares[:], summed[:] = 0.0, 0.0, 0.0, 0.0
+        newest, inside = 0, -1
+        for j in range(before[k] - 1, max(before[k] - 1 - length, -1), -1):
+            if segment[j] < 0:
+                continue
+            i = taken[j]
+            if segment[j] != inside:
+                for axis in range(3):
+                    _add(tail, axis, h_mps[newest, axis] / max(speed_mps[newest], 1e-3) * (summed[0, 0] + summed[0, 1]))
+                summed[:], newest, inside = 0.0, i, segment[j]
+            size = speed_mps[i] * math.exp(per_s * (clock_s[k - 1] - clock_s[i]))
+            _add(summed, 0, size)
+            _add(speeds, 0, size)
+            _add(squares, 0, size * size)
+        for axis in range(3):
+            _add(tail, axis, h_mps[newest, axis] / max(speed_mps[newest], 1e-3) * (summed[0, 0] + summed[0, 1]))
+        if speeds[0, 0] > 0.0:
+            v_tail = (tail[:, 0] + tail[:, 1]) / scaling
+            mean = (squares[0, 0] + squares[0, 1]) / (speeds[0, 0] + speeds[0, 1])
+            wake_mps[k] = v_tail * _gain(_size(v_tail) / mean, exponent)
+            size_mps[k] = (speeds[0, 0] + speeds[0, 1]) / scaling
+    return wake_mps, size_mps
+
+
+@workings
+def _add(sums: Any, row: int, value: float) -> None:
+    """Add to a sum, whose rounding error is in the column beside it (Neumaier 1974, ZAMM 54:39)."""
+    total = sums[row, 0] + value
+    if abs(sums[row, 0]) >= abs(value):
+        sums[row, 1] += (sums[row, 0] - total) + value
+    else:
+        sums[row, 1] += (value - total) + sums[row, 0]
+    sums[row, 0] = total
 
 
 @workings

@@ -1,0 +1,86 @@
+"""The command that shows what accuracy costs in time."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from study_app.haptics.motion import Motion
+    from study_app.haptics.scene import Scene
+
+DEFAULT_PATH = "stir"
+
+
+@click.command()
+@click.option("--scene", metavar="FILE", help="Protocol or scene file; default: rek2024 and physical_liquids.")
+@click.option("--liquid", metavar="NAME", help="Which liquid; default: the thesis' water, and honey by its viscosity.")
+@click.option(
+    "--path",
+    default=DEFAULT_PATH,
+    show_default=True,
+    metavar="PATH",
+    help="Motion CSV, or a programmed path: stir, circle, reverse, reach …",
+)
+@click.option("--to", type=click.Path(path_type=Path), metavar="DIR", help="Folder for table and figure; else printed.")
+def accuracy(scene: str | None, liquid: str | None, path: str, to: Path | None) -> None:
+    """Show what accuracy costs in time: how wrong each model of a liquid is, and how long it takes.
+
+    Wakes are measured against their definition, models of a real liquid against experiments and exact solutions.
+    """
+    from study_app.evaluation.accuracy import accuracy as measure
+    from study_app.evaluation.accuracy_files import markdown
+    from study_app.evaluation.accuracy_files import write as write_all
+    from study_app.evaluation.soaked import make_folder
+
+    numerical, physical, notes = _subjects(scene, liquid)
+    one = numerical or physical
+    motion = _motion(path, one) if one is not None else None
+    if motion is None:
+        raise click.UsageError(f"there is nothing to measure: {'; '.join(notes)}")
+    if to is not None:
+        make_folder(to)
+    named = "a hand that stirs" if path == DEFAULT_PATH else path
+    found = measure(
+        numerical, physical, motion, named=named, notes=notes, tell=lambda text: click.echo(f"{text} …", err=True)
+    )
+    if to is None:
+        click.echo(markdown(found), nl=False)
+        return
+    for written in write_all(found, to):
+        click.echo(written)
+
+
+def _subjects(scene: str | None, liquid: str | None) -> tuple[Scene | None, Scene | None, tuple[str, ...]]:
+    """Return the scene whose definition is followed, the one whose liquid is real, and what is missing."""
+    from study_app.protocol.load import load_scene, load_scenes
+
+    if scene is None and liquid is None:
+        return load_scene("rek2024", "water"), load_scene("physical_liquids", "honey"), ()
+    if scene is None:
+        thesis, real = load_scenes("rek2024"), load_scenes("physical_liquids")
+        if liquid in thesis or liquid in real:
+            return thesis.get(liquid or ""), real.get(liquid or ""), ()
+        known = ", ".join(dict.fromkeys([*thesis, *real]))
+        raise click.UsageError(f"--liquid {liquid}: there are {known}; name another file's liquid with --scene")
+    if liquid is None:
+        there = load_scenes(scene)
+        if len(there) > 1:
+            raise click.UsageError(f"--scene {scene}: say which --liquid of {', '.join(there)}")
+        liquid = next(iter(there))
+    chosen = load_scene(scene, liquid)
+    if chosen.liquids[0].viscosity_pa_s is None:
+        return chosen, None, (f"{liquid} gives no viscosity: nothing physical is known to compare it with",)
+    return chosen, chosen, ()
+
+
+def _motion(path: str, scene: Scene) -> Motion:
+    from study_app.evaluation.motions import stir
+    from study_app.haptics import motion, paths
+
+    if path == DEFAULT_PATH:
+        return stir(scene.scale, scene.rate_hz)
+    programmed = path in paths.NAMES or not (Path(path).suffix or Path(path).exists())
+    return paths.path(path, rate_hz=scene.rate_hz) if programmed else motion.read(Path(path))
