@@ -5,6 +5,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 from click.testing import CliRunner
@@ -115,19 +116,25 @@ def test_simulate_names_the_unknown_parameter(tmp_path: Path) -> None:
 def test_a_replay_that_compared_nothing_does_not_say_that_all_is_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     """What is printed of a replay's findings, and the exit code."""
 
-    def replayed(
-        count: int, lasted_s: float, took_s: float, differences: tuple[str, ...], uncompared: tuple[str, ...]
-    ) -> tuple[int, str]:
-        found = replay.Replayed(count, lasted_s, took_s, differences, uncompared)
+    def replayed(count: int, **told: Any) -> tuple[int, str]:
+        some = {"recordings": count, "seconds": 9 * count, "lasted_s": 10.0 * count, "computed_s": 0.1 * count}
+        none: dict[str, Any] = {"took_s": 1.5, "differences": (), "missing": (), "uncompared": ()}
+        found = replay.Replayed(**(some | none | told))
         monkeypatch.setattr(replay, "replay", lambda _: found)
         done = CliRunner().invoke(commands, ["replay", "ses-01"])
         return done.exit_code, done.output
 
-    assert replayed(0, 0.0, 0.0, (), ()) == (0, "the session has no recordings: there was no force to compare\n")
-    same = "1 recording, 20.0 s, 10 times as fast as it ran: every force compared is the same\n"
-    assert replayed(1, 20.0, 2.0, (), ()) == (0, same)
-    differ = "trial 1 differs\ntrial 2 has a gap\n2 recordings, 20.0 s, 10 times as fast as they ran: forces differ\n"
-    assert replayed(2, 20.0, 2.0, ("trial 1 differs",), ("trial 2 has a gap",)) == (3, differ)
+    nothing = "no force was compared, so nothing is proved\n"
+    assert replayed(0) == (3, f"the session kept no recordings\n{nothing}")
+    assert replayed(0, uncompared=("trial 1 is lost",)) == (3, f"trial 1 is lost\n{nothing}")
+    same = "1 recording, 10.0 s, computed again 100 times as fast as it ran (1.5 s in all): "
+    assert replayed(1) == (0, f"{same}every force compared is the same\n")
+    assert replayed(1, seconds=0, uncompared=("a gap",)) == (3, f"a gap\n{same}{nothing}")
+    same = same.replace("it ran", "they ran").replace("1 recording, 10.0", "2 recordings, 20.0")
+    assert replayed(2, uncompared=("a gap",)) == (0, f"a gap\n{same}every force compared is the same\n")
+    assert replayed(2, missing=("a file",)) == (3, f"a file\n{same}every force compared is the same\n")
+    differ = f"trial 1 differs\ntrial 2 has a gap\n{same}forces differ\n"
+    assert replayed(2, differences=("trial 1 differs",), uncompared=("trial 2 has a gap",)) == (3, differ)
 
 
 def test_verify_ends_with_a_verdict_and_its_exit_code(tmp_path: Path) -> None:

@@ -113,18 +113,29 @@ def verify(folder: Path) -> None:
 @click.command()
 @SESSION
 def replay(session: Path) -> None:
-    """Compute every force again from the recording, with the same kernel, and name the seconds that differ."""
+    """Compute every force again from the recording, with the same kernel, and name the seconds that differ.
+
+    Names the trials whose recordings are lost, missing or not comparable, too. Ends with exit code 3 where a force
+    differs, a recording is missing, or nothing could be compared, which proves nothing.
+    """
     from study_app.evaluation.replay import replay as replay_session
 
     found = replay_session(session)
-    for sentence in (*found.differences, *found.uncompared):
+    for sentence in (*found.differences, *found.missing, *found.uncompared):
         click.echo(sentence)
-    if not found.recordings:
-        click.echo("the session has no recordings: there was no force to compare")
-        return
-    pace = found.lasted_s / found.took_s if found.took_s else 0.0
+    if not (found.recordings or found.missing or found.uncompared):
+        click.echo("the session kept no recordings")
     verdict = "forces differ" if found.differences else "every force compared is the same"
-    many, ran = ("1 recording", "it") if found.recordings == 1 else (f"{found.recordings} recordings", "they")
-    click.echo(f"{many}, {found.lasted_s:.1f} s, {pace:.0f} times as fast as {ran} ran: {verdict}")
-    if found.differences:
+    if not found.seconds:
+        verdict = "no force was compared, so nothing is proved"
+    if found.recordings:
+        pace = found.lasted_s / found.computed_s if found.computed_s else 0.0
+        many, ran = ("1 recording", "it") if found.recordings == 1 else (f"{found.recordings} recordings", "they")
+        click.echo(
+            f"{many}, {found.lasted_s:.1f} s, computed again {pace:.0f} times as fast as {ran} ran "
+            f"({found.took_s:.1f} s in all): {verdict}"
+        )
+    else:
+        click.echo(verdict)
+    if not found.proved:
         click.get_current_context().exit(EXIT_FOUND)

@@ -5,13 +5,13 @@ that. The same version of the program on the same kind of processor gives the sa
 The key is opened in memory alone, and nothing of it is told: who replays a session stays blind.
 
 A recording begins shortly before its trial, so that the force it begins with is known; one that follows another without
-a pause goes on from where that one was.
+a pause goes on from where that one was. What cannot be computed again is named: a proof says what it is not about.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -28,6 +28,8 @@ from study_app.haptics.scene import Scene
 from study_app.haptics.tick import tick
 from study_app.protocol.model import Protocol
 from study_app.store import blinding, journal, receipt, recording
+from study_app.store.atomic import is_there
+from study_app.store.events import check_fields
 from study_app.store.journal import Line
 from study_app.store.layout import locate
 
@@ -38,15 +40,25 @@ NAMED_SECONDS = 8
 class Replayed:
     """What a replay found.
 
-    ``differences`` has a sentence for each recording whose forces came out otherwise, ``uncompared`` one for each that
-    could not be computed again, or not to its end. ``lasted_s`` is how long the hand moved, ``took_s`` the replay.
+    ``recordings`` were computed again, ``seconds`` of them compared. ``differences`` has a sentence for each recording
+    whose forces came out otherwise, ``missing`` one for each that the journal tells of and that is not there,
+    ``uncompared`` one for each that could not be computed again, or not to its end. ``lasted_s`` is how long the hand
+    moved, ``computed_s`` how long its forces took again; ``took_s`` adds reading the files and loading the code.
     """
 
     recordings: int
+    seconds: int
     lasted_s: float
+    computed_s: float
     took_s: float
     differences: tuple[str, ...]
+    missing: tuple[str, ...]
     uncompared: tuple[str, ...]
+
+    @property
+    def proved(self) -> bool:
+        """Whether something was compared, all of it is the same, and nothing is missing that was recorded."""
+        return self.seconds > 0 and not self.differences and not self.missing
 
 
 def replay(session_folder: Path) -> Replayed:
@@ -57,36 +69,50 @@ def replay(session_folder: Path) -> Replayed:
     StoreError
         It is no session's folder, or its journal, receipt, key or a recording cannot be read.
     """
+    began = time.perf_counter()
     study, session = locate(session_folder)
     lines = journal.read(session.journal)
+    check_fields(session.journal, lines)
     kept = receipt.read(session.receipt)
     key = blinding.read_key(study.path)
     if key.hash != kept["key_hash"]:
         raise StoreError(f"{study.key} is not the key that {session.path} ran under: restore it from a copy")
-    protocol = _whole(kept["protocol"], key)
-    limit_n = float(kept["device"].get("force_limit_n", np.inf))
-    _again(records(SAMPLE, 0), Scene(), limit_n, None)  # loads the compiled code: no part of what a replay takes
-    began = time.perf_counter()
+    protocol, limit_n = _ran(session.receipt, kept, key)
+    _again(records(SAMPLE, 0), Scene(), limit_n, None)  # loads the compiled code: no part of what computing takes
     found = _Found()
     before: _Before | None = None
-    for line, code in _recorded(lines):
-        scene = protocol.scene_for(key.condition(*code))
-        samples = recording.read_samples(session.path / line["recording"])
-        checks = recording.read_checks(session.path / line["recording"])
+    for started, line in _presented(lines):
+        name = f"trial {started['trial']}, attempt {started['attempt']}"
+        if line is None or line["event"] == "recording_lost":
+            why = "no line of the journal says why" if line is None else line["reason"]
+            found.uncompared.append(f"{name}: has no recording: {why}")
+            continue
+        path = session.path / line["recording"]
+        if not is_there(path):
+            found.missing.append(f"{name}: {line['recording']} is missing, though the journal tells of it")
+            continue
+        scene = protocol.scene_for(key.condition(started["block"], started["code"]))
+        samples, checks = recording.read_samples(path), recording.read_checks(path)
+        start = time.perf_counter()
         before = _again(samples, scene, limit_n, before)
-        found.compare(f"trial {line['trial']}, attempt {line['attempt']}", samples, before, checks)
-    took_s = time.perf_counter() - began
-    return Replayed(found.recordings, found.lasted_s, took_s, tuple(found.differences), tuple(found.uncompared))
+        found.compare(name, samples, before, checks)
+        found.computed_s += time.perf_counter() - start
+    return found.replayed(time.perf_counter() - began)
 
 
 @dataclass(slots=True)
 class _Before:
-    """A recording computed again, and the models in the state it left them in: what the next one may go on from."""
+    """A recording computed again, and the models in the state it left them in: what the next one may go on from.
+
+    ``knows_its_start`` says that no force was under way as it began, or that it goes on from a recording of which that
+    is so.
+    """
 
     serial: int
     model: Any
     safety: Any
     samples: Any
+    knows_its_start: bool = True
 
 
 def _again(samples: Any, scene: Scene, limit_n: float, before: _Before | None) -> _Before:
@@ -101,13 +127,14 @@ def _again(samples: Any, scene: Scene, limit_n: float, before: _Before | None) -
         first = shared
         _copy_forces(before.samples[len(before.samples) - first :], out[:first])
         _run(rest, before.model, model, before.serial, serial, before.safety[0], out, first)
-        return _Before(serial, model, before.safety, out)
+        return _Before(serial, model, before.safety, out, before.knows_its_start)
     safety = new_safety(limit_n)
     if len(out) and out.tick[0] != 0:
         _assume(safety[0], out[0])
         first = 1
+    knows_its_start = not out.force_n[out.scene != serial].any()
     _run(rest, rest, model, 0, serial, safety[0], out, first)
-    return _Before(serial, model, safety, out)
+    return _Before(serial, model, safety, out, knows_its_start)
 
 
 def _shared(before: _Before | None, out: Any) -> int | None:
@@ -161,21 +188,43 @@ class _Found:
 
     def __init__(self) -> None:
         self.recordings = 0
+        self.seconds = 0
         self.lasted_s = 0.0
+        self.computed_s = 0.0
         self.differences: list[str] = []
+        self.missing: list[str] = []
         self.uncompared: list[str] = []
+
+    def replayed(self, took_s: float) -> Replayed:
+        """Return all of it, which took so long [s]."""
+        return Replayed(
+            self.recordings,
+            self.seconds,
+            self.lasted_s,
+            self.computed_s,
+            took_s,
+            tuple(self.differences),
+            tuple(self.missing),
+            tuple(self.uncompared),
+        )
 
     def compare(self, name: str, samples: Any, again: _Before, checks: recording.Checks) -> None:
         """Compare one recording's checks with those of the forces computed again."""
-        self.recordings += 1
         if len(samples) == 0:
             self.uncompared.append(f"{name}: holds no sample")
             return
+        if not again.knows_its_start:
+            self.uncompared.append(f"{name}: goes on from the force of a recording that is not there, or has a gap")
+            return
+        self.recordings += 1
         self.lasted_s += float(samples.time_ns[-1] - samples.time_ns[0]) * 1e-9
         whole = _until_gap(samples.tick)
         if whole < len(samples):
             lost_s = whole / checks.rows
             self.uncompared.append(f"{name}: samples are missing after {lost_s:.1f} s; what follows was not compared")
+        self.seconds += sum(
+            min((second + 1) * checks.rows, len(samples)) <= whole for second in range(len(checks.device_force))
+        )
         for what, kept, forces in (
             ("force on the hand", checks.device_force, again.samples.device_force_n),
             ("force of the liquids", checks.effect_force, again.samples.force_n),
@@ -202,12 +251,30 @@ def _listed(seconds: list[int]) -> str:
     return f"second {shown}{more}"
 
 
-def _recorded(lines: list[Line]) -> Iterator[tuple[Line, tuple[str, str]]]:
-    """Yield each line about a whole recording, in the order of presentation, with its trial's block and code."""
-    told = {(line["trial"], line["attempt"]): line for line in lines if line["event"] == "recorded"}
+def _presented(lines: Sequence[Line]) -> Iterator[tuple[Line, Line | None]]:
+    """Yield the line of each presentation that was to be recorded, and the line about its recording, if there is one.
+
+    In the order of presentation.
+    """
+    events = ("recorded", "recording_lost")
+    told = {(line["trial"], line["attempt"]): line for line in lines if line["event"] in events}
+    if not lines or not lines[0].get("recordings"):
+        return
     for line in lines:
-        if line["event"] == "trial_started" and (which := (line["trial"], line["attempt"])) in told:
-            yield told[which], (line["block"], line["code"])
+        if line["event"] == "trial_started":
+            yield line, told.get((line["trial"], line["attempt"]))
+
+
+def _ran(path: Path, kept: Mapping[str, Any], key: blinding.Key) -> tuple[Protocol, float]:
+    """Return the protocol and the limit of the force [N] of the session whose receipt was ``kept`` at ``path``."""
+    try:
+        return _whole(kept["protocol"], key), float(kept["device"].get("force_limit_n", np.inf))
+    except KeyError as lacking:
+        raise StoreError(f"{path} lacks {lacking}: restore it from a copy") from lacking
+    except (AttributeError, TypeError, ValueError):  # said without the reason, which would tell conditions
+        raise StoreError(
+            f"{path} and the study's key give no protocol that this version can run: restore them from a copy"
+        ) from None
 
 
 def _whole(published: Mapping[str, Any], key: blinding.Key) -> Protocol:

@@ -22,6 +22,7 @@ from study_app.session.events import Begin, Continue, EndAsked, ForceStopped, Pa
 from study_app.session.ports import Ports
 from study_app.session.rehearsal import rehearse
 from study_app.session.runner import Runner
+from study_app.store import recording
 from study_app.store.journal import SessionClock
 from study_app.store.layout import StudyFolder
 from study_app.store.session import begin
@@ -112,6 +113,12 @@ def test_a_rehearsed_session_comes_out_to_the_last_bit(rehearsed: Path) -> None:
     assert (found.differences, found.uncompared) == ((), ())
     assert found.recordings == 4
     assert found.lasted_s > 3
+    assert found.seconds == sum(
+        len(recording.read_checks(path).device_force)
+        for path in session(rehearsed).glob("recordings/trial-00?.parquet")
+    )
+    assert found.proved
+    assert 0 < found.computed_s < found.took_s
 
 
 def test_repeats_pauses_stops_and_fades_come_out_to_the_last_bit(tmp_path: Path) -> None:
@@ -144,6 +151,74 @@ def test_a_place_that_was_changed_is_named_by_trial_and_second(rehearsed: Path, 
         f"trial 2, attempt 1: the force on the hand differs in second {last} of {last + 1} seconds",
         f"trial 2, attempt 1: the force of the liquids differs in second {last} of {last + 1} seconds",
     )
+
+
+def retell(place: Path, change: Callable[[dict[str, Any]], dict[str, Any]]) -> None:
+    """Change the lines of a journal; a line keeps its number."""
+    lines = [json.loads(line) for line in (place / "journal.jsonl").read_text().splitlines()]
+    (place / "journal.jsonl").write_text("".join(f"{json.dumps(change(line))}\n" for line in lines))
+
+
+def test_recordings_that_are_lost_or_missing_are_named(rehearsed: Path, tmp_path: Path) -> None:
+    place = copied(rehearsed, tmp_path / "lost")
+    own = {"n", "t_s", "at", "trial", "attempt"}
+
+    def lose(line: dict[str, Any]) -> dict[str, Any]:
+        if line["event"] != "recorded" or line["trial"] > 2:
+            return line
+        told = {name: value for name, value in line.items() if name in own}
+        if line["trial"] == 1:
+            return told | {"event": "recording_lost", "reason": "the disk was full"}
+        return told | {"event": "note", "kind": "mark", "text": ""}
+
+    retell(place, lose)
+    found = replay(place)
+    assert found.uncompared == (
+        "trial 1, attempt 1: has no recording: the disk was full",
+        "trial 2, attempt 1: has no recording: no line of the journal says why",
+    )
+    assert (found.recordings, found.differences, found.missing) == (2, (), ())
+    assert found.proved
+    (place / "recordings" / "trial-004.parquet").unlink()
+    found = replay(place)
+    assert found.missing == (
+        "trial 4, attempt 1: recordings/trial-004.parquet is missing, though the journal tells of it",
+    )
+    assert (found.recordings, found.proved) == (1, False)
+
+
+def test_what_goes_on_from_a_lost_recording_is_not_said_to_differ(tmp_path: Path) -> None:
+    place = troubled(tmp_path / "results")
+    assert replay(place).proved
+    (place / "recordings" / "trial-001.parquet").unlink()
+    found = replay(place)
+    assert len(found.missing) == 1
+    assert found.uncompared == tuple(
+        f"trial 1, attempt {attempt}: goes on from the force of a recording that is not there, or has a gap"
+        for attempt in (2, 3, 4)  # each began while the one before it could still be felt
+    )
+    assert (found.recordings, found.differences) == (1, ())
+
+
+def test_a_session_without_recordings_proves_nothing(tmp_path: Path) -> None:
+    rehearse(short.write(tmp_path), participants=1, seed=1, results=tmp_path / "results", recordings=False)
+    found = replay(session(tmp_path / "results"))
+    assert (found.recordings, found.seconds, found.proved) == (0, 0, False)
+    assert (found.differences, found.missing, found.uncompared) == ((), (), ())
+
+
+@pytest.mark.parametrize("name", ["device", "protocol"])
+def test_a_receipt_that_lacks_what_ran_is_one_sentence(rehearsed: Path, tmp_path: Path, name: str) -> None:
+    place = copied(rehearsed, tmp_path / "receipt")
+    receipt = json.loads((place / "receipt.json").read_text())
+    for changed, said in (
+        ({other: value for other, value in receipt.items() if other != name}, f"lacks '{name}': restore it"),
+        (receipt | {name: "?"}, "give no protocol"),
+    ):
+        (place / "receipt.json").write_text(json.dumps(changed))
+        with pytest.raises(StoreError, match=said) as raised:
+            replay(place)
+        assert "\n" not in str(raised.value)
 
 
 def test_missing_samples_are_said_and_not_compared(rehearsed: Path, tmp_path: Path) -> None:
