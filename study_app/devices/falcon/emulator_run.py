@@ -28,6 +28,8 @@ from study_app.devices.hand import REACH, move_hand
 from study_app.haptics.compiled import kernel
 from study_app.haptics.plant import move, push
 
+STROKE_NOW, STROKE_ASKED = 1, 2
+
 RUN = np.dtype(
     [
         ("heard", np.uint8, (wire.PACKET,)),
@@ -47,7 +49,7 @@ RUN = np.dtype(
         ("before_rad", np.float64, (3,)),  # angles at the packet before
         ("stalled_ns", np.int64),  # hears nothing until
         ("stroke", np.int64),  # of homing, by an emulated hand with no other orders: STROKES[stroke - 1]
-        ("stroke_due", np.int64),  # 1: it should begin one
+        ("stroke_due", np.int64),  # STROKE_NOW, STROKE_ASKED: when lights or arms ask for it, or 0: not
     ],
     align=True,
 )
@@ -116,7 +118,7 @@ def _obey(e: Any, at_ns: int) -> None:
     run.lights = flags & (wire.FLAG_GREEN | wire.FLAG_BLUE | wire.FLAG_RED)
     homing = flags & wire.FLAG_HOMING
     if homing and not run.homing:
-        run.stroke_due = 1
+        run.stroke_due = STROKE_NOW
     if run.homing and not homing:
         run.homed = 0
         if e.faults.forgets:
@@ -224,7 +226,7 @@ def _load(e: Any) -> None:
 def _stroke(e: Any, now_ns: int) -> None:
     """Pull out, push in, pull out and go to the middle, if homing wants it and nobody else wants anything.
 
-    And again, as a person would, while an arm is not homed or the blue light still asks to pull out.
+    And again, as a person would, whenever an arm is not homed or the blue light asks to pull out.
     """
     run, hand = e.run, e.hand
     if hand.serial != hand.taken:
@@ -235,12 +237,12 @@ def _stroke(e: Any, now_ns: int) -> None:
     if hand.moving:
         return
     if run.stroke == 0:
-        if not (run.stroke_due and run.homing):
+        asked = run.homed != 0b111 or run.lights & wire.FLAG_BLUE
+        if not run.homing or run.stroke_due == 0 or (run.stroke_due == STROKE_ASKED and not asked):
             return
-        run.stroke_due = 0
     if run.stroke == len(STROKES_M):
         run.stroke = 0
-        run.stroke_due = 1 if run.homed != 0b111 or run.lights & wire.FLAG_BLUE else 0
+        run.stroke_due = STROKE_ASKED
         return
     run.stroke += 1
     hand.order.kind = REACH

@@ -179,6 +179,22 @@ def test_pulled_out_far_enough_for_any_gate_by_whoever_claims_it_anew():
     assert furthest > 0.170
 
 
+def test_a_hand_that_has_stroked_already_pulls_out_again_when_the_blue_light_asks_for_it():
+    emulator = at_work()
+    home(emulator)
+    assert (emulator.homed, emulator.moving) == (0b111, False)
+    for _ in range(50):
+        exchanged(emulator, flags=HOMING)
+        emulator.pause(2e-3)
+    assert not emulator.moving
+    farthest_m = 0.0
+    for _ in range(600):
+        exchanged(emulator, flags=HOMING | wire.FLAG_BLUE)
+        emulator.pause(2e-3)
+        farthest_m = max(farthest_m, emulator.position_m[2])
+    assert farthest_m + emulator.geometry.centre_m > 0.170
+
+
 @pytest.mark.parametrize("fault", ["never_homes", "frozen"])
 def test_it_may_never_home(fault):
     emulator = at_work()
