@@ -67,6 +67,20 @@ def test_check_far_from_the_checkout_tells_the_study_in_words(tmp_path: Path) ->
     assert "8 N" in finished.stdout
 
 
+def test_check_takes_a_file_of_liquids_without_a_study(tmp_path: Path) -> None:
+    """One that has a part of a study needs all of it."""
+    liquids = "format = 1\n[liquids.tar]\ndensity_kg_m3 = 1153\n"
+    (tmp_path / "liquids.toml").write_text(liquids)
+    (tmp_path / "half.toml").write_text(liquids + '[study]\nname = "half"\n')
+    finished = liquid_study("check", "liquids.toml", cwd=tmp_path)
+    assert finished.returncode == 0, finished.stderr
+    assert "Force limit  8 N" in finished.stdout
+    assert "tar: effects named" in finished.stdout
+    half = liquid_study("check", "half.toml", cwd=tmp_path)
+    assert (half.returncode, half.stdout) == (2, "")
+    assert "sequence" in half.stderr
+
+
 def test_a_letter_that_the_console_lacks_stops_no_command(tmp_path: Path) -> None:
     text = source_bytes("demo").decode().replace('title = "A first look"', 'title = "Łódź"', 1)
     (tmp_path / "lodz.toml").write_text(text, encoding="utf-8")

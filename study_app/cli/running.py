@@ -24,7 +24,7 @@ OPERATOR = click.option("--operator", default="", metavar="INITIALS", help="Who 
 @click.argument("protocol", metavar="FILE", required=False)
 @click.option("--schema", is_flag=True, help="Print the JSON Schema of protocol files instead.")
 def check(protocol: str | None, *, schema: bool) -> None:
-    """Print the study in words, or every problem of the file with line and hint."""
+    """Print the study or the scenes in words, or every problem of the file with line and hint."""
     from study_app.protocol import describe, load
 
     if schema:
@@ -36,7 +36,10 @@ def check(protocol: str | None, *, schema: bool) -> None:
         return
     if protocol is None:
         raise click.UsageError("check needs a protocol: a file, or one of " + ", ".join(load.shipped()))
-    click.echo(describe.describe(load.load(protocol)))
+    if load.is_scene_file(protocol):
+        click.echo(describe.describe_scenes(load.load_scenes(protocol)))
+    else:
+        click.echo(describe.describe(load.load(protocol)))
 
 
 @click.command()

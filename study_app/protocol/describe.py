@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-from study_app.haptics.gate import resolve
+from study_app.haptics.gate import describe_gate, resolve
+from study_app.haptics.scene import Scene
 from study_app.protocol import feeling
 from study_app.protocol.model import Block, Explore, Protocol, Questionnaire
 from study_app.protocol.schedule import block_codes
@@ -34,6 +35,21 @@ def describe(protocol: Protocol) -> str:
         *_warned(protocol),
     )
     return "\n\n".join("\n".join(section) for section in sections)
+
+
+def describe_scenes(scenes: Mapping[str, Scene]) -> str:
+    """Return the liquids of a file that holds no study in words; ``scenes`` are by their names."""
+    scene = next(iter(scenes.values()))
+    ball_mm = scene.body.diameter_m * 1000
+    rows = [
+        ("Force limit", f"{scene.force_limit_n:g} N"),
+        ("Servo", f"{scene.rate_hz:g} Hz"),
+        ("Scale", f"{scene.scale:g} times the motion of the hand"),
+        ("Ball", f"{ball_mm:g} mm, {ball_mm / scene.scale:.3g} mm of the hand"),
+    ]
+    effects = ("\n".join(f"  {line}".rstrip() for line in describe_gate(it)) for it in scenes.values())
+    head = ("Liquids without a study", *_aligned(rows))
+    return "\n\n".join(("\n".join(head), "Effects in each liquid", *effects))
 
 
 def expected_duration_s(protocol: Protocol) -> float:

@@ -19,7 +19,7 @@ from study_app.protocol.places import Places
 from study_app.protocol.problems import Fault, did_you_mean, faults_of
 from study_app.protocol.table import Table
 
-__all__ = ["load", "load_scene", "load_scenes", "parse", "protocol_hash", "shipped", "source_bytes"]
+__all__ = ["is_scene_file", "load", "load_scene", "load_scenes", "parse", "protocol_hash", "shipped", "source_bytes"]
 
 M = TypeVar("M", bound=BaseModel)
 
@@ -93,12 +93,28 @@ def load_scenes(name_or_path: str | Path) -> dict[str, Scene]:
     name = str(name_or_path)
     source = source_bytes(name_or_path)
     document, places = _document(source, name)
-    if document.keys() & (Protocol.model_fields.keys() - SceneFile.model_fields.keys()):
+    if _holds_study(document):
         protocol = parse(source, name)
         return {liquid: protocol.scene_of(liquid) for liquid in protocol.liquids}
     _raise(name, _faults(SceneFile, document), places)
     file = SceneFile.model_validate(document, strict=True)
     return {name: Scene(**dict(file.scene), liquids=(liquid,)) for name, liquid in file.liquids.items()}
+
+
+def is_scene_file(name_or_path: str | Path) -> bool:
+    """Return whether a file holds liquids and nothing of a study.
+
+    Raises
+    ------
+    ProtocolError
+        The file is not there, or no TOML.
+    """
+    document, _ = _document(source_bytes(name_or_path), str(name_or_path))
+    return "liquids" in document and not _holds_study(document)
+
+
+def _holds_study(document: Mapping[str, Any]) -> bool:
+    return bool(document.keys() & (Protocol.model_fields.keys() - SceneFile.model_fields.keys()))
 
 
 def _document(source: bytes, name: str) -> tuple[dict[str, Any], Places]:
