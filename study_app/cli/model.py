@@ -22,7 +22,7 @@ def simulate(scene: str, liquid: str, path: str, out: Path, changes: tuple[str, 
     from study_app.haptics.override import override_all
     from study_app.protocol.load import load_scene
 
-    chosen = override_all(load_scene(scene, liquid), dict(_assignment(change) for change in changes))
+    chosen = override_all(load_scene(scene, liquid), dict(assignment(change) for change in changes))
     programmed = path in paths.NAMES or not (Path(path).suffix or Path(path).exists())
     moved = paths.path(path, rate_hz=chosen.rate_hz) if programmed else motion.read(Path(path))
     table = offline.simulate(chosen, moved)
@@ -30,7 +30,8 @@ def simulate(scene: str, liquid: str, path: str, out: Path, changes: tuple[str, 
     click.echo(f"{out}: {len(table)} rows")
 
 
-def _assignment(change: str) -> tuple[str, str]:
+def assignment(change: str) -> tuple[str, str]:
+    """Return name and value of a --set."""
     name, separator, value = change.partition("=")
     if not separator:
         raise click.UsageError(f"--set {change}: write NAME=VALUE, such as --set density_kg_m3=1200")

@@ -1,0 +1,46 @@
+"""The command that finds a liquid's parameters in measurements."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from study_app.cli.model import assignment
+
+
+@click.command()
+@click.option("--measured", required=True, type=click.Path(path_type=Path), metavar="CSV", help="Motion and force.")
+@click.option("--scene", required=True, metavar="FILE", help="Protocol or scene file, or the name of a shipped one.")
+@click.option("--liquid", required=True, metavar="NAME", help="Id of the liquid in that file.")
+@click.option("--fit", "names", required=True, metavar="NAMES", help="Parameters, such as drag_coefficient,length.")
+@click.option("--set", "changes", multiple=True, metavar="NAME=VALUE", help="Begin elsewhere, or fix a parameter.")
+@click.option(
+    "--velocity",
+    type=click.Choice(["centred", "scene"]),
+    default="centred",
+    show_default=True,
+    help="Where the CSV has no velocities: without lag, as a real force follows them, or by the scene's filter.",
+)
+@click.option("--to", type=click.Path(path_type=Path), metavar="DIR", help="Folder for preset, residuals and figure.")
+def identify(
+    measured: Path, scene: str, liquid: str, names: str, changes: tuple[str, ...], velocity: str, to: Path | None
+) -> None:
+    """Fit a liquid's parameters to measured motion and force, with intervals and a warning where they mean little.
+
+    CSV has columns t_s, x_m, y_m, z_m, fx_n, fy_n, fz_n (scene frame; the liquid's force on the ball), and vx_mps,
+    vy_mps, vz_mps where they are known; or t_s, velocity_mps, force_n for a motion along one line.
+    """
+    from study_app.evaluation import identified
+    from study_app.evaluation import measured as measurements
+    from study_app.evaluation.identify import fit
+    from study_app.haptics.override import override_all
+    from study_app.protocol.load import load_scene
+
+    chosen = override_all(load_scene(scene, liquid), dict(assignment(change) for change in changes))
+    read = measurements.read(measured)
+    motion = measurements.centred(read.motion) if velocity == "centred" else read.motion
+    found = fit(chosen, liquid, [name.strip() for name in names.split(",")], motion, read.force_n)
+    click.echo(identified.text(found))
+    for written in identified.write(found, to, measured) if to is not None else ():
+        click.echo(written)

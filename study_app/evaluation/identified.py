@@ -1,0 +1,125 @@
+"""What a fit leaves behind: a report, a preset that other commands take, the residuals as a table, and a figure."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import textwrap
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from study_app.evaluation import identify_figure, style
+from study_app.evaluation.identify import CONFIDENCE, Fit
+from study_app.evaluation.parameters import Parameter
+from study_app.evaluation.soaked import make_folder
+from study_app.haptics import motion
+from study_app.haptics.offline import Table
+from study_app.haptics.scene import Given, Liquid, Scene
+from study_app.store.atomic import write_file
+
+COLUMNS: Final = tuple(f"{kind}_{axis}_n" for kind in ("measured", "fitted", "residual") for axis in "xyz")
+_COMMENT_LETTERS: Final = 110
+
+
+def text(found: Fit) -> str:
+    """Return the report: the parameters before and after with their intervals, the residual, and warnings."""
+    rows = [
+        ["parameter", "from", "fitted", f"{100 * CONFIDENCE:g} % interval"],
+        *([it.name, f"{it.value:.5g}", *found.told(it)] for it in found.parameters),
+    ]
+    widths = [max(len(cell) for cell in column) for column in zip(*rows, strict=True)]
+    table = [
+        "  " + "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows
+    ]
+    return "\n".join((f"{found.liquid_id}: {found.summary()}", *table, *(f"warning: {it}" for it in found.warnings)))
+
+
+def write(found: Fit, to: Path, source: Path) -> tuple[Path, ...]:
+    """Write preset (TOML), report (text), residuals (CSV) and figure into the folder ``to``; return the files.
+
+    ``source`` is the file that was measured: the preset names it with its hash.
+
+    Raises
+    ------
+    StudyError
+        A file cannot be written.
+    """
+    make_folder(to)
+    name = f"{found.liquid_id}-fit"
+    written = [to / f"{found.liquid_id}.toml", to / f"{name}.txt", to / f"{name}.csv"]
+    write_file(written[0], preset(found, source).encode())
+    write_file(written[1], f"{text(found)}\n".encode())
+    motion.write(written[2], residuals(found))
+    drawn = identify_figure.draw(found)
+    for kind in style.FORMATS:
+        written.append(to / f"{name}.{kind}")
+        write_file(written[-1], style.file_bytes(drawn, kind, f"{found.liquid_id}: measured and fitted force"))
+    return tuple(written)
+
+
+def residuals(found: Fit) -> Table:
+    """Return times, measured and fitted forces and what is left, a row a measured moment."""
+    table = np.recarray(len(found.motion.t_s), [(name, np.float64) for name in ("t_s", *COLUMNS)])
+    table["t_s"] = found.motion.t_s
+    values = np.column_stack([found.measured_n, found.fitted_n, found.residual_n])
+    for name, column in zip(COLUMNS, values.T, strict=True):
+        table[name] = column
+    return table
+
+
+def preset(found: Fit, source: Path) -> str:
+    """Return the fitted scene as a scene file, each fitted number with its interval beside it."""
+    digest = hashlib.sha256(source.read_bytes()).hexdigest()
+    said = (
+        f"Fitted to {source.name} (SHA-256 {digest[:16]}…), {found.summary()}.",
+        *(f"Warning: {warning}." for warning in found.warnings),
+    )
+    comments = [f"# {line}" for it in said for line in textwrap.wrap(it, _COMMENT_LETTERS)]
+    notes = {_place(it, found): f"{100 * CONFIDENCE:g} %: {found.told(it)[1]}" for it in found.parameters}
+    lines = [*comments, "", "format = 1", *_tables(("scene",), _scene(found.scene), notes)]
+    for liquid in found.scene.liquids:
+        lines += _tables(("liquids", liquid.id), _liquid(liquid), notes)
+    return "\n".join(lines) + "\n"
+
+
+def _place(it: Parameter, found: Fit) -> tuple[str, ...]:
+    """Return where a parameter stands in a scene file."""
+    if it.table == "body":
+        return "scene", "body", it.field
+    return "liquids", found.liquid_id, *(() if it.table == "liquid" else (it.table,)), it.field
+
+
+def _scene(scene: Scene) -> Mapping[str, Any]:
+    """Return what a scene file says of all liquids alike; it cannot say that velocities are given."""
+    given = {"velocity"} if isinstance(scene.velocity, Given) else set()
+    return scene.model_dump(exclude_none=True, exclude={"liquids", *given})
+
+
+def _liquid(liquid: Liquid) -> Mapping[str, Any]:
+    """Return what a scene file says of a liquid: without tables that mean nothing and say nothing new."""
+    idle = {name for name in ("added_mass", "history") if name not in liquid.effects}
+    fields = type(liquid).model_fields
+    idle = {name for name in idle if getattr(liquid, name) == fields[name].default}
+    return liquid.model_dump(exclude_none=True, exclude={"id", *idle})
+
+
+def _tables(place: tuple[str, ...], table: Mapping[str, Any], notes: Mapping[tuple[str, ...], str]) -> Iterator[str]:
+    """Yield a table of a TOML file, then those inside it."""
+    yield ""
+    yield f"[{'.'.join(place)}]"
+    for key, value in table.items():
+        if not isinstance(value, Mapping):
+            note = notes.get((*place, key))
+            yield f"{key} = {_written(value)}" + (f"  # {note}" if note else "")
+    for key, value in table.items():
+        if isinstance(value, Mapping) and value:
+            yield from _tables((*place, key), value, notes)
+
+
+def _written(value: object) -> str:
+    if isinstance(value, tuple):
+        return f"[{', '.join(_written(it) for it in value)}]"
+    return json.dumps(value, ensure_ascii=False) if isinstance(value, str | bool) else repr(value)

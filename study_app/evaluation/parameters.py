@@ -1,0 +1,135 @@
+"""The numbers of a liquid that a fit may vary: found by name, within the ranges of the scene's own models."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+from pydantic import BaseModel, ValidationError
+
+from study_app.errors import StudyError
+from study_app.haptics.scene import Liquid, Scene
+
+THRESHOLDS: Final = ("breaking_angle_deg", "breaking_span_m", "resolution_m")
+"""These decide for or against: the force does not change with them, or jumps."""
+
+_OF_EFFECTS: Final = ("wake", "local_wake", "current", "added_mass", "history")
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """One number of a scene.
+
+    ``name`` is what it was asked for by, ``table`` and ``field`` where it is: "liquid", "body" or an effect's table.
+    ``least`` and ``most`` are what its model permits, ``least`` itself not where ``above``. ``whole`` numbers count.
+    """
+
+    name: str
+    table: str
+    field: str
+    value: float
+    least: float
+    most: float
+    above: bool
+    whole: bool
+
+
+def find(scene: Scene, liquid_id: str, names: Sequence[str]) -> tuple[Parameter, ...]:
+    """Return the parameters called ``names``, of a scene whose liquids name their effects.
+
+    A name is a field of the liquid, of the tables of its effects or of the body, such as ``drag_coefficient``; where
+    two share one, the first found in this order, unless the table is named: ``body.density_kg_m3``.
+
+    Raises
+    ------
+    StudyError
+        No such liquid or parameter, one named twice, or one that cannot be fitted.
+    """
+    tables = dict(_tables(scene, _liquid(scene, liquid_id)))
+    if not names:
+        raise StudyError("no parameter is named: say which to fit, such as drag_coefficient")
+    found = tuple(_parameter(tables, name) for name in names)
+    for k, one in enumerate(found):
+        for other in found[:k]:
+            if (one.table, one.field) == (other.table, other.field):
+                raise StudyError(f"{other.name} and {one.name} are the same parameter: name it once")
+    return found
+
+
+def replace(scene: Scene, liquid_id: str, parameters: Sequence[Parameter], values: Sequence[float]) -> Scene:
+    """Return the scene with new values; those of whole numbers are rounded.
+
+    Raises
+    ------
+    StudyError
+        Values that the scene does not permit.
+    """
+    tree = scene.model_dump()
+    for parameter, value in zip(parameters, values, strict=True):
+        rows = [tree["body"]] if parameter.table == "body" else [it for it in tree["liquids"] if it["id"] == liquid_id]
+        for row in rows:
+            table = row if parameter.table in {"body", "liquid"} else row[parameter.table]
+            table[parameter.field] = round(value) if parameter.whole else float(value)
+    try:
+        return Scene.model_validate(tree)
+    except ValidationError as error:
+        said = ", ".join(f"{it.name} = {value:g}" for it, value in zip(parameters, values, strict=True))
+        raise StudyError(f"{said} is not permitted: {error.errors()[0]['msg']}") from error
+
+
+def _liquid(scene: Scene, liquid_id: str) -> Liquid:
+    for liquid in scene.liquids:
+        if liquid.id == liquid_id:
+            return liquid
+    there = ", ".join(liquid.id for liquid in scene.liquids) or "none"
+    raise StudyError(f"the scene has no liquid {liquid_id!r}: there is {there}")
+
+
+def _tables(scene: Scene, liquid: Liquid) -> Iterator[tuple[str, BaseModel]]:
+    """Yield the tables that say something about the force, in the order in which a plain name is looked for."""
+    yield "liquid", liquid
+    for name in _OF_EFFECTS:
+        table = getattr(liquid, name)
+        if name in liquid.effects and table is not None:
+            yield name, table
+    yield "body", scene.body
+
+
+def _parameter(tables: Mapping[str, BaseModel], name: str) -> Parameter:
+    place, _, field = name.rpartition(".")
+    if field in THRESHOLDS:
+        raise StudyError(
+            f"{name} cannot be fitted: it is a threshold, and the force does not change with it or jumps; "
+            "set it with --set and compare the residuals"
+        )
+    numbers = {name: dict(_numbers(table)) for name, table in tables.items()}
+    for table, fields in numbers.items():
+        if field in fields and place in {"", table}:
+            least, most, above, whole = fields[field]
+            value = getattr(tables[table], field)
+            if value is None and field == "reach_m":
+                value = getattr(tables["body"], "diameter_m")  # noqa: B009 - a table of any kind
+            if value is None:
+                raise StudyError(f"the scene gives no {name} to start from: give one with --set {name}=VALUE")
+            return Parameter(name, table, field, float(value), least, most, above, whole)
+    known = sorted({field for fields in numbers.values() for field in fields} - set(THRESHOLDS))
+    near = difflib.get_close_matches(field, known, n=1)
+    meant = f"did you mean {near[0]!r}? " if near else ""
+    raise StudyError(f"nothing to fit is called {name!r}: {meant}this liquid and its effects have {', '.join(known)}")
+
+
+def _numbers(table: BaseModel) -> Iterator[tuple[str, tuple[float, float, bool, bool]]]:
+    """Yield every field that is one number, with its least and greatest value, whether above the least, and whole."""
+    for field, schema in type(table).model_json_schema()["properties"].items():
+        for kind in schema.get("anyOf", [schema]):
+            if kind.get("type") in {"number", "integer"}:
+                yield field, (*_range(kind), kind["type"] == "integer")
+
+
+def _range(kind: Mapping[str, Any]) -> tuple[float, float, bool]:
+    above = "exclusiveMinimum" in kind
+    least = float(kind.get("exclusiveMinimum", kind.get("minimum", -math.inf)))
+    return least, float(kind.get("exclusiveMaximum", kind.get("maximum", math.inf))), above
