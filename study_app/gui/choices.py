@@ -9,9 +9,11 @@ from pathlib import Path
 
 from study_app.devices import is_simulated, kind_of
 from study_app.errors import StoreError
+from study_app.protocol.load import parse, source_bytes
 from study_app.session.resume import find_protocol
 from study_app.store.layout import locate, refuse_never_begun, study_folder
 from study_app.store.progress import progress
+from study_app.store.resume import check_can_go_on
 
 MAX_SEED = 999_999
 
@@ -56,9 +58,11 @@ def resumed(
     Raises
     ------
     StoreError
-        It is no session's folder, its journal cannot be read, or the session is finished.
+        It cannot go on: it is no session's folder, open in another program, finished, damaged, or of another protocol.
     SessionError
         No protocol at hand is of its study.
+    ProtocolError
+        The protocol cannot be used.
     """
     study, folder = locate(session_folder)
     refuse_never_begun(folder)
@@ -68,8 +72,11 @@ def resumed(
             f"{folder.path} is finished ({done.ended}): it cannot go on; use a new session number for another visit"
         )
     start = done.start
+    chosen = protocol if protocol is not None else find_protocol(start, candidates)
+    source = source_bytes(chosen)
+    check_can_go_on(session_folder, parse(source, chosen), source)
     return NewSession(
-        source=protocol if protocol is not None else find_protocol(start, candidates),
+        source=chosen,
         participant=start["participant"],
         session=start["session"],
         seed=start["seed"],

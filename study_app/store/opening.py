@@ -91,13 +91,30 @@ def is_open(folder: Path) -> bool:
     return any(_lives(_holder(marker)) for marker in markers(folder))
 
 
+def refuse_if_open(folder: Path) -> None:
+    """Refuse a folder that a program, perhaps this one, has open; nothing is changed.
+
+    Raises
+    ------
+    StoreError
+        Says which program, and since when.
+    """
+    for marker in markers(folder):
+        holder = _holder(marker)
+        if _lives(holder):
+            raise _is_open(marker, holder)
+
+
 def _pass(marker: Path) -> None:
     """Take away the marker of a program that is gone; refuse where it lives."""
     holder = _holder(marker)
-    if not _lives(holder):
-        marker.unlink(missing_ok=True)
-        return
-    raise StoreError(
+    if _lives(holder):
+        raise _is_open(marker, holder)
+    marker.unlink(missing_ok=True)
+
+
+def _is_open(marker: Path, holder: dict[str, Any]) -> StoreError:
+    return StoreError(
         f"{marker.parent} is open in another program (process {holder.get('pid')} on {holder.get('host')}, since "
         f"{holder.get('at')}): wait for it, or end it there; if that program is gone, delete {marker}"
     )

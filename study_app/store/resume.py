@@ -6,6 +6,7 @@ import contextlib
 import json
 import time
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
@@ -18,14 +19,14 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.schedule import stream
 from study_app.store import journal, receipt
 from study_app.store.atomic import is_there, sweep
-from study_app.store.blinding import open_or_draw_key, same_conditions
+from study_app.store.blinding import Key, open_or_draw_key, same_conditions
 from study_app.store.checksums import sha256
 from study_app.store.description import write_description
 from study_app.store.events import check_fields
-from study_app.store.journal import Journal, Line, SessionClock
-from study_app.store.layout import SessionFolder, locate, refuse_never_begun
+from study_app.store.journal import Contents, Journal, Line, SessionClock
+from study_app.store.layout import SessionFolder, StudyFolder, locate, refuse_never_begun
 from study_app.store.open_session import Place, SessionStore
-from study_app.store.opening import open_alone
+from study_app.store.opening import open_alone, refuse_if_open
 from study_app.store.participants import write_participants
 from study_app.store.progress import attempts, progress_of
 from study_app.store.recorder import Lost, Recorded, event_of, recording_files
@@ -71,21 +72,15 @@ def reopen(
     refuse_never_begun(folder)
     opening = open_alone(folder.path)
     try:
-        contents = journal.whole(folder.journal)
-        check_fields(folder.journal, contents.lines)
-        start = _unfinished(folder, contents.lines)
-        place = Place(study_folder, folder, start["study"])
-        first = receipt.read(folder.receipt)
-        _same_protocol(place, first, start, protocol, source)
-        draw = stream(start["seed"], "blinding").random if start["simulated"] else None
-        key = open_or_draw_key(study_folder.path, protocol, draw)
+        left = _left(study_folder, folder, protocol, source)
+        contents = left.contents
         gap_s, clock = _go_on(contents.lines, now_ns, now)
-        recorder = make_recorder(place, start, clock)
+        recorder = make_recorder(left.place, left.start, clock)
         opened = Journal.reopen(folder.journal, contents, clock)
     except BaseException:
         opening.release()
         raise
-    store = SessionStore(place, opened, key, first, opening, lines=contents.lines, recorder=recorder)
+    store = SessionStore(left.place, opened, left.key, left.receipt, opening, lines=contents.lines, recorder=recorder)
     told = {"gap_s": gap_s, "operator": operator}
     with contextlib.ExitStack() as failing:
         failing.callback(store.close)
@@ -93,14 +88,51 @@ def reopen(
         facts = {"torn_bytes": contents.torn_bytes, "device": device.get("name"), "version": study_app.__version__}
         store.append("session_resumed", t_s=at_s, **told, **facts)
         _sweep(folder)
-        for event, fields in _recordings_found(folder, contents.lines) if start.get("recordings") else ():
+        for event, fields in _recordings_found(folder, contents.lines) if left.start.get("recordings") else ():
             store.append(event, **fields)
         store.note_resumed({"at": clock.at(at_s), **told, **surroundings(device, screens, clock)})
         store.write_tables()
         write_description(study_folder, protocol.study)
-        write_participants(study_folder, place.study)
+        write_participants(study_folder, left.place.study)
         failing.pop_all()
     return store
+
+
+def check_can_go_on(session_folder: Path, protocol: Protocol, source: bytes) -> None:
+    """Refuse what `reopen` would refuse, before anything is made ready for it; nothing is touched.
+
+    Raises
+    ------
+    StoreError
+        As `reopen`.
+    """
+    study_folder, folder = locate(session_folder)
+    refuse_never_begun(folder)
+    refuse_if_open(folder.path)
+    _left(study_folder, folder, protocol, source)
+
+
+@dataclass(frozen=True, slots=True)
+class _Left:
+    """What an interrupted session left that can go on."""
+
+    place: Place
+    contents: Contents
+    start: Line
+    receipt: dict[str, Any]
+    key: Key
+
+
+def _left(study_folder: StudyFolder, folder: SessionFolder, protocol: Protocol, source: bytes) -> _Left:
+    """Read what an interrupted session left; refuse what cannot go on with this protocol."""
+    contents = journal.whole(folder.journal)
+    check_fields(folder.journal, contents.lines)
+    start = _unfinished(folder, contents.lines)
+    place = Place(study_folder, folder, start["study"])
+    first = receipt.read(folder.receipt)
+    _same_protocol(place, first, start, protocol, source)
+    draw = stream(start["seed"], "blinding").random if start["simulated"] else None
+    return _Left(place, contents, start, first, open_or_draw_key(study_folder.path, protocol, draw))
 
 
 def _unfinished(folder: SessionFolder, lines: list[Line]) -> Line:

@@ -4,6 +4,7 @@ import csv
 import io
 import itertools
 import json
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -25,7 +26,7 @@ from study_app.store.opening import is_open
 from study_app.store.rebuild import rebuild
 from study_app.store.recorder import event_of, recording_files
 from study_app.store.recording import read_samples, write_frames
-from study_app.store.resume import reopen
+from study_app.store.resume import check_can_go_on, reopen
 from study_app.store.session import SessionStore
 from study_app.store.verify import verify
 
@@ -291,6 +292,50 @@ def test_what_is_missing_is_named_and_nothing_is_written(
         again()
     assert every_byte(tmp_path) == before
     assert not is_open(store.folder.path)
+
+
+def finish(store: SessionStore) -> None:
+    store.finish("withdrawn")
+
+
+def lose_the_receipt(store: SessionStore) -> None:
+    store.close()
+    store.folder.receipt.unlink()
+
+
+def lose_the_key(store: SessionStore) -> None:
+    store.close()
+    store.place.study_folder.key.unlink()
+
+
+@pytest.mark.parametrize("done", [finish, lose_the_receipt, lose_the_key, SessionStore.close, None])
+def test_looking_alone_refuses_what_could_not_be_opened_again(
+    tmp_path: Path,
+    start: Callable[..., SessionStore],
+    again: Again,
+    protocol: Protocol,
+    done: Callable[[SessionStore], None] | None,
+) -> None:
+    """Of another protocol where the session was only closed; open where nothing was done."""
+    with start() as store:
+        if done is not None:
+            done(store)
+        source = SOURCE + b"# changed" if done is SessionStore.close else SOURCE
+        before = every_byte(tmp_path)
+        with pytest.raises(StoreError) as told:
+            check_can_go_on(store.folder.path, protocol, source)
+        assert every_byte(tmp_path) == before
+        with pytest.raises(StoreError, match=re.escape(str(told.value))):
+            again(source=source)
+
+
+def test_looking_at_a_session_that_can_go_on_changes_nothing(
+    tmp_path: Path, start: Callable[..., SessionStore], protocol: Protocol
+) -> None:
+    start().close()
+    before = every_byte(tmp_path)
+    check_can_go_on(tmp_path / "study" / "data" / "sub-P007" / "ses-01", protocol, SOURCE)
+    assert every_byte(tmp_path) == before
 
 
 def test_a_study_killed_before_it_was_described_is_described(

@@ -1,0 +1,73 @@
+"""What is chosen before a session, and what is refused before any window opens for it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from study_app import app
+from study_app.errors import StoreError
+from study_app.gui.choices import NewSession, resumed
+from study_app.protocol.load import load, source_bytes
+from study_app.store.session import SessionStore, begin
+
+
+@pytest.fixture
+def begun(tmp_path: Path) -> SessionStore:
+    """Begin a session of the demo; return it open."""
+    return begin(
+        tmp_path / "results",
+        load("demo"),
+        source_bytes("demo"),
+        "P001",
+        seed=5,
+        operator="AK",
+        language="en",
+        device={"name": "mouse"},
+        screens={},
+        simulated=False,
+    )
+
+
+@pytest.fixture
+def windows(monkeypatch: pytest.MonkeyPatch) -> list[NewSession]:
+    """Open no window; return the sessions for which they would have been."""
+    asked: list[NewSession] = []
+    monkeypatch.setattr(app, "_hold", lambda chosen, _tell: asked.append(chosen) or 0)
+    return asked
+
+
+def test_a_session_that_can_go_on_is_chosen_as_it_was_begun(begun: SessionStore, windows: list[NewSession]) -> None:
+    begun.close()
+    assert app.resume(begun.folder.path, operator="BB") == 0
+    (chosen,) = windows
+    assert chosen == resumed(begun.folder.path, operator="BB")
+    assert (chosen.participant, chosen.session, chosen.seed, chosen.device) == ("P001", 1, 5, "mouse")
+    assert (chosen.source, chosen.results, chosen.resumes) == ("demo", begun.place.study_folder.path, begun.folder.path)
+
+
+def test_a_session_that_is_open_is_refused_before_any_window(begun: SessionStore, windows: list[NewSession]) -> None:
+    with begun, pytest.raises(StoreError, match="is open in another program"):
+        app.resume(begun.folder.path)
+    assert windows == []
+
+
+def test_a_finished_session_is_refused_before_any_window(begun: SessionStore, windows: list[NewSession]) -> None:
+    begun.finish("completed")
+    with pytest.raises(StoreError, match="is finished"):
+        app.resume(begun.folder.path)
+    assert windows == []
+
+
+def test_a_changed_protocol_is_refused_before_any_window(
+    begun: SessionStore, windows: list[NewSession], tmp_path: Path
+) -> None:
+    begun.close()
+    before = begun.folder.journal.read_bytes()
+    changed = tmp_path / "changed.toml"
+    changed.write_text(source_bytes("demo").decode().replace('"Now reach"', '"Reach now"'))
+    with pytest.raises(StoreError, match="Reach now"):
+        app.resume(begun.folder.path, protocol=str(changed))
+    assert windows == []
+    assert begun.folder.journal.read_bytes() == before
