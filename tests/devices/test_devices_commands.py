@@ -102,7 +102,7 @@ class TestDoctorOverASocket:
             examined = examine(f"falcon-socket:{tmp_path / 'falcon'}", tell=str, seconds=0.25)
         assert examined.facts.program == "running"
         assert examined.facts.homed == 0b111
-        assert examined.facts.rate_hz > 0  # how fast is this machine's affair
+        assert examined.facts.replies  # how fast they come is this machine's affair
 
 
 class TestTheTerminal:

@@ -173,7 +173,7 @@ def _turned(device: FalconDevice, seconds: float) -> tuple[Facts, str | None]:
         replies=counters["replies"] > 0,
         moved=bool(np.ptp(samples["position_m"], axis=0).max() > _STILL_M) if len(samples) else None,
         broken_share=max(counters["requests"] - counters["replies"] - 1, 0) / asked,
-        rate_hz=None if emulated else timing(samples.view(np.recarray), rate_hz).rate_hz,
+        rate_hz=None if emulated else timing(samples.view(np.recarray), rate_hz).rate_hz or None,
     )
     return facts, failure
 
