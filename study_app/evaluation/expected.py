@@ -1,7 +1,7 @@
 """What to expect of a scene's choice of effects: its cost a tick, and how wrong its force is while a hand strokes.
 
 The hand strokes to and fro with the greatest speed and acceleration of the scene's motion, read in whole counts of an
-encoder, through the scene's own velocity estimator.
+encoder, through the scene's own velocity estimator. The force is that of the effects, before safety limits it.
 """
 
 from __future__ import annotations

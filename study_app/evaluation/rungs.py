@@ -20,6 +20,7 @@ from study_app.haptics.bounds import resistance_n
 from study_app.haptics.compiled import kernel
 from study_app.haptics.effects.drag import resistance
 from study_app.haptics.layout import ESTIMATOR_GIVEN, SAMPLE, Record, records
+from study_app.haptics.limits import Bearable
 from study_app.haptics.motion import Floats, Motion
 from study_app.haptics.pack import Model, pack
 from study_app.haptics.safety import new_safety
@@ -27,7 +28,7 @@ from study_app.haptics.scene import Given, Scene
 from study_app.haptics.tick import tick
 from study_app.haptics.vector import norm, subtract
 
-UNLIMITED_NSPM: Final = 1e9
+UNLIMITED: Final = Bearable(1e9, 1e9)
 """Forces are compared as the model gives them: no slope limit, which no table has for the slowest rungs."""
 COUNT_M: Final = 38e-6
 """One count of the Falcon's encoders, at the hand [m]."""
@@ -189,7 +190,7 @@ class InterpretedRung(Rung):
 
 
 def _packed(scene: Scene) -> Model:
-    return pack(scene, slope_limit_nspm=UNLIMITED_NSPM)
+    return pack(scene, limits=UNLIMITED)
 
 
 def given(scene: Scene) -> Scene:
