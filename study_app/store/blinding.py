@@ -9,6 +9,7 @@ system's randomness, a rehearsal's from its seed, and a folder holds one or the 
 from __future__ import annotations
 
 import base64
+import contextlib
 import hashlib
 import json
 import secrets
@@ -21,9 +22,9 @@ from typing import Any, Literal, TypeAlias
 from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
 from study_app.protocol.schedule import block_codes, draw_key
-from study_app.store import receipt
+from study_app.store import journal, receipt
 from study_app.store.atomic import append_line, cannot_read, create_folder, is_there
-from study_app.store.layout import StudyFolder
+from study_app.store.layout import SessionFolder, StudyFolder
 
 Codes: TypeAlias = dict[str, dict[str, str]]
 
@@ -209,15 +210,29 @@ def _tables_hash(protocol: Protocol) -> str:
 
 
 def _verified_key(study: StudyFolder) -> Key:
-    """Read the key and compare its hash with what every receipt published."""
+    """Read the key and compare its hash with what every session published."""
     key = read_key(study.path)
     for session in study.sessions():
-        if is_there(session.receipt) and receipt.read(session.receipt)["key_hash"] != key.hash:
+        if _published_hash(session) not in {None, key.hash}:
             raise StoreError(
-                f"{study.key} is not the key that {session.path} ran under (its SHA-256 differs from the receipt's): "
+                f"{study.key} is not the key that {session.path} ran under (its SHA-256 differs from the published): "
                 "restore it from a copy"
             )
     return key
+
+
+def _published_hash(session: SessionFolder) -> str | None:
+    """Return the key's hash that a session published.
+
+    In its receipt; where that cannot be read in its journal's first line, so that one damaged session stops no other;
+    None where neither can be.
+    """
+    with contextlib.suppress(StoreError):
+        return str(receipt.read(session.receipt)["key_hash"])
+    with contextlib.suppress(StoreError):
+        for line in journal.scan(session.journal).lines[:1]:
+            return str(line.get("key_hash"))
+    return None
 
 
 def read_key(folder: Path) -> Key:

@@ -202,6 +202,34 @@ def test_a_tampered_key_is_found_by_the_receipts(start: Callable[..., SessionSto
     assert reveals(folder) == ()
 
 
+@pytest.mark.parametrize("content", [b"", b"{}", b'{"key_hash', b"\xff\xfe", None])
+def test_a_damaged_receipt_stops_no_session_but_its_own(
+    start: Callable[..., SessionStore], tmp_path: Path, content: bytes | None
+) -> None:
+    with start("P001"):
+        pass
+    with start("P002") as store:
+        damaged = store.folder.receipt
+    if content is None:
+        damaged.unlink()
+    else:
+        damaged.write_bytes(content)
+    start("P003").finish("completed")
+    assert set(reveal(tmp_path / "study", by="AK", reason="done")) == {"practice", "liquids", "delays"}
+    assert [error.place for error in verify(tmp_path / "study").errors] == ["data/sub-P002/ses-01/receipt.json"]
+
+
+def test_a_tampered_key_is_found_by_the_journal_of_a_session_whose_receipt_is_damaged(
+    start: Callable[..., SessionStore], tmp_path: Path
+) -> None:
+    with start() as store:
+        store.folder.receipt.write_bytes(b"?")
+    content = content_of(tmp_path / "study") | {"nonce": "0" * 64}
+    sealed(tmp_path / "study").write_bytes(base64.encodebytes(json.dumps(content).encode()))
+    with pytest.raises(StoreError, match=r"is not the key that .*ses-01 ran under"):
+        start("P008")
+
+
 def test_a_lost_key_is_not_drawn_anew(start: Callable[..., SessionStore], tmp_path: Path) -> None:
     start("P001").finish("completed")
     sealed(tmp_path / "study").unlink()
