@@ -1,10 +1,14 @@
 """Sessions that were claimed and never begun: their program was ended before the journal's first line.
 
 Nothing happened in them, so their number is free again. Who takes one over has it open first, as every other folder.
+A program that is ended while it claims a session, or lets go of it, leaves a hidden folder beside it.
 """
 
 from __future__ import annotations
 
+import contextlib
+import shutil
+import time
 from pathlib import Path
 
 from study_app.errors import StoreError
@@ -13,6 +17,7 @@ from study_app.store.atomic import cannot_read, cannot_write, is_there, sweep, t
 from study_app.store.opening import Opening, is_open, markers, open_alone
 
 _BEFORE_THE_FIRST_LINE = ("receipt.json", "journal.jsonl")
+_NO_PROGRAM_TAKES_S = 3600.0  # to put its marker into a folder that it has created, or to take that folder away
 
 
 def never_begun(path: Path) -> bool:
@@ -74,3 +79,15 @@ def take_over(path: Path) -> Opening | None:
         opening.release()
         raise
     return opening
+
+
+def sweep_claims(participant: Path) -> None:
+    """Take away what programs that are gone left in a participant's folder as they claimed a session or let go of it.
+
+    Without a program's marker nobody knows whose it is; then only what is older than any such moment.
+    """
+    for half in temporaries(participant):
+        with contextlib.suppress(OSError):  # it has just become a session, or is gone
+            old = time.time() - half.stat().st_mtime > _NO_PROGRAM_TAKES_S
+            if half.is_dir() and (old or markers(half)) and not is_open(half):  # in this order: markers come
+                shutil.rmtree(half, ignore_errors=True)

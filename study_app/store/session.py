@@ -14,7 +14,7 @@ from study_app.protocol.load import protocol_hash
 from study_app.protocol.model import Protocol
 from study_app.protocol.schedule import stream
 from study_app.store import receipt
-from study_app.store.abandoned import take_over
+from study_app.store.abandoned import sweep_claims, take_over
 from study_app.store.atomic import beside, cannot_write, is_there, sync_folder
 from study_app.store.blinding import Key, open_or_draw_key
 from study_app.store.description import check_study, write_description
@@ -145,6 +145,7 @@ def _claim(place: Place) -> Opening:
     path = place.folder.path
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
+        sweep_claims(path.parent)
         opening = create_opened(path) or take_over(path)
     except OSError as error:
         raise cannot_write(path, error) from error

@@ -16,7 +16,7 @@ from study_app.store import journal, open_session, session
 from study_app.store.abandoned import abandoned, never_begun
 from study_app.store.layout import StudyFolder, check_unused, suggest_id
 from study_app.store.open_session import SessionStore
-from study_app.store.opening import open_alone
+from study_app.store.opening import markers, open_alone
 from study_app.store.resume import reopen
 from study_app.store.verify import verify
 from tests.store.conftest import SOURCE
@@ -119,6 +119,36 @@ def test_who_fails_after_taking_it_over_leaves_no_folder(
     with pytest.raises(StoreError, match="no space"):
         start("P004")
     assert not left.session("P004", 1).path.parent.exists()
+
+
+def test_what_a_program_killed_while_claiming_left_is_swept_with_the_next_claim(
+    study: StudyFolder, start: Start
+) -> None:
+    if not hasattr(os, "fork"):
+        pytest.skip("needs processes that fork")
+    place = study.session("P004", 1).path.parent
+    killed(start, "P004", Path, "rename")  # what makes the folder the session's
+    (half,) = place.iterdir()
+    assert half.name.startswith(".ses-01.")
+    assert markers(half)
+    start("P003", session=2).close()
+    assert half.is_dir(), "another participant's"
+    assert suggest_id(study) == "P004"
+    start("P004").finish("completed")
+    assert [path.name for path in place.iterdir()] == ["ses-01"]
+    assert verify(study.path).errors == ()
+
+
+def test_a_claim_whose_program_lives_or_is_not_known_stays(study: StudyFolder, start: Start) -> None:
+    place = study.session("P004", 1).path.parent
+    claimed, unmarked, old = (place / f".ses-02.{number:08x}.tmp" for number in range(3))
+    for half in (claimed, unmarked, old):
+        half.mkdir(parents=True)
+    open_alone(claimed)
+    os.utime(old, (0, 0))
+    os.utime(claimed, (0, 0))
+    start("P004").close()
+    assert {path.name for path in place.iterdir()} == {claimed.name, unmarked.name, "ses-01"}
 
 
 def test_a_session_that_began_is_never_taken_over(study: StudyFolder, start: Start) -> None:
