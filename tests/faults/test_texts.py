@@ -49,4 +49,8 @@ def test_a_free_text_survives_journal_tables_and_readers(tmp_path: Path, text: s
     assert exclusions(tmp_path / "study") == (excluded,)
     assert excluded.reason == text.strip()
     assert verify(tmp_path / "study").errors == ()
-    assert load_study(tmp_path / "study") is not None
+    study = load_study(tmp_path / "study")
+    assert study.trials["notes"][0] == first["notes"]
+    assert study.exclusions == (excluded,)
+    for table in (study.trials, study.participants):
+        assert set(table["exclusion_reason"]) == {text.strip()}
