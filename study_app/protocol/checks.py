@@ -12,6 +12,7 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict
 
 from study_app.haptics.scene import MAX_LIQUIDS
+from study_app.protocol.analysis import decisions
 from study_app.protocol.document import Path, names
 from study_app.protocol.model import Block, Condition, DeviceNeeds, Named, PageText, Reach
 from study_app.protocol.problems import Fault
@@ -59,7 +60,7 @@ def draft(document: Mapping[str, Any], broken: Iterable[Path]) -> Draft:
 
 def check(document: Mapping[str, Any], broken: Iterable[Path]) -> Iterator[Fault]:
     """Yield every problem between the tables of ``document``, whose ``broken`` places are known already."""
-    for of_names in (references, sequence, repeats, items, languages):
+    for of_names in (references, sequence, repeats, items, languages, decisions):
         yield from of_names(document)
     parts = draft(document, broken)
     for of_tables in (targets, crowded, practice, codes, breaks, counted_parts):

@@ -14,6 +14,7 @@ from pydantic import BaseModel, BeforeValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from study_app.haptics.scene import Accuracy, Body, Estimator, Ewma, Knee, Liquid, MotionBox, Scene
+from study_app.protocol.analysis import Analysis
 from study_app.protocol.blocks import Block
 from study_app.protocol.questionnaires import Item, Questionnaire, Scale
 from study_app.protocol.table import Table
@@ -21,6 +22,7 @@ from study_app.protocol.tasks import Explore, Reach, Task
 from study_app.protocol.texts import Id, Language, Localised, text_in
 
 __all__ = [
+    "Analysis",
     "Block",
     "Condition",
     "DeviceNeeds",
@@ -101,6 +103,9 @@ class Condition(Table):
     liquid: Id | None = Field(default=None, description="The liquid; or give liquids.")
     liquids: tuple[Id, ...] = Field(default=(), description="Several liquids; where they overlap the last one counts.")
     delay_ms: float = Field(default=0, ge=0, le=1000, description="Delay of everything drawn in the tank [ms].")
+    label: Id | None = Field(
+        default=None, description="The item of analysis.names that is right for it; left out: none is."
+    )
 
     @property
     def liquid_ids(self) -> tuple[str, ...]:
@@ -161,6 +166,7 @@ class Protocol(Table):
     blocks: Named[Block] = Field(min_length=1)
     sequence: tuple[Id, ...] = Field(min_length=1, description="Pages and blocks in the order of the session.")
     limits: Limits = Field(default_factory=Limits)
+    analysis: Analysis | None = Field(default=None, description="What was decided before the first session.")
 
     def text(self, value: str | dict[str, str], language: str) -> str:
         """Return a localised text in one of the study's languages."""

@@ -138,6 +138,14 @@ body = { en = "Let go.", nl = "Laat los." }
 )
 """The sound protocol with constraints, breaks, dealt rows and items in random order."""
 
+DECIDED = """\
+[analysis]
+names = ["warm", "cold"]
+rising = ["warm"]
+noticed = "cold"
+
+"""
+
 MORE_ITEMS = """\
 [questionnaires.more]
 intro = { en = "How much?", nl = "Hoeveel?" }
@@ -379,6 +387,19 @@ CASES = (
     case("part left out", "part = 2", "part = 3", ("part = 3", "blocks.look.part", "is 3, must be 1 or 2")),
     case("first part", "part = 1", "part = 2",
          ('part = 2\ntitle = { en = "Feeling"', "blocks.feel.part", "is 2, must be 1")),
+    # what was decided about the analysis
+    case("unknown item of the analysis", "[pages.hello]", DECIDED.replace('rising = ["warm"]', 'rising = ["worm"]') +
+         "[pages.hello]", ("rising", "analysis.rising.1", 'there is no item "worm" (did you mean "warm"?)')),
+    case("unknown item of noticing", "[pages.hello]", DECIDED.replace('noticed = "cold"', 'noticed = "late"') +
+         "[pages.hello]", ("noticed", "analysis.noticed", 'there is no item "late"')),
+    case("item that rises and falls", "[pages.hello]", DECIDED.replace("noticed", 'falling = ["warm"]\nnoticed') +
+         "[pages.hello]", ("rising", "analysis.rising.1", '"warm" is expected to fall too')),
+    case("item decided twice", "[pages.hello]", DECIDED.replace('["warm"]', '["warm", "warm"]') + "[pages.hello]",
+         ("rising", "analysis.rising.2", '"warm" is there twice')),
+    case("label of no name", "delay_ms = 120", 'delay_ms = 120\nlabel = "cold"',
+         ('label = "cold"', "conditions.both.label", '"cold" is not among analysis.names')),
+    case("bound of nothing", "[pages.hello]", DECIDED.replace("names", "equivalence_bound = 0\nnames") +
+         "[pages.hello]", ("equivalence_bound", "analysis.equivalence_bound", "is 0, must be more than 0")),
     # several at once
     Case(
         "all at once",

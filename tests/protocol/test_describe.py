@@ -33,6 +33,9 @@ REK = load("rek2024")
         "delay_125  water      seen 125 ms late",
         "like_honey    This liquid behaves like honey.",
         "from 1 (Completely disagree) to 7 (Completely agree)",
+        "Equivalent       answers as without delay, to within 1 point of the scale",
+        "Recognised       water by like_water, honey by like_honey, light_oil by like_oil",
+        "Fall with delay  comfortable",
     ],
 )
 def test_the_thesis_study_in_words(words: str):
@@ -141,3 +144,13 @@ def test_a_task_never_lasts_longer_than_its_timeout():
 
 def test_the_demo_takes_three_minutes():
     assert expected_duration_s(load("demo")) == pytest.approx(180, abs=30)
+
+
+def test_what_was_decided_about_the_analysis_or_that_nothing_was():
+    assert "nothing  there is no table [analysis]: the report will call" in describe(
+        parse(SOUND.encode(), "small.toml")
+    )
+    told = describe(parse((SOUND + '[analysis]\nalpha = 0.01\nprimary = ["cold"]\n').encode(), "small.toml"))
+    assert "p of at most 0.01" in told
+    assert "Primary          cold" in told
+    assert "Equivalent       not tested" in told
