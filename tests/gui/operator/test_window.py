@@ -64,6 +64,15 @@ def test_the_bar_is_filled_as_far_as_the_line_below_it_says(window, told, done):
     assert filled == pytest.approx(done / 4, abs=0.08)  # gaps and round ends
 
 
+def test_what_the_buttons_do_is_one_line_below_them(running, told, qtbot):
+    running.resize(1600, 900)
+    for view in (told.view(), told.view(trouble="the disk is full", waits=True)):
+        running.show_view(view)
+        hint = running.buttons.hint
+        qtbot.waitUntil(lambda hint=hint: hint.width() > 0)
+        assert hint.fontMetrics().horizontalAdvance(hint.text()) < hint.width()
+
+
 def test_the_limit_a_trial_broke_can_be_read_in_the_smallest_window(window, told, health, qtbot):
     told.welcome()
     told.start(1)
