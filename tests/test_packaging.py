@@ -1,6 +1,7 @@
 """What is shipped: the wheel works far from the checkout, the README's commands are the ones the check runs."""
 
 import os
+import re
 import subprocess
 import sys
 from importlib.metadata import requires
@@ -59,7 +60,7 @@ def test_qt_stays_where_repainting_does_not_leak() -> None:
 
 def test_every_picture_of_the_readme_is_there() -> None:
     readme = (ROOT / "README.md").read_text("utf-8")
-    pictures = [part.split(")")[0] for part in readme.split("](")[1:] if part.startswith(".readme/")]
+    pictures = re.findall(r'(?:\]\(|src=")(\.readme/[^)"]+)', readme)
     assert pictures
     for picture in pictures:
         assert (ROOT / picture).is_file(), picture
