@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import click
+from click.core import ParameterSource
 
 from study_app.cli.words import FILE, RESULTS, SESSION
 
@@ -114,26 +115,49 @@ def run(
 
 @click.command()
 @FILE
-@click.option("--participants", type=click.IntRange(1, 999), default=1, show_default=True)
+@click.option("--participants", type=click.IntRange(1, 99_999), default=1, show_default=True)
 @click.option("--seed", type=SEED, default=1, show_default=True)
 @click.option("--device", default="scripted", show_default=True, metavar="NAME", help="scripted or falcon-emulated.")
 @click.option("--no-recordings", is_flag=True, help="Keep answers and trial rows only, not every sample and frame.")
+@click.option(
+    "--answers-only",
+    is_flag=True,
+    help="Thousands of participants in seconds, to try an analysis: four sessions are rehearsed and kept nowhere, then "
+    "everybody answers by what was felt in one of them. Nothing is measured: those columns say n/a. Sessions are "
+    "written whole, without waiting for the disk.",
+)
 @RESULTS
+@click.pass_context
 def rehearse(
-    protocol: str, participants: int, seed: int, device: str, *, no_recordings: bool, results: Path | None
+    context: click.Context,
+    protocol: str,
+    participants: int,
+    seed: int,
+    device: str,
+    *,
+    no_recordings: bool,
+    answers_only: bool,
+    results: Path | None,
 ) -> None:
     """Run whole sessions with simulated participants, faster than real time; every row says simulated."""
-    from study_app.session.rehearsal import rehearse as rehearse_study
+    if answers_only:
+        if context.get_parameter_source("device") is not ParameterSource.DEFAULT:
+            raise click.UsageError("--answers-only needs no device: leave out --device")
+        from study_app.session.answers_only import rehearse_answers
 
-    folder = rehearse_study(
-        protocol,
-        participants=participants,
-        seed=seed,
-        device=device,
-        results=results,
-        recordings=not no_recordings,
-        progress=click.echo,
-    )
+        folder = rehearse_answers(protocol, participants=participants, seed=seed, results=results, progress=click.echo)
+    else:
+        from study_app.session.rehearsal import rehearse as rehearse_study
+
+        folder = rehearse_study(
+            protocol,
+            participants=participants,
+            seed=seed,
+            device=device,
+            results=results,
+            recordings=not no_recordings,
+            progress=click.echo,
+        )
     click.echo(f"{folder}: {participants} simulated participant{'s' if participants > 1 else ''}")
 
 

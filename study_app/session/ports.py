@@ -8,6 +8,8 @@ from typing import Any, Protocol
 
 from study_app.haptics.scene import Scene
 from study_app.session.pages import Page
+from study_app.store.blinding import Key
+from study_app.store.journal import SessionClock
 
 
 class ServoPort(Protocol):
@@ -40,6 +42,14 @@ class RecorderPort(Protocol):
     def append(self, samples: Any) -> None: ...  # noqa: D102
     def frame(self, painted_ns: int, sample_ns: int) -> None: ...  # noqa: D102
     def stop(self) -> None: ...  # noqa: D102
+
+
+class KeptSession(JournalPort, Protocol):
+    """What is asked of the store of a rehearsed session (``store.open_session.SessionStore``)."""
+
+    clock: SessionClock
+    recorder: Any
+    key: Key
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,16 +25,16 @@ from study_app.errors import SessionError, StoreError
 from study_app.haptics.clock import VirtualClock
 from study_app.haptics.pack import elements_needed
 from study_app.haptics.servo import Servo
-from study_app.protocol.answers import rate, rater
+from study_app.protocol.answers import Felt, rater
 from study_app.protocol.load import parse, source_bytes
 from study_app.protocol.model import Protocol, Reach
 from study_app.protocol.schedule import Schedule, build_schedule, stream
 from study_app.session.events import Begin, Chosen, Continue, Event, ItemShown, ResumeAsked, Submitted
 from study_app.session.pages import Page, PausePage, QuestionnairePage, TaskPage, TextPage
-from study_app.session.ports import Ports
+from study_app.session.ports import KeptSession, Ports
 from study_app.session.resume import FIRST, REHEARSED_SCREENS, Start, find_protocol, resume_at
 from study_app.session.runner import Runner
-from study_app.session.simulated import Draw, Explorer, Reacher, Senses, choices, reading_s
+from study_app.session.simulated import Draw, Explorer, Reacher, Senses, filled_in, reading_s
 from study_app.store import journal
 from study_app.store.description import check_study
 from study_app.store.journal import SessionClock
@@ -95,7 +95,7 @@ def rehearse(
         check_unused(StudyFolder(folder), person, 1)
     for person in people:
         began = time.perf_counter()
-        with _Machine(study, person, seed, device) as machine:
+        with Machine(study, person, seed, device) as machine:
             store = begin(
                 folder,
                 study,
@@ -137,7 +137,7 @@ def resume(session_folder: Path, *, protocol: str | Path | None = None) -> None:
     source = source_bytes(name)
     study = parse(source, name)
     person, seed = begun["participant"], begun["seed"]
-    with _Machine(study, person, seed, begun["device"]) as machine:
+    with Machine(study, person, seed, begun["device"]) as machine:
         store = reopen(
             session_folder,
             study,
@@ -152,7 +152,7 @@ def resume(session_folder: Path, *, protocol: str | Path | None = None) -> None:
         _run(study, schedule, machine, store, resume_at(study, schedule, lines))
 
 
-class _Machine:
+class Machine:
     """A device with a simulated hand, and its servo on a clock that stands still but for the servo.
 
     Both end with the block.
@@ -187,23 +187,34 @@ class _Machine:
         self.device.close()
 
 
-def _run(
-    study: Protocol, schedule: Schedule, machine: _Machine, store: SessionStore, start: Start
-) -> tuple[float, int]:
+def _run(study: Protocol, schedule: Schedule, machine: Machine, store: SessionStore, start: Start) -> tuple[float, int]:
     """Run an open session to its end; return how long it lasted in its own time [s], and its answers."""
     with store:
-        rehearsal = _Rehearsal(study, schedule, machine, store, start)
+        rehearsal = Rehearsal(study, schedule, machine, store, start)
         rehearsal.run()
     return store.clock.seconds(), rehearsal.answers
 
 
-class _Rehearsal:
-    """One session and its simulated participant."""
+class Rehearsal:
+    """One session and its simulated participant.
+
+    Parameters
+    ----------
+    store : where it is kept
+    felt : is told of every trial what was felt in it
+    """
 
     def __init__(
-        self, study: Protocol, schedule: Schedule, machine: _Machine, store: SessionStore, start: Start
+        self,
+        study: Protocol,
+        schedule: Schedule,
+        machine: Machine,
+        store: KeptSession,
+        start: Start = FIRST,
+        felt: Callable[[int, Felt], object] | None = None,
     ) -> None:
         self.answers = 0
+        self._tell_felt = felt
         self._study = study
         self._machine = machine
         self._seed = schedule.seed
@@ -284,6 +295,8 @@ class _Rehearsal:
                 self._post(Continue(self._now_s()))
         arm.rest()
         self._felt = senses.felt()
+        if self._tell_felt is not None:
+            self._tell_felt(page.trial, self._felt)
 
     def _see(self, senses: Senses, hand: Explorer | Reacher) -> bool:
         """Show the frames since the last look, and let the hand act on the newest; return whether it is done."""
@@ -302,13 +315,11 @@ class _Rehearsal:
         """Answer every statement by what was felt, and confirm."""
         for item in page.items:
             self._post(ItemShown(self._now_s(), item.id))
-        draw = self._stream(f"{page.trial}/answers")
-        answers = rate([item.id for item in page.items], self._felt, self._person, draw)
-        for choice in choices(answers, draw, len(page.labels)):
+        for choice in filled_in(page, self._felt, self._person, self._stream(f"{page.trial}/answers")):
             self._pass(choice.after_s)
             if page is not self._page:
                 return
             self._post(Chosen(self._now_s(), choice.item, choice.value))
         self._pass(1.0)
         self._post(Submitted(self._now_s()))
-        self.answers += len(answers)
+        self.answers += len(page.items)

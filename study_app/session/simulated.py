@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from study_app.devices.hand_orders import HandOrders
-from study_app.protocol.answers import Felt
+from study_app.protocol.answers import Felt, Rater, rate
 from study_app.protocol.model import Explore, Reach
-from study_app.session.pages import TextPage
+from study_app.session.pages import QuestionnairePage, TextPage
 from study_app.session.runner import TankView
 from study_app.session.strokes import exploration
 
@@ -134,6 +134,11 @@ class Choice:
     item: str
     value: int
     after_s: float
+
+
+def filled_in(page: QuestionnairePage, felt: Felt, person: Rater, draw: Draw) -> list[Choice]:
+    """Return how a page is answered by what was felt."""
+    return choices(rate([item.id for item in page.items], felt, person, draw), draw, len(page.labels))
 
 
 def choices(answers: dict[str, int], draw: Draw, points: int) -> list[Choice]:

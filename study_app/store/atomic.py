@@ -8,6 +8,7 @@ import re
 import secrets
 import shutil
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import BinaryIO
 
@@ -41,11 +42,12 @@ def write_file(path: Path, content: bytes, *, waits: bool = True) -> None:
             half.unlink(missing_ok=True)
 
 
-def create_folder(path: Path, files: dict[str, bytes]) -> bool:
+def create_folder(path: Path, files: Mapping[str, bytes], *, waits: bool = True) -> bool:
     """Create folder ``path`` holding ``files``, or return False where another program was first.
 
     The folder is filled beside and renamed into place, which no system does over a folder that holds something: of
-    two programs exactly one succeeds, and the other finds every file whole.
+    two programs exactly one succeeds, and the other finds every file whole. Without ``waits`` nothing is flushed: for
+    what can be made again, since a power cut may then take it.
 
     Raises
     ------
@@ -56,10 +58,12 @@ def create_folder(path: Path, files: dict[str, bytes]) -> bool:
     try:
         half.mkdir()
         for name, content in files.items():
-            _write_through(half / name, content)
-        sync_folder(half)
+            _write_through(half / name, content, waits=waits)
+        if waits:
+            sync_folder(half)
         half.rename(path)
-        sync_folder(path.parent)
+        if waits:
+            sync_folder(path.parent)
     except OSError as error:
         if any((path / name).exists() for name in files):
             return False

@@ -13,7 +13,7 @@ import json
 import math
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -129,18 +129,8 @@ class Journal:
         """
         if self._file.closed:
             raise StoreError(f"{self.path} is closed: {event!r} came after the session's end and was not recorded")
-        if not fields.keys().isdisjoint(_OWN):
-            raise ValueError(f"{event}: fields {_OWN} are the journal's own")
-        moment = self.clock.seconds() if t_s is None else t_s
-        line = {
-            "n": self._lines + 1,
-            "event": event,
-            "t_s": round(moment, 6),
-            "at": self.clock.at(moment),
-            **{name: plain(value) for name, value in fields.items()},
-        }
-        text = json.dumps(line, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
-        content = text.encode("utf-8", "backslashreplace") + b"\n"
+        line = line_of(self._lines + 1, event, self.clock, t_s, fields)
+        content = line_bytes(line)
         try:
             if self._torn:
                 self._take_back()
@@ -247,6 +237,26 @@ def scan(path: Path) -> Contents:
         lines.append(line)
         whole_bytes += len(piece) + 1
     return Contents(lines, whole_bytes, torn_bytes=len(tail))
+
+
+def line_of(number: int, event: str, clock: SessionClock, t_s: float | None, fields: Mapping[str, Any]) -> Line:
+    """Return a line of a journal; ``t_s`` is when it happened, by default now on ``clock``."""
+    if not fields.keys().isdisjoint(_OWN):
+        raise ValueError(f"{event}: fields {_OWN} are the journal's own")
+    moment = clock.seconds() if t_s is None else t_s
+    return {
+        "n": number,
+        "event": event,
+        "t_s": round(moment, 6),
+        "at": clock.at(moment),
+        **{name: plain(value) for name, value in fields.items()},
+    }
+
+
+def line_bytes(line: Line) -> bytes:
+    """Return a line as it stands in the file, newline and all."""
+    text = json.dumps(line, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    return text.encode("utf-8", "backslashreplace") + b"\n"
 
 
 def plain(value: Any) -> Any:

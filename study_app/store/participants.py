@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Final
+
 from study_app.errors import StoreError
 from study_app.store import journal, tables
 from study_app.store.atomic import is_there, write_file
@@ -9,10 +14,19 @@ from study_app.store.columns import PARTICIPANTS, header
 from study_app.store.events import check_fields
 from study_app.store.layout import SessionFolder, StudyFolder
 
+NONE: Final[Mapping[Path, tables.Row]] = MappingProxyType({})
 
-def participants(folder: StudyFolder) -> list[tables.Row]:
-    """Return one row per session that has begun its journal, by participant and number."""
-    return [row for session in folder.sessions() for row in row_of(session)]
+
+def participants(folder: StudyFolder, known: Mapping[Path, tables.Row] = NONE) -> list[tables.Row]:
+    """Return one row per session that has begun its journal, by participant and number.
+
+    ``known`` are rows by session folder whose journals need not be read, since this program has just written them.
+    """
+    return [
+        row
+        for session in folder.sessions()
+        for row in ([known[session.path]] if session.path in known else row_of(session))
+    ]
 
 
 def row_of(session: SessionFolder) -> list[tables.Row]:
@@ -37,8 +51,8 @@ def _damaged(session: SessionFolder, start: journal.Line) -> tables.Row:
     return {**dict.fromkeys(header(PARTICIPANTS)), **known, **which, "status": "damaged"}
 
 
-def write_participants(folder: StudyFolder, study: str) -> None:
-    """Bring the table up to date with all journals.
+def write_participants(folder: StudyFolder, study: str, known: Mapping[Path, tables.Row] = NONE) -> None:
+    """Bring the table up to date with all journals; ``known`` as in :func:`participants`.
 
     Several programs may do so at once on a shared folder: each looks again after it wrote, so that whoever wrote last
     has seen what the others journalled before they wrote, and the table ends up complete.
@@ -49,12 +63,12 @@ def write_participants(folder: StudyFolder, study: str) -> None:
         The table cannot be written, or a journal cannot be read.
     """
     path = folder.participants(study)
-    content = tables.csv_bytes(PARTICIPANTS, participants(folder))
+    content = tables.csv_bytes(PARTICIPANTS, participants(folder, known))
     if path.is_file() and path.read_bytes() == content:
         return
     while True:
         write_file(path, content)
-        again = tables.csv_bytes(PARTICIPANTS, participants(folder))
+        again = tables.csv_bytes(PARTICIPANTS, participants(folder, known))
         if again == content:
             return
         content = again

@@ -72,9 +72,51 @@ def begin(
     check_study(study_folder, protocol.study.name)
     check_unused(study_folder, participant, session)
     clock = clock if clock is not None else SessionClock()
-    _make_folder(study_folder.path)
+    make_folder(study_folder.path)
     key = open_or_draw_key(study_folder.path, protocol, stream(seed, "blinding").random if simulated else None)
     place = Place(study_folder, study_folder.session(participant, session), protocol.study.name)
+    started, first_receipt = first_words(
+        protocol,
+        source,
+        participant,
+        session=session,
+        seed=seed,
+        operator=operator,
+        language=language,
+        device=device,
+        screens=screens,
+        simulated=simulated,
+        pilot=pilot,
+        recordings=recordings,
+        key_hash=key.hash,
+        clock=clock,
+    )
+    opening = _claim(place)
+    try:
+        return _open(place, opening, clock, key, first_receipt, started, protocol)
+    except BaseException:
+        _unclaim(place, opening)
+        raise
+
+
+def first_words(
+    protocol: Protocol,
+    source: bytes,
+    participant: str,
+    *,
+    session: int,
+    seed: int,
+    operator: str,
+    language: str,
+    device: Mapping[str, Any],
+    screens: Mapping[str, Any],
+    simulated: bool,
+    pilot: bool,
+    recordings: bool,
+    key_hash: str,
+    clock: SessionClock,
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return the fields of a session's first line, and its receipt as it is before the first trial."""
     facts = {
         "participant": participant,
         "session": session,
@@ -85,7 +127,7 @@ def begin(
         "simulated": simulated,
         "pilot": pilot,
         "recordings": recordings,
-        "key_hash": key.hash,
+        "key_hash": key_hash,
         "protocol_hash": protocol_hash(source),
         "version": study_app.__version__,
     }
@@ -102,12 +144,7 @@ def begin(
         **surroundings(device, screens, clock),
         "protocol": receipt.without_conditions(protocol),
     }
-    opening = _claim(place)
-    try:
-        return _open(place, opening, clock, key, first_receipt, started, protocol)
-    except BaseException:
-        _unclaim(place, opening)
-        raise
+    return started, first_receipt
 
 
 def make_recorder(place: Place, start: Mapping[str, Any], clock: SessionClock) -> Recorder | None:
@@ -128,7 +165,7 @@ def surroundings(device: Mapping[str, Any], screens: Mapping[str, Any], clock: S
     }
 
 
-def _make_folder(path: Path) -> None:
+def make_folder(path: Path) -> None:
     """Create the study's folder, which several programs may share, and let no power cut take it or one above it."""
     path = path.absolute()
     missing = [level for level in (path, *path.parents) if not is_there(level)]

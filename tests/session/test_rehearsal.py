@@ -160,13 +160,13 @@ def test_the_last_choice_for_an_item_is_its_answer_and_every_choice_is_on_the_sc
 def test_a_device_that_is_lost_ends_the_rehearsal_with_a_word_why(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    look = rehearsal._Rehearsal._see
+    look = rehearsal.Rehearsal._see
 
     def pull_the_cable(self: Any, senses: Any, hand: Any) -> bool:
         self._machine.device.unplug()
         return look(self, senses, hand)
 
-    monkeypatch.setattr(rehearsal._Rehearsal, "_see", pull_the_cable)
+    monkeypatch.setattr(rehearsal.Rehearsal, "_see", pull_the_cable)
     with pytest.raises(SessionError, match="stopped answering"):
         rehearsal.rehearse("demo", participants=1, seed=1, results=tmp_path / "demo")
 

@@ -192,7 +192,7 @@ def test_a_minute_with_faulty_packets_has_no_jump_of_force_and_no_turn_unaccount
 
 
 def test_a_cable_pulled_in_a_trial_keeps_the_data_marks_the_trial_and_lets_it_go_on(tmp_path, monkeypatch):
-    look, looks = rehearsal._Rehearsal._see, []
+    look, looks = rehearsal.Rehearsal._see, []
 
     def pull_the_cable(self, senses, hand):
         looks.append(self._page.trial)
@@ -202,7 +202,7 @@ def test_a_cable_pulled_in_a_trial_keeps_the_data_marks_the_trial_and_lets_it_go
 
     folder = StudyFolder(tmp_path / "demo")
     with monkeypatch.context() as patch:
-        patch.setattr(rehearsal._Rehearsal, "_see", pull_the_cable)
+        patch.setattr(rehearsal.Rehearsal, "_see", pull_the_cable)
         with pytest.raises(SessionError, match="'falcon-emulated' stopped answering"):
             rehearsal.rehearse("demo", participants=1, seed=1, device="falcon-emulated", results=folder.path)
     (session,) = folder.sessions()

@@ -1,0 +1,159 @@
+"""Sessions that are answered without being held: the machine, the questionnaires and the answer model, and no servo.
+
+What a trial felt like is drawn from what rehearsed participants felt in its condition (see ``feelings``); a task takes
+its least time, and nothing of it is measured, so those columns say n/a. Everything else is as in a rehearsal: the same
+machine, orders, answer model and files, and every row says that it is simulated. Who feels what the rehearsed
+participant felt answers word for word as in the rehearsal.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from datetime import datetime
+from pathlib import Path
+
+from study_app.errors import SessionError
+from study_app.protocol.answers import Felt, rater
+from study_app.protocol.load import parse, source_bytes
+from study_app.protocol.model import Explore, Protocol, Reach
+from study_app.protocol.schedule import build_schedule, stream
+from study_app.session.commands import Command, Finish, ShowPage, StartTrial, Write
+from study_app.session.events import Begin, Chosen, Continue, Event, ItemShown, Submitted, TaskDone
+from study_app.session.feelings import FEELING, Feelings, feelings
+from study_app.session.machine import advance, open_session
+from study_app.session.pages import Page, QuestionnairePage, TaskPage, TextPage
+from study_app.session.resume import REHEARSED_SCREENS
+from study_app.session.simulated import Draw, filled_in, reading_s
+from study_app.session.state import FINAL
+from study_app.store.journal import SessionClock
+from study_app.store.simulated import SimulatedSession, SimulatedStudy
+
+DEVICE = {"name": "answers-only", "measured": False}
+SAY_EVERY_S = 5.0
+REACH_S = 1.0  # from target to target, where nobody moves
+
+
+def rehearse_answers(
+    protocol: str | Path,
+    *,
+    participants: int,
+    seed: int,
+    results: Path | None = None,
+    felt: Feelings | None = None,
+    progress: Callable[[str], object] | None = None,
+) -> Path:
+    """Answer for P001, P002 … and return the study folder.
+
+    Parameters
+    ----------
+    protocol : file or name of a protocol
+    participants : how many
+    seed : all randomness comes from it, the key's too
+    results : study folder; by default ``results/<study>``
+    felt : what each condition feels like; by default rehearsed first
+    progress : is told a line now and then
+
+    Raises
+    ------
+    ProtocolError
+        The protocol cannot be used.
+    StoreError
+        The folder holds another study or an id is used already, and then nothing was touched; or it cannot be written.
+    SessionError
+        A session broke.
+    """
+    source = source_bytes(protocol)
+    study = parse(source, str(protocol))
+    folder = Path("results") / study.study.name if results is None else Path(results)
+    people = tuple(f"P{number:03d}" for number in range(1, participants + 1))
+    kept = SimulatedStudy(folder, study, source, people, seed=seed, device=DEVICE, screens=REHEARSED_SCREENS)
+    if felt is None:
+        felt = feelings(study, seed=seed, people=FEELING, progress=progress)
+    said_s = time.monotonic()
+    with kept:
+        for number, person in enumerate(people, start=1):
+            _Answering(study, person, seed, kept, felt).run()
+            if progress is not None and (time.monotonic() - said_s >= SAY_EVERY_S or number == participants):
+                said_s = time.monotonic()
+                progress(f"{person}: {number} of {participants} answered (simulated)")
+    return folder
+
+
+class _Answering:
+    """One session that is answered without being held."""
+
+    def __init__(self, study: Protocol, who: str, seed: int, kept: SimulatedStudy, felt: Feelings) -> None:
+        self._study = study
+        self._seed = seed
+        self._who = who
+        self._felt = felt
+        self._feels: Felt | None = None
+        self._page: Page | None = None
+        self._now_s = 0.0
+        clock = SessionClock(lambda: round(self._now_s * 1e9), datetime.now().astimezone())
+        self._store: SimulatedSession = kept.begin(who, clock)
+        self._person = rater(self._stream("person"))
+        schedule = build_schedule(study, who, seed)
+        self._state = open_session(study, schedule, kept.key.codes, study.study.languages[0])
+
+    def _stream(self, name: str) -> Draw:
+        return stream(self._seed, f"rehearsal/{self._who}/{name}").random
+
+    def run(self) -> None:
+        """Go from the first page to the last."""
+        self._post(Begin(self._now_s))
+        while self._state.phase not in FINAL:
+            match self._page:
+                case TextPage() as page:
+                    self._pass(reading_s(page))
+                    self._post(Continue(self._now_s))
+                case TaskPage() as page:
+                    self._pass(_least_s(page.task))
+                    self._post(TaskDone(self._now_s, "complete", {}))
+                case QuestionnairePage() as page:
+                    self._fill_in(page)
+                case _:
+                    raise SessionError(f"the session broke at {self._page}")
+
+    def _fill_in(self, page: QuestionnairePage) -> None:
+        for item in page.items:
+            self._post(ItemShown(self._now_s, item.id))
+        assert self._feels is not None  # noqa: S101 - a trial was felt before it is asked about
+        for choice in filled_in(page, self._feels, self._person, self._stream(f"{page.trial}/answers")):
+            self._pass(choice.after_s)
+            self._post(Chosen(self._now_s, choice.item, choice.value))
+        self._pass(1.0)
+        self._post(Submitted(self._now_s))
+
+    def _pass(self, seconds: float) -> None:
+        """Let time pass, in whole milliseconds as a servo's clock has them."""
+        self._now_s = round(self._now_s + seconds, 3)
+
+    def _post(self, event: Event) -> None:
+        self._state, commands = advance(self._state, event)
+        for command in commands:
+            self._carry_out(command, event.at_s)
+
+    def _carry_out(self, command: Command, at_s: float) -> None:
+        match command:
+            case Write(event, fields):
+                self._store.append(event, t_s=at_s, **fields)
+            case StartTrial(trial=trial, condition=condition):
+                felt = self._felt[self._state.trial.block, condition]
+                self._feels = felt[int(len(felt) * self._stream(f"{trial}/felt")())]
+            case ShowPage(page):
+                self._page = page
+            case Finish(status, reason):
+                self._store.finish(status, reason)
+            case _:
+                """What moves, measures or stops something has nothing to do here."""
+
+
+def _least_s(task: Explore | Reach) -> float:
+    """Return how long a task takes at least [s]."""
+    if isinstance(task, Explore):
+        return task.min_s
+    if task.duration_s is not None:
+        return task.duration_s
+    return (task.count or 0) * (task.dwell_s + REACH_S)

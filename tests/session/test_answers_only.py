@@ -1,0 +1,164 @@
+"""Answers without a servo: the files that a held session leaves, and the answers that the model gives."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from study_app.analysis.export import export
+from study_app.analysis.figures import plot
+from study_app.analysis.tables import load_study
+from study_app.cli import commands
+from study_app.errors import StoreError
+from study_app.protocol.answers import Felt
+from study_app.protocol.load import load
+from study_app.session import answers_only
+from study_app.session.answers_only import rehearse_answers
+from study_app.session.feelings import Feelings, feelings
+from study_app.session.rehearsal import rehearse
+from study_app.store.blinding import reveal
+from study_app.store.layout import StudyFolder
+from study_app.store.reproduced import reproduced
+from study_app.store.verify import verify
+from tests.compiled import needs_servo
+
+WALL_CLOCK = ("answered_at", "trial_started_at", "session_started_at", "session_ended_at")
+
+
+def made_up(name: str = "rek2024") -> Feelings:
+    """What every condition of a study feels like, told apart by force and delay alone."""
+    study = load(name)
+    return {
+        (block.id, condition): (
+            Felt(0.5 + 0.4 * number, 4.0, 0.1, 0.02, 0.03, study.delay_s(condition)),
+            Felt(0.6 + 0.4 * number, 4.2, 0.1, 0.02, 0.03, study.delay_s(condition)),
+        )
+        for block in study.blocks.values()
+        for number, condition in enumerate(block.conditions)
+    }
+
+
+def rows(path: Path) -> list[dict[str, str]]:
+    with path.open(encoding="utf-8", newline="") as file:
+        return [{k: v for k, v in row.items() if k not in WALL_CLOCK} for row in csv.DictReader(file)]
+
+
+def tables(folder: Path) -> dict[str, list[dict[str, str]]]:
+    return {path.relative_to(folder).as_posix(): rows(path) for path in sorted((folder / "data").rglob("*.csv"))}
+
+
+@pytest.fixture(scope="module")
+def twelve(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("answers") / "rek2024"
+    return rehearse_answers("rek2024", participants=12, seed=1, results=folder, felt=made_up())
+
+
+def test_the_folder_is_sound_and_every_row_says_simulated(twelve: Path) -> None:
+    found = verify(twelve)
+    assert (found.errors, found.warnings, found.psychds.errors, found.sessions) == ((), (), (), 12)
+    for name, held in tables(twelve).items():
+        assert held, name
+        assert {row["simulated"] for row in held} == {"true"}, name
+
+
+def test_everybody_answers_every_statement_and_nothing_is_said_to_have_been_measured(twelve: Path) -> None:
+    study = load_study(twelve)
+    assert (study.n, len(study.responses), study.doubts) == (12, 12 * 62, ())
+    assert study.responses["response"].between(1, 7).all()
+    measured = study.trials[["ticks", "force_mean_n", "path_length_m", "delay_error_mean_ms", "valid", "recording"]]
+    assert measured.isna().all().all()
+    assert set(study.trials["outcome"]) == {"complete"}
+
+
+def test_export_plot_unblind_and_reproduce_take_it(twelve: Path, tmp_path: Path) -> None:
+    for session in StudyFolder(twelve).sessions():
+        assert reproduced(session.path) == ()
+    assert export(twelve, tmp_path / "tables")
+    reveal(twelve, by="AB", reason="a test")
+    assert plot(twelve, tmp_path / "figures")
+
+
+def test_the_same_call_gives_the_same_answers_and_another_seed_others(twelve: Path, tmp_path: Path) -> None:
+    again, other = (
+        rehearse_answers("rek2024", participants=12, seed=seed, results=tmp_path / str(seed), felt=made_up())
+        for seed in (1, 2)
+    )
+    assert tables(again) == tables(twelve)
+    assert tables(other) != tables(twelve)
+
+
+def test_fewer_participants_answer_as_the_first_of_many(twelve: Path, tmp_path: Path) -> None:
+    few = tables(rehearse_answers("rek2024", participants=3, seed=1, results=tmp_path / "few", felt=made_up()))
+    many = tables(twelve)
+    assert all(many[name] == held for name, held in few.items() if "sub-" in name)
+
+
+@needs_servo
+def test_who_feels_what_was_felt_in_a_rehearsal_answers_as_in_it(tmp_path: Path) -> None:
+    held = rehearse("demo", participants=1, seed=3, results=tmp_path / "held", recordings=False)
+    felt = feelings(load("demo"), seed=3, people=1)
+    assert all(len(once) == 1 for once in felt.values()), "otherwise which of them is felt is drawn"
+    answered = rehearse_answers("demo", participants=1, seed=3, results=tmp_path / "answered", felt=felt)
+    asked = ("trial", "code", "item", "number", "response", "changes")
+    one, other = (
+        [
+            [row[name] for name in asked]
+            for name_, held_ in tables(folder).items()
+            if "responses" in name_
+            for row in held_
+        ]
+        for folder in (held, answered)
+    )
+    assert one == other
+
+
+@needs_servo
+def test_what_is_felt_is_what_each_condition_gives(tmp_path: Path) -> None:
+    study = load("demo")
+    felt = feelings(study, seed=1, people=2)
+    assert felt.keys() == {(block.id, condition) for block in study.blocks.values() for condition in block.conditions}
+    for (block, condition), lived in felt.items():
+        assert len(lived) == 2 * study.blocks[block].repetitions
+        for one in lived:
+            assert one.force_mean_n > 0
+            assert one.delay_s == pytest.approx(study.delay_s(condition), abs=0.015)
+    assert not any(tmp_path.iterdir())
+
+
+def test_a_used_id_is_refused_and_nothing_is_touched(tmp_path: Path) -> None:
+    folder = rehearse_answers("rek2024", participants=2, seed=1, results=tmp_path / "rek2024", felt=made_up())
+    before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    with pytest.raises(StoreError, match="P001"):
+        rehearse_answers("rek2024", participants=5, seed=1, results=folder, felt=made_up())
+    assert {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()} == before
+
+
+def test_the_folder_of_another_study_is_refused(tmp_path: Path) -> None:
+    folder = rehearse_answers("rek2024", participants=1, seed=1, results=tmp_path / "a", felt=made_up())
+    with pytest.raises(StoreError, match="holds the study"):
+        rehearse_answers("demo", participants=1, seed=1, results=folder, felt=made_up("demo"))
+
+
+def test_ended_by_the_user_it_leaves_whole_sessions_and_their_table(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def enough(line: str) -> None:
+        if line.startswith("P003"):
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(answers_only, "SAY_EVERY_S", 0.0)
+    folder = tmp_path / "rek2024"
+    with pytest.raises(KeyboardInterrupt):
+        rehearse_answers("rek2024", participants=9, seed=1, results=folder, felt=made_up(), progress=enough)
+    found = verify(folder)
+    assert (found.errors, found.sessions) == ((), 3)
+    assert load_study(folder).n == 3
+
+
+def test_a_device_makes_no_sense_without_one() -> None:
+    asked = ["rehearse", "demo", "--answers-only", "--device", "scripted"]
+    result = CliRunner().invoke(commands, asked)
+    assert (result.exit_code, "needs no device" in result.output) == (2, True)
