@@ -116,12 +116,15 @@ class FalconDevice(Device):
         self._falcon.handle, self._falcon.transfer = _CLOSED
         if transport is None:
             return
-        quieted = quiet(transport) > 0 if used else True
-        transport.close()
-        if guard is not None and (quieted or gone):
-            guard.stand_down()
-        elif guard is not None:
-            guard.release()
+        quieted = not used
+        try:
+            quieted = quieted or quiet(transport) > 0
+        finally:  # an interrupt ends neither its being let go of nor its guard's duty
+            try:
+                transport.close()
+            finally:
+                if guard is not None:
+                    (guard.stand_down if quieted or gone else guard.release)()
 
     @property
     def counters(self) -> dict[str, int]:

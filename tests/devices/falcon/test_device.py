@@ -11,10 +11,11 @@ if numba.config.DISABLE_JIT:
 
 from study_app.devices import open_device
 from study_app.devices.falcon import calibration, wire
+from study_app.devices.falcon import device as driver
 from study_app.devices.falcon.calibration import Calibration
 from study_app.devices.falcon.emulated import EmulatedFalcon
 from study_app.devices.falcon.emulator import Emulator
-from study_app.devices.falcon.failures import UsbFailure
+from study_app.devices.falcon.failures import FalconLost, UsbFailure
 from study_app.devices.falcon.geometry import GEOMETRIES, SAFE_BOX_M
 from study_app.devices.falcon.homing import PULL_OUT, READY, STROKES, NotHomed
 from study_app.devices.falcon.kinematics import REACHED, inverse, new_mechanism
@@ -49,6 +50,19 @@ class Turns:
 
 def still(**options):
     return Emulator(**{"tremor_m": 0.0, "running": True, **options})
+
+
+class Guard:
+    """Keeps what it was told."""
+
+    def __init__(self):
+        self.orders = []
+
+    def stand_down(self):
+        self.orders.append("stand_down")
+
+    def release(self):
+        self.orders.append("release")
 
 
 def places_in_the_box(geometry):
@@ -237,6 +251,30 @@ class TestForce:
         assert turns.after(1, (1.0, 1.0, 1.0)) == READ_LOST
         assert opened.hand.torques == (0, 0, 0)
         opened.close()
+
+    @pytest.mark.parametrize("interrupted", ["quiet", "close"])
+    def test_an_end_that_is_interrupted_leaves_the_rest_to_the_guard(self, opened, monkeypatch, interrupted):
+        guard = Guard()
+        opened._guard = guard
+        transport = opened._transport
+        turns = Turns(opened)
+        turns.after(600, (1.0, 1.0, 1.0))
+        close = transport.close
+
+        def interrupt(*_):
+            close()
+            raise KeyboardInterrupt
+
+        if interrupted == "quiet":
+            monkeypatch.setattr(driver, "quiet", lambda _: (_ for _ in ()).throw(KeyboardInterrupt))
+        else:
+            monkeypatch.setattr(transport, "close", interrupt)
+        with pytest.raises(KeyboardInterrupt):
+            opened.close()
+        assert guard.orders == (["release"] if interrupted == "quiet" else ["stand_down"])
+        with pytest.raises(FalconLost):
+            transport.write(b"", 1.0)
+        assert turns.after(1) == READ_LOST
 
     def test_a_calibration_of_this_one_is_used_and_told(self):
         calibration.save("OWN", Calibration("zm-redux", 9000.0, 0.05, measured="2026-11-20"))
