@@ -65,7 +65,7 @@ class FalconDevice(Device):
         self.workspace_m = workspace_m
         self.force_limit_n = force_limit_n
         self._firmware = firmware
-        self._geometry = geometry_named(geometry)
+        self._published = self._geometry = geometry_named(geometry)
         self._tell = tell if tell is not None else _say_nothing
         self._cancelled = cancelled
         self._patience_s = patience_s
@@ -198,14 +198,11 @@ class FalconDevice(Device):
         }
 
     def _calibrate(self, serial: str | None) -> None:
-        """Use what was measured of this Falcon, if it was."""
-        self._calibration = calibration.load(serial) if serial else None
-        if self._calibration is None:
-            return
-        self._geometry = geometry_named(self._calibration.geometry)
-        self._falcon.mechanism = new_mechanism(
-            self._geometry, self._calibration.units_per_nm, self._calibration.arm_offset_rad
-        )
+        """Use what was measured of this Falcon; nothing of another that was open before."""
+        self._calibration = used = calibration.load(serial) if serial else None
+        self._geometry = self._published if used is None else geometry_named(used.geometry)
+        gain = calibration.UNCALIBRATED_UNITS_PER_NM if used is None else used.units_per_nm
+        self._falcon.mechanism = new_mechanism(self._geometry, gain, 0.0 if used is None else used.arm_offset_rad)
 
     def _home(self, transport: Transport) -> None:
         mechanism = self._falcon.mechanism.copy()

@@ -289,6 +289,18 @@ class TestForce:
         assert described["calibration"]["measured"] == "2026-11-20"
         assert described["units_per_nm"] == 9000.0
 
+    def test_a_calibration_does_not_outlive_what_it_was_measured_of(self):
+        calibration.save("OWN", Calibration("zm-redux", 9000.0, 0.05))
+        emulator = still(serial="OWN")
+        device = EmulatedFalcon(emulator=emulator)
+        before = device.describe()
+        with device:
+            assert device.describe()["geometry"] == "zm-redux"
+        emulator.serial = "ANOTHER"
+        with device:
+            described = device.describe()
+        assert {name: described[name] for name in before} == before
+
 
 class TestInUse:
     def test_buttons_are_those_of_the_grip_and_the_last_one_stops(self, opened):
