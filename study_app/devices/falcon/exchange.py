@@ -215,9 +215,11 @@ def _write(context: int, fx: float, fy: float, fz: float) -> int:
     if falcon.testing != 0 and not (none and pushing):
         return 0
     falcon.force_n[0], falcon.force_n[1], falcon.force_n[2] = fx, fy, fz
+    told = falcon.units[0], falcon.units[1], falcon.units[2]
     push(falcon)
     pack(falcon.units, _lights(falcon), falcon.packet)
-    _send(falcon, context)
+    if not _send(falcon, context):
+        falcon.units[0], falcon.units[1], falcon.units[2] = told
     return READ_LOST if falcon.lost != 0 else 0
 
 
@@ -312,8 +314,8 @@ def _open_gate(falcon: Any, elapsed_s: float) -> None:
 
 
 @kernel
-def _send(falcon: Any, context: int) -> None:
-    """Send ``packet``."""
+def _send(falcon: Any, context: int) -> bool:
+    """Send ``packet``; return whether all of it went out, so that the motors know it."""
     falcon.transferred = 0
     code = _transfer(
         falcon.transfer,
@@ -324,10 +326,12 @@ def _send(falcon: Any, context: int) -> None:
         np.intp(context + _TRANSFERRED_AT),
         np.uint32(_TIMEOUT_MS),
     )
+    sent: bool = code in (SUCCESS, ERROR_TIMEOUT) and falcon.transferred == PACKET
     if code == ERROR_NO_DEVICE:
         falcon.lost = 1
-    elif code != SUCCESS or falcon.transferred != PACKET:
+    elif not sent:
         falcon.write_errors += 1
     else:
         falcon.requests += 1
         falcon.asked += 1
+    return sent

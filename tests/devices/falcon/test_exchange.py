@@ -284,6 +284,30 @@ class TestLostAndLate:
         turns.turn()
         assert (turns.falcon.requests, turns.falcon.write_errors) == (0, 1)
 
+    def test_a_force_that_did_not_go_out_is_no_force_the_motors_push_with(self, turns):
+        turns.open_gate()
+        turns.turn(reply(), force_n=(0.3, 0.0, 0.0))
+        held = turns.falcon.units.tolist()
+        turns.bridge.write_answer = ERROR_TIMEOUT
+        for _ in range(20):
+            turns.turn(reply(), force_n=(5.0, 0.0, 0.0))
+            assert turns.falcon.units.tolist() == held
+        turns.bridge.write_answer = 0
+        turns.turn(reply(), force_n=(5.0, 0.0, 0.0))
+        assert np.linalg.norm(force_of(turns, CENTRE_M)) < 0.3 + 0.48
+
+    def test_an_end_of_force_is_tried_again_until_it_goes_out(self, turns):
+        turns.open_gate()
+        while not turns.falcon.testing:
+            turns.turn(*[reply()] * int(turns.now_ns // MS % 2), force_n=PUSH_N)
+        turns.bridge.write_answer = ERROR_TIMEOUT
+        turns.turn(reply())
+        assert turns.torques != [0, 0, 0]
+        turns.bridge.write_answer = 0
+        turns.turn(reply())
+        assert turns.falcon.testing
+        assert turns.torques == [0, 0, 0]
+
     @pytest.mark.parametrize("force_n", [PUSH_N, (0.0, 0.0, 0.0)])
     def test_losses_are_written_off_after_a_short_test(self, turns, force_n):
         turns.open_gate()
