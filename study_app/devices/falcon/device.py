@@ -112,6 +112,7 @@ class FalconDevice(Device):
         transport, self._transport = self._transport, None
         guard, self._guard = self._guard, None
         used, gone = bool(self._falcon.handle), bool(self._falcon.lost)
+        pushing = gone and bool(self._falcon.units.any())
         self._falcon.lost = 1
         self._falcon.handle, self._falcon.transfer = _CLOSED
         if transport is None:
@@ -124,7 +125,7 @@ class FalconDevice(Device):
                 transport.close()
             finally:
                 if guard is not None:
-                    (guard.stand_down if quieted or gone else guard.release)()
+                    (guard.leave if pushing else guard.stand_down if quieted or gone else guard.release)()
 
     @property
     def counters(self) -> dict[str, int]:

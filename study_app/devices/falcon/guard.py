@@ -11,6 +11,7 @@ from __future__ import annotations
 import signal
 import subprocess
 import sys
+import threading
 import time
 from contextlib import suppress
 from types import TracebackType
@@ -83,6 +84,17 @@ class Guard:
         """Let it send its packets, once the Falcon is closed; wait until it has."""
         self._end(b"")
 
+    def leave(self) -> None:
+        """Let it send its packets once the Falcon is there again, for as long as its patience lasts; wait for nothing.
+
+        For a link that was lost: the Falcon may push on, and be back before anybody opens it.
+        """
+        child, self._child = self._child, None
+        if child is None or child.stdin is None:
+            return
+        child.stdin.close()
+        threading.Thread(target=_see_off, args=(child,), name="guard", daemon=True).start()
+
     def _end(self, word: bytes) -> None:
         child, self._child = self._child, None
         if child is None or child.stdin is None:
@@ -109,6 +121,11 @@ class Guard:
             self.stand_down()
         else:
             self.release()
+
+
+def _see_off(child: subprocess.Popen[bytes]) -> None:
+    child.wait()
+    _close(child)
 
 
 def _close(child: subprocess.Popen[bytes]) -> None:

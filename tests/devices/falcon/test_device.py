@@ -64,6 +64,9 @@ class Guard:
     def release(self):
         self.orders.append("release")
 
+    def leave(self):
+        self.orders.append("leave")
+
 
 def places_in_the_box(geometry):
     """Return places (x, y, z) [m] all over the safe box, but for corners beyond the encoders' known range."""
@@ -325,6 +328,16 @@ class TestInUse:
         assert opened.hand.torques == (0, 0, 0)
         again = Turns(opened, turns.now_ns)
         assert again.after(3) == READ_NEW
+
+    @pytest.mark.parametrize(("push_n", "order"), [(1.0, "leave"), (0.0, "stand_down")])
+    def test_a_cable_pulled_while_it_pushes_leaves_the_guard_waiting_for_it(self, opened, push_n, order):
+        guard = opened._guard = Guard()
+        turns = Turns(opened)
+        turns.after(600, (0.0, push_n, 0.0))
+        opened.hand.faults.on("unplugged")
+        turns.after(1)
+        opened.close()
+        assert guard.orders == [order]
 
     def test_a_mains_adapter_that_fails_gives_no_more_positions(self, opened):
         turns = Turns(opened)

@@ -111,6 +111,17 @@ def test_the_guard_waits_until_the_falcon_is_let_go(server):
     assert [request[0] for request in server.requests].count(DESCRIPTOR) == 6
 
 
+def test_a_guard_that_is_left_behind_waits_for_the_falcon_to_come_back(tmp_path):
+    guard = Guard(f"falcon-socket:{tmp_path / 'falcon'}")
+    guard.start()
+    guard.leave()  # and does not wait
+    assert not guard.watching
+    guard.leave()
+    with Server(tmp_path / "falcon") as server:
+        server.wait_for(PACKETS)
+        assert server.sent() == QUIET
+
+
 def test_what_ends_a_program_does_not_end_its_guard(server):
     guard = Guard(server.bridge)
     guard.start()
