@@ -101,6 +101,8 @@ class Faults:
         setattr(self._state, _switch(name), int(on))
         if name == "unplugged" and on:
             self._state.was_unplugged = 1
+        if name == "kernel_driver_stays" and on:
+            self._state.kernel_driver = 1  # which has to be there, to stay
 
     def off(self, name: str) -> None:
         """Switch it off."""

@@ -142,8 +142,6 @@ class TestFaultsOfTheEmulator:
     def test_a_bridge_that_cannot_be_had(self, fault, mode, monkeypatch):
         emulator = Emulator(running=True)
         emulator.faults.on(fault)
-        if fault == "kernel_driver_stays":
-            emulator.faults.on("kernel_driver")
         monkeypatch.setattr("sys.platform", "linux")
         has_words_of(refused(emulator), mode)
 
