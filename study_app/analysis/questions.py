@@ -29,12 +29,16 @@ class Item:
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """What was presented under a code; all but the code is None until the key is opened."""
+    """What was presented under a code; all but the code is None until the key is opened.
+
+    ``label`` is the item that names what was felt, where one does.
+    """
 
     code: str
     condition: str | None = None
     liquid: str | None = None
     delay_ms: float | None = None
+    label: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +85,13 @@ class Block:
 def settings_of(key: Key) -> dict[tuple[str, str], Setting]:
     """Return what the opened key says of every code: (block id, code) → setting."""
     return {
-        (block, code): Setting(code, condition, " + ".join(key.liquids(block, code)), key.delay_ms(block, code))
+        (block, code): Setting(
+            code,
+            condition,
+            " + ".join(key.liquids(block, code)),
+            key.delay_ms(block, code),
+            key.tables["conditions"][condition].get("label"),
+        )
         for block, codes in key.codes.items()
         for code, condition in codes.items()
     }

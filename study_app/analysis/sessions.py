@@ -1,15 +1,18 @@
-"""One session of a results folder, read from its receipt and its tables and checked against each other."""
+"""The sessions of a results folder, read from their receipts and their tables and checked against each other."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from study_app.analysis import reading
 from study_app.analysis.questions import Block, main_blocks, spoken, text_in
+from study_app.analysis.reading import Whole
 from study_app.errors import AnalysisError
 from study_app.store.blinding import Key
 from study_app.store.columns import TABLES
@@ -24,10 +27,9 @@ class Session:
     study: str
     title: str
     version: str
+    protocol: Mapping[str, Any]
     blocks: tuple[Block, ...]
     facts: Mapping[str, Any]
-    responses: pd.DataFrame
-    trials: pd.DataFrame
 
     @property
     def asked(self) -> tuple[tuple[str, tuple[str, ...], tuple[str, ...]], ...]:
@@ -35,17 +37,21 @@ class Session:
         return tuple((block.id, block.codes_as_dealt, tuple(item.id for item in block.items)) for block in self.blocks)
 
 
-def read_session(folder: SessionFolder, key: Key | None) -> Session:
-    """Read a session; ``key`` is the study's once it was opened.
+def read_session(folder: SessionFolder, key: Key | None, like: Session | None = None) -> Session:
+    """Read a session's receipt; ``key`` is the study's once it was opened.
+
+    ``like`` is another session of the study: of what is the same in both one copy is kept.
 
     Raises
     ------
     AnalysisError
-        A file of it is missing, damaged or of another session.
+        The receipt is missing or damaged.
     """
     receipt = reading.document(folder.receipt)
     try:
         protocol = receipt["protocol"]
+        if like is not None and protocol == like.protocol:
+            protocol = like.protocol
         head = protocol["study"]
         study, title, version = str(head["name"]), text_in(head["title"], spoken(protocol)), str(head["version"])
         facts = {
@@ -54,58 +60,78 @@ def read_session(folder: SessionFolder, key: Key | None) -> Session:
             **{name: receipt[name] for name in ("simulated", "pilot", "status", "language", "started_at", "ended_at")},
             "device": receipt["device"].get("name"),
             "key_hash": receipt["key_hash"],
+            **{name: receipt.get(name) for name in ("seed", "protocol_hash", "version")},
         }
-        blocks = main_blocks(protocol, key)
+        blocks = like.blocks if like is not None and protocol is like.protocol else main_blocks(protocol, key)
     except (KeyError, TypeError, AttributeError) as error:
         raise AnalysisError(
             f"{folder.receipt} does not describe the session ({type(error).__name__}: {error}): it was changed, or "
             "written by another version of the program; restore it from a copy"
         ) from error
-    session = Session(
-        folder=folder,
-        study=study,
-        title=title,
-        version=version,
-        blocks=blocks,
-        facts=facts,
-        responses=_table(folder, study, "responses"),
-        trials=_table(folder, study, "trials"),
-    )
-    _check_answers(session)
-    return session
+    return Session(folder, study, title, version, protocol, blocks, facts)
 
 
-def _table(folder: SessionFolder, study: str, name: str) -> pd.DataFrame:
-    """Read a table of a session, whose rows must be that session's."""
-    path = folder.table(study, name)
-    found = reading.table(path, TABLES[name])
-    for column, value in {"study": study, "participant": folder.participant, "session": folder.number}.items():
-        foreign = found[found[column] != value]
+def read_tables(sessions: Sequence[Session], name: str) -> pd.DataFrame:
+    """Read table ``name`` of sessions that were asked alike, with ``session_status`` added; rows in their order.
+
+    Raises
+    ------
+    AnalysisError
+        A file is missing, damaged or of another session, or answers what nobody asked.
+    """
+    paths = [session.folder.table(session.study, name) for session in sessions]
+    table, lengths = reading.tables(paths, TABLES[name])
+    _check_own(sessions, paths, table, lengths)
+    if name == "responses":
+        _check_answers(sessions, paths, table, lengths)
+    status = np.repeat([session.facts["status"] for session in sessions], lengths)
+    return table.assign(session_status=pd.array(status, dtype="string"))
+
+
+def _check_own(sessions: Sequence[Session], paths: Sequence[Path], table: pd.DataFrame, lengths: Whole) -> None:
+    """Refuse rows that are not of the session whose file they stand in."""
+    own: dict[str, list[Any]] = {
+        "study": [session.study for session in sessions],
+        "participant": [session.folder.participant for session in sessions],
+        "session": [session.folder.number for session in sessions],
+    }
+    for column, values in own.items():
+        found = table[column].to_numpy()
+        foreign = np.flatnonzero(found != np.repeat(np.array(values, dtype=object), lengths))
         if len(foreign):
+            which, row = _place(lengths, int(foreign[0]))
             raise AnalysisError(
-                f"{path}, row {foreign.index[0] + 1}, column {column}: {str(foreign[column].iloc[0])!r} instead of "
-                f"{str(value)!r}: the file belongs elsewhere; restore this session's own from a copy"
+                f"{paths[which]}, row {row}, column {column}: {str(found[foreign[0]])!r} instead of "
+                f"{str(values[which])!r}: the file belongs elsewhere; restore this session's own from a copy"
             )
-    return found
 
 
-def _check_answers(session: Session) -> None:
+def _check_answers(sessions: Sequence[Session], paths: Sequence[Path], table: pd.DataFrame, lengths: Whole) -> None:
     """Refuse answers that nobody asked for, and answers given twice."""
-    path = session.folder.table(session.study, "responses")
-    items = {(block.id, item.id) for block in session.blocks for item in block.items}
-    codes = {(block.id, code) for block in session.blocks for code in block.codes}
-    rows = session.responses[session.responses["phase"] == "main"]
-    for row, block, code, item in zip(rows.index + 1, rows["block"], rows["code"], rows["item"], strict=True):
-        if (block, item) not in items or (block, code) not in codes:
+    blocks = sessions[0].blocks
+    asked = {(block.id, code, item.id) for block in blocks for code in block.codes for item in block.items}
+    main = np.flatnonzero(table["phase"].to_numpy() == "main")
+    answered = zip(*(table[name].to_numpy()[main] for name in ("block", "code", "item")), strict=True)
+    for index, (block, code, item) in zip(main, answered, strict=True):
+        if (block, code, item) not in asked:
+            which, row = _place(lengths, int(index))
             raise AnalysisError(
-                f"{path}, row {row}: the receipt knows no statement {item!r} on a setting {code!r} in block {block!r}: "
-                "the file was changed or belongs to another study; make it again from the journal: "
-                f"liquid-study rebuild {session.folder.path}"
+                f"{paths[which]}, row {row}: the receipt knows no statement {item!r} on a setting {code!r} in block "
+                f"{block!r}: the file was changed or belongs to another study; make it again from the journal: "
+                f"liquid-study rebuild {sessions[which].folder.path}"
             )
-    twice = session.responses[session.responses.duplicated(["trial", "attempt", "item"])]
+    twice = np.flatnonzero(table.duplicated(["participant", "session", "trial", "attempt", "item"]))
     if len(twice):
+        which, row = _place(lengths, int(twice[0]))
+        answer = table.iloc[int(twice[0])]
         raise AnalysisError(
-            f"{path}, row {twice.index[0] + 1}: the answer to {twice['item'].iloc[0]!r} in trial "
-            f"{twice['trial'].iloc[0]} stands there twice; make the table again from the journal: liquid-study rebuild "
-            f"{session.folder.path}"
+            f"{paths[which]}, row {row}: the answer to {answer['item']!r} in trial {answer['trial']} stands there "
+            f"twice; make the table again from the journal: liquid-study rebuild {sessions[which].folder.path}"
         )
+
+
+def _place(lengths: Whole, index: int) -> tuple[int, int]:
+    """Return the session of the row at ``index``, and the row's number in its file, from 1."""
+    ends = np.cumsum(lengths)
+    which = int(np.searchsorted(ends, index, side="right"))
+    return which, int(index - ends[which] + lengths[which]) + 1

@@ -9,16 +9,17 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import pandas as pd
 
-from study_app.analysis import measures
+from study_app.analysis import decided, measures
+from study_app.analysis.decided import Decided
 from study_app.analysis.excluding import check_there, with_excluded
 from study_app.analysis.questions import Block, Kind, Setting, settings_of
-from study_app.analysis.sessions import Session, read_session
+from study_app.analysis.sessions import Session, read_session, read_tables
 from study_app.errors import AnalysisError
 from study_app.store import blinding
 from study_app.store.abandoned import never_begun
@@ -39,7 +40,8 @@ class Study:
     ``exclusion_reason`` and ``counted`` added; ``participants`` has a row a session, with the last three. ``blocks``
     are the main blocks that ask something; ``settings`` says what every (block, code) stands for, and is empty while
     the key is sealed; ``exclusions`` is what was decided to leave out; ``doubts`` are files that are not as they were
-    recorded, and are used as they are.
+    recorded, and are used as they are. ``decided`` is what the protocol decided about the analysis, ``protocol`` the
+    first session's, as its receipt holds it.
     """
 
     folder: Path
@@ -53,6 +55,8 @@ class Study:
     participants: pd.DataFrame
     exclusions: tuple[Exclusion, ...]
     doubts: tuple[Doubt, ...] = ()
+    decided: Decided = decided.NOTHING
+    protocol: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def people(self) -> tuple[str, ...]:
@@ -141,11 +145,11 @@ def load_study(folder: Path) -> Study:
         raise AnalysisError(_no_sessions(place.path))
     key = blinding.revealed_key(place.path)
     listed = exclusions(place.path)
-    records = [read_session(session, key) for session in sessions]
+    records = [read_session(sessions[0], key)]
+    records += [read_session(session, key, like=records[0]) for session in sessions[1:]]
     for session in records[1:]:
         _check_alike(records[0], session)
-    responses = pd.concat([_with_status(session, session.responses) for session in records], ignore_index=True)
-    trials = pd.concat([_with_status(session, session.trials) for session in records], ignore_index=True)
+    responses, trials = read_tables(records, "responses"), read_tables(records, "trials")
     check_there(place, trials, listed)
     last = pd.concat([responses, trials])[[*_TRIAL, "attempt"]].groupby(_TRIAL)["attempt"].max().rename("last_attempt")
     return Study(
@@ -160,6 +164,8 @@ def load_study(folder: Path) -> Study:
         participants=_sessions(with_excluded(pd.DataFrame([session.facts for session in records]), listed)),
         exclusions=listed,
         doubts=tuple(doubt for one in records for doubt in doubts(Place(place, one.folder, one.study))),
+        decided=decided.read([session.protocol.get("analysis") for session in records]),
+        protocol=records[0].protocol,
     )
 
 
@@ -192,10 +198,6 @@ def _check_alike(first: Session, other: Session) -> None:
             f"{other.folder.path} (version {other.version}) was asked other statements than {first.folder.path} "
             f"(version {first.version}): keep the versions of a study in folders of their own"
         )
-
-
-def _with_status(session: Session, table: pd.DataFrame) -> pd.DataFrame:
-    return table.assign(session_status=pd.Series(session.facts["status"], index=table.index, dtype="string"))
 
 
 def _with_counted(table: pd.DataFrame, last: pd.Series[int]) -> pd.DataFrame:
