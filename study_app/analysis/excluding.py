@@ -21,6 +21,8 @@ def with_excluded(table: pd.DataFrame, listed: Sequence[Exclusion]) -> pd.DataFr
     listed : sequence of Exclusion
         What is left out: a session with all its trials, or one trial with all its attempts.
     """
+    if not listed:
+        return table.assign(excluded=False, exclusion_reason=pd.Series(pd.NA, index=table.index, dtype="string"))
     trials = table["trial"] if "trial" in table.columns else [None] * len(table)
     found = [
         list(_about(listed, str(participant), int(session), trial))

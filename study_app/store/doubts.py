@@ -36,11 +36,12 @@ class Doubt:
 def doubts(place: Place) -> tuple[Doubt, ...]:
     """Return what cannot be trusted of a session's journal, receipt and tables: one doubt a file at most.
 
-    A table is compared with what the journal gives, unless the journal itself is doubtful; all of them, once the
-    session has ended, with their checksums. A session that is open in a program is not judged: its tables follow.
+    Once the session has ended they are compared with their checksums: files that keep these are as they were when the
+    tables were made from the journal. Where one does not, a table is compared with what the journal gives, unless the
+    journal itself is doubtful. A session that is open in a program is not judged: its tables follow.
     """
     folder = place.folder
-    if is_open(folder.path):
+    if is_open(folder.path) or _as_ended(place):
         return ()
     restore = f"restore it from a copy; liquid-study verify {place.study_folder.path} checks everything"
     if not is_there(folder.journal):
@@ -75,14 +76,27 @@ def _listed(place: Place, contents: Contents) -> tuple[Mapping[str, str], tuple[
         return {}, (Doubt(place.folder.checksums, "is missing or no list of checksums", remedy),)
 
 
+def _as_ended(place: Place) -> bool:
+    """Return whether journal, receipt and tables are what the checksums of the session's end are of."""
+    try:
+        listed = read_checksums(place.folder)
+        return all(listed.get(name) == hashed(place.folder, name) for name in _behind(place))
+    except StoreError:
+        return False
+
+
 def _changed(place: Place, listed: Mapping[str, str]) -> Iterator[Path]:
     """Yield journal, receipt and tables that are not those the checksums are of; a missing one is said elsewhere."""
+    for name, path in _behind(place).items():
+        if name in listed and is_there(path) and hashed(place.folder, name) != listed[name]:
+            yield path
+
+
+def _behind(place: Place) -> dict[str, Path]:
+    """Return the files behind every number: journal, receipt and tables, by their path in the session's folder."""
     folder = place.folder
     tables = (folder.table(place.study, name) for name in ("responses", "trials"))
-    for path in (folder.journal, folder.receipt, *tables):
-        name = path.relative_to(folder.path).as_posix()
-        if name in listed and is_there(path) and hashed(folder, name) != listed[name]:
-            yield path
+    return {path.name: path for path in (folder.journal, folder.receipt, *tables)}
 
 
 def _tables(place: Place, contents: Contents, restore: str) -> Iterator[Doubt]:

@@ -132,17 +132,21 @@ def csv_bytes(columns: Sequence[Column], rows: Iterable[Mapping[str, Any]]) -> b
     half a surrogate pair, which no file can hold, becomes a question mark.
     """
     names = header(tuple(columns))
-    records = [",".join(names), *(",".join(_cell(row[name]) for name in names) for row in rows)]
+    records = [",".join(names), *(",".join([cell_text(row[name]) for name in names]) for row in rows)]
     return "".join(f"{record}\n" for record in records).encode("utf-8", "replace")
 
 
-def _cell(value: Any) -> str:
-    if value is None or (isinstance(value, float) and not math.isfinite(value)):
+def cell_text(value: Any) -> str:
+    """Return a cell as it stands in a table."""
+    kind = type(value)
+    if value is None or (kind is float and not math.isfinite(value)):
         return MISSING
-    if isinstance(value, bool):
+    if kind is int or kind is float:
+        return repr(value)
+    if kind is bool:
         return "true" if value else "false"
-    text = repr(value) if isinstance(value, float) else str(value)
-    if any(sign in text for sign in ',"\r\n') or text != text.strip():
+    text = str(value)
+    if "," in text or '"' in text or "\n" in text or "\r" in text or text != text.strip():
         return '"' + text.replace('"', '""') + '"'
     return text
 

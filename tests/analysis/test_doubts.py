@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
+import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -118,6 +120,19 @@ def test_the_commands_say_nothing_where_there_is_nothing_to_say(
 ) -> None:
     finished = CliRunner().invoke(commands, [command, str(copy.path), "--to", str(tmp_path / "out")])
     assert (finished.exit_code, finished.stderr) == (0, "")
+
+
+def test_one_file_that_was_changed_brings_all_of_its_session_under_suspicion(copy: StudyFolder) -> None:
+    """The other tables are then compared with the journal, and not only with their checksums."""
+    session = copy.sessions()[0]
+    table = another_answer(session)
+    name = table.name
+    listed = session.checksums.read_text(encoding="utf-8")
+    forged = hashlib.sha256(table.read_bytes()).hexdigest()
+    session.checksums.write_text(re.sub(rf"[0-9a-f]{{64}}  {name}", f"{forged}  {name}", listed), encoding="utf-8")
+    trials = session.table("rek2024", "trials")
+    change(trials, b",complete,", b",timeout,")
+    assert {line.split()[0] for line in told(copy)} == {str(trials), str(table)}
 
 
 def test_a_session_that_was_never_begun_stops_no_analysis(copy: StudyFolder, tmp_path: Path) -> None:

@@ -2,8 +2,10 @@ from pathlib import Path
 
 import pytest
 
+from study_app.analysis import reading
 from study_app.analysis.tables import Study, load_study
 from study_app.errors import AnalysisError, StoreError
+from study_app.store.columns import RESPONSES, header
 from tests.analysis.conftest import CANNOT_JUDGE, Answer, Results, make_results
 
 
@@ -331,4 +333,31 @@ def test_an_opened_key_that_was_changed_is_refused(rek: Results) -> None:
     make_results(rek.folder.parent / "other", rek.protocol)
     (rek.folder / "blinding" / "key.sealed").write_bytes(b"e30=")
     with pytest.raises(StoreError, match=r"key\.sealed"):
+        load_study(rek.folder)
+
+
+def test_a_bad_cell_is_found_in_whichever_file_and_row_it_stands(rek: Results, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Files are read some at a time, and the row is counted in its own file."""
+    monkeypatch.setattr(reading, "AT_ONCE", 2)
+    for number in range(1, 6):
+        rek.add(f"P{number:03d}", lambda *_: 4)
+    path = rek.responses("P004")
+    lines = path.read_text(encoding="utf-8").split("\n")
+    cells = lines[7].split(",")
+    cells[header(RESPONSES).index("changes")] = "99999999999999999999"
+    path.write_text("\n".join([*lines[:7], ",".join(cells), *lines[8:]]), encoding="utf-8")
+    with pytest.raises(
+        AnalysisError, match=r"subject-P004.*row 7, column changes: '99999999999999999999' is not a whole"
+    ):
+        load_study(rek.folder)
+
+
+def test_a_foreign_row_is_found_in_whichever_file_it_stands(rek: Results) -> None:
+    for number in range(1, 4):
+        rek.add(f"P{number:03d}", lambda *_: 4)
+    path = rek.trials("P003")
+    head, *rows, end = path.read_text(encoding="utf-8").split("\n")
+    rows[4] = rows[4].replace("P003", "P002", 1)
+    path.write_text("\n".join([head, *rows, end]), encoding="utf-8")
+    with pytest.raises(AnalysisError, match=r"subject-P003.*row 5, column participant: 'P002' instead of 'P003'"):
         load_study(rek.folder)
