@@ -54,7 +54,7 @@ class Guard:
         """
         if self._child is not None:
             return
-        command = [sys.executable, "-m", __spec__.name, self._name]
+        command = [sys.executable, "-P", "-m", __spec__.name, self._name]  # -P: no modules of the present folder
         # In a session, or console, of its own: what ends the program with its terminal does not end its guard.
         child = subprocess.Popen(  # noqa: S603 - our own module, and no shell
             command,

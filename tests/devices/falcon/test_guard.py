@@ -223,6 +223,13 @@ def test_the_guard_loads_no_compiler():
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
+def test_a_guard_loads_nothing_from_the_folder_it_is_started_in(tmp_path, monkeypatch):
+    (tmp_path / "signal.py").write_text("raise SystemExit")
+    monkeypatch.chdir(tmp_path)
+    with Guard("falcon") as guard:
+        assert guard.watching
+
+
 @compiled
 def test_an_emulated_falcon_pushes_on_when_its_program_is_killed_and_not_when_it_was_guarded(tmp_path):
     from study_app.devices.falcon.boot import configure
