@@ -15,6 +15,7 @@ from study_app.devices.falcon.bulk import BulkCalls
 from study_app.devices.falcon.diagnosis import OPEN, Facts, sentence
 from study_app.devices.falcon.exchange import COUNTERS, exchange_functions, new_exchange
 from study_app.devices.falcon.failures import ProgramMissing, usb_failure
+from study_app.devices.falcon.firmware import check
 from study_app.devices.falcon.geometry import DEFAULT_GEOMETRY, WORKSPACE_M, geometry_named
 from study_app.devices.falcon.guard import Guard, quiet
 from study_app.devices.falcon.homing import PATIENCE_S, home
@@ -181,7 +182,9 @@ class FalconDevice(Device):
             raise ProgramMissing(
                 f"the firmware {self._firmware} cannot be read: {error.strerror}", Facts(usb=OPEN, program="refused")
             ) from error
-        self._tell("Loading the Falcon's firmware.")
+        found = check(program)
+        unknown = f"SHA-256 {found.sha256[:16]}…, which is none of those that are known to work"
+        self._tell(f"Loading the Falcon's firmware, {found.name or unknown}.")
         return boot.boot(transport, program, tell=self._tell).sha256
 
     def _hasten(self, transport: Transport) -> dict[str, Any]:

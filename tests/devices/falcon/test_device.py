@@ -1,3 +1,4 @@
+import hashlib
 import json
 from itertools import product
 from random import Random
@@ -10,7 +11,7 @@ if numba.config.DISABLE_JIT:
     pytest.skip("devices are C functions", allow_module_level=True)
 
 from study_app.devices import open_device
-from study_app.devices.falcon import calibration, wire
+from study_app.devices.falcon import calibration, firmware, wire
 from study_app.devices.falcon import device as driver
 from study_app.devices.falcon.calibration import Calibration
 from study_app.devices.falcon.emulated import EmulatedFalcon
@@ -115,6 +116,19 @@ class TestOpening:
         assert len(json.loads(described)["firmware"]) == 64
         assert "secret" not in described
 
+    def test_a_firmware_that_nobody_knows_is_told_to_be_so(self, tmp_path, told, monkeypatch):
+        file = tmp_path / "firmware.bin"
+        file.write_bytes(stream())
+        digest = hashlib.sha256(stream()).hexdigest()
+        for name in (None, "nvent_firmware.bin"):
+            if name is not None:
+                monkeypatch.setitem(firmware._KNOWN, (digest[:16], digest[-8:]), name)
+            with open_device("falcon-emulated", firmware=file, tell=told.append):
+                loading = [line for line in told if line.startswith("Loading")]
+        assert len(loading) == 2
+        assert f"SHA-256 {digest[:16]}…, which is none of those that are known to work" in loading[0]
+        assert loading[1] == "Loading the Falcon's firmware, nvent_firmware.bin."
+
     def test_without_its_program_it_says_what_to_give(self):
         emulator = still(running=False)
         device = EmulatedFalcon(emulator=emulator)
@@ -124,12 +138,13 @@ class TestOpening:
         with pytest.raises(DeviceError, match="mains adapter"):
             device.open()
 
-    def test_a_firmware_that_is_not_there_or_is_none_is_told(self, tmp_path):
+    def test_a_firmware_that_is_not_there_or_is_none_is_told(self, tmp_path, told):
         with pytest.raises(DeviceError, match=r"nowhere\.bin cannot be read"):
             open_device("falcon-emulated", firmware=tmp_path / "nowhere.bin")
         (tmp_path / "page.bin").write_text("<!DOCTYPE html><html>")
         with pytest.raises(DeviceError, match="web page"):
-            open_device("falcon-emulated", firmware=tmp_path / "page.bin")
+            open_device("falcon-emulated", firmware=tmp_path / "page.bin", tell=told.append)
+        assert told == []
 
     @pytest.mark.parametrize("fault", ["access_denied", "not_supported", "busy", "unplugged"])
     def test_a_bridge_that_cannot_be_had_is_told_and_can_be_tried_again(self, fault):
