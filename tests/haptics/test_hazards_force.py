@@ -49,6 +49,22 @@ def test_hazard_14_a_long_rest_leaves_exactly_nothing(name):
         assert not vector.any()
 
 
+@pytest.mark.skipif(not COMPILED, reason="minutes are for compiled code")
+def test_hazard_14_what_was_smoothed_of_an_acceleration_ends_as_nothing():
+    """An average over 25 ms leaves the range of ordinary numbers after 18 s; the kernel's tail lasts far longer."""
+    effects = ("drag", "added_mass", "history")
+    hand = Hand(scene(liquid(1400, viscosity_pa_s=2.0, effects=effects)))
+    place = hand.sweep(0.2, 300)[-1].position_m + 1e-4
+    tracks = hand.model.liquid_states[0]
+    for _ in range(300):
+        rested = pass_time(hand, place, 100)
+        numbers = np.concatenate([tracks.added_mass.acceleration_mps2, tracks.history.smoothed_mps, rested.force_n])
+        assert not ((numbers != 0) & (abs(numbers) < np.finfo(float).tiny)).any()
+    assert not tracks.added_mass.acceleration_mps2.any()
+    assert not tracks.history.smoothed_mps.any()
+    assert tracks.history.force_n.any(), "the tail remembers"
+
+
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("speed_mps", [0.0, 5e-324, 1e-300, 1e-160, 1e-12])
 def test_hazard_15_as_the_reynolds_number_vanishes_drag_is_stokes(law, speed_mps):

@@ -18,7 +18,7 @@ from typing import Any
 from study_app.haptics.compiled import part
 from study_app.haptics.effects.records import EXPONENTIALS
 from study_app.haptics.layout import Record
-from study_app.haptics.vector import clear, copy
+from study_app.haptics.vector import clear
 
 TIMES = (0.1, 0.3, 1.0, 3.0, 10.0, 40.0, 190.0, 1000.0, 6500.0, 50000.0)  # t̃_i
 WEIGHTS = (
@@ -68,7 +68,8 @@ def _begin(history: Record, tracks: Record, w: Any, exponentials: Any) -> None:
     tracks.primed = 1
     tracks.first = 0
     tracks.held = 0
-    copy(w, tracks.smoothed_mps)
+    for axis in range(3):
+        tracks.smoothed_mps[axis] = w[axis] if abs(w[axis]) > NOTHING else 0.0
     for i in range(EXPONENTIALS):
         clear(exponentials[history.tail_row + i].memory)
 
@@ -86,11 +87,13 @@ def _fade(history: Record, exponentials: Any, interval_s: float) -> None:
 
 @part
 def _append(history: Record, tracks: Record, w: Any, intervals: Any, interval_s: float) -> None:
-    """Put the newest interval into the window; there is room for it."""
+    """Put the newest interval into the window; there is room for it. What is left of w at rest ends as 0."""
     weight = -math.expm1(-history.filter_per_s * interval_s)
     newest = intervals[history.row + _wrapped(tracks.first + tracks.held, history.rows)]
     for axis in range(3):
         change_mps = weight * (w[axis] - tracks.smoothed_mps[axis])
+        if abs(tracks.smoothed_mps[axis] + change_mps) <= NOTHING:
+            change_mps = -tracks.smoothed_mps[axis]
         tracks.smoothed_mps[axis] += change_mps
         newest.acceleration_mps2[axis] = change_mps / interval_s
     newest.duration_s = interval_s
