@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from study_app.haptics.compiled import part
@@ -12,6 +11,7 @@ from study_app.haptics.vector import copy, square_distance
 SHORTEST_S = 0.2e-3
 LONGEST_S = 20e-3
 FASTEST_HAND_MPS = 10.0
+FARTHEST_HAND_M = 10.0
 REFUSALS_IN_A_ROW = 5
 STALE_NS = 5_000_000
 FAULT_NS = 50_000_000
@@ -28,9 +28,10 @@ def admit(parameters: Record, state: Record, safety: Record, sample: Record) -> 
     """Take the sample's position into the scene and return Δt [s], or 0 where there is nothing to take.
 
     Δt is the time since the last accepted sample, so that the next one covers any gap; the first takes the nominal
-    period. A position that is not finite, or that a hand of 10 m/s could not have reached within Δt, is refused; after
-    five refusals in a row estimator and wakes have lost the body, and the next finite position is a new beginning.
-    A position that the device only repeats after it was refused is marked as refused too.
+    period. A position that is no number, lies more than 10 m off the device's middle along an axis, or is out of reach
+    of a hand of 10 m/s within Δt, is refused; after five refusals in a row estimator and wakes have lost the
+    body, and the next position that a hand can have is a new beginning. A position that the device only repeats after
+    it was refused is marked as refused too.
     """
     if sample.fresh == 0:
         if state.rejected > 0:
@@ -39,7 +40,7 @@ def admit(parameters: Record, state: Record, safety: Record, sample: Record) -> 
     interval_s: float = parameters.period_s
     if state.tracking:
         interval_s = clamp((sample.time_ns - state.accepted_ns) * 1e-9)
-    if not _plausible(parameters, state, sample, interval_s):
+    if not _plausible(state, sample, interval_s):
         sample.limiters |= LIMITER_GLITCH
         state.rejected += 1
         if state.rejected == REFUSALS_IN_A_ROW:
@@ -73,13 +74,14 @@ def _in_scene(parameters: Record, hand_m: Any) -> tuple[float, float, float]:
 
 
 @part
-def _plausible(parameters: Record, state: Record, sample: Record, interval_s: float) -> bool:
-    """Return whether the position is finite, in the scene too, and within reach of the last accepted one."""
-    x_m, y_m, z_m = _in_scene(parameters, sample.position_m)
-    if not (math.isfinite(x_m) and math.isfinite(y_m) and math.isfinite(z_m)):
-        return False
+def _plausible(state: Record, sample: Record, interval_s: float) -> bool:
+    """Return whether the position is one that a hand can have, and within reach of the last accepted one."""
+    hand_m = sample.position_m
+    for axis in range(3):
+        if not abs(hand_m[axis]) <= FARTHEST_HAND_M:  # NaN neither
+            return False
     farthest_m = FASTEST_HAND_MPS * interval_s
-    return state.tracking == 0 or square_distance(sample.position_m, state.hand_m) <= farthest_m * farthest_m
+    return state.tracking == 0 or square_distance(hand_m, state.hand_m) <= farthest_m * farthest_m
 
 
 @part

@@ -10,6 +10,7 @@ WRITES = 8192
 PROBE = np.dtype(
     [
         ("velocity_mps", np.float64, (3,)),
+        ("began_ns", np.int64),
         ("reads", np.int64),
         ("writes", np.int64),
         ("lost_at_read", np.int64),
@@ -35,6 +36,8 @@ _clock_at = record_at(CLOCK)
 def _read(context, now_ns, reading):
     probe = _probe_at(context)
     probe.reads += 1
+    if probe.reads == 1:
+        probe.began_ns = now_ns
     if probe.reads == probe.stall_at_read:
         _clock_at(probe.clock).now_ns += probe.stall_ns
     if probe.reads >= probe.lost_at_read:
@@ -43,7 +46,7 @@ def _read(context, now_ns, reading):
         return READ_NOTHING_NEW
     out = _reading_at(reading)
     for axis in range(3):
-        out.position_m[axis] = probe.velocity_mps[axis] * now_ns * 1e-9
+        out.position_m[axis] = probe.velocity_mps[axis] * (now_ns - probe.began_ns) * 1e-9
     out.buttons = probe.buttons
     if probe.reads == probe.bad_at_read:
         out.position_m[1] = np.nan
@@ -59,7 +62,7 @@ def _write(context, fx, fy, fz):
 
 
 class Probe:
-    """Moves at ``velocity_mps`` through the origin at time 0; its memory may be given, to be shared with a process."""
+    """Moves at ``velocity_mps`` from the origin on, once read; its memory may be given, to be shared with a process."""
 
     name = "probe"
     force_limit_n = 8.0

@@ -187,6 +187,21 @@ def test_hazard_11_whoever_finds_the_body_again_finds_numbers():
 
 
 @pytest.mark.parametrize("felt", ALL.values(), ids=ALL)
+@pytest.mark.parametrize("far_m", [10.1, 1e155, 1e300, 1.7e308])
+def test_hazard_11_no_place_beyond_a_hands_reach_is_a_new_beginning(felt, far_m):
+    hand = Hand(felt)
+    hand.sweep(0.1, 200)
+    for k in range(40):
+        lost = hand.turn((0.0, -far_m, far_m * (1 - 1e-12 * (k % 2))))
+        assert lost.limiters & LIMITER_GLITCH
+        assert np.isfinite(all_numbers(hand.model)).all()
+        assert np.isfinite(lost.force_n).all()
+    back = hand.sweep(0.1, 20)
+    assert not any(sample.limiters & LIMITER_GLITCH for sample in back)
+    assert np.isfinite(all_numbers(hand.model)).all()
+
+
+@pytest.mark.parametrize("felt", ALL.values(), ids=ALL)
 @pytest.mark.parametrize("jump_m", [(0.1, 0, 0), (0, -0.1, 0), (0.03, 0.03, 0.03)])
 def test_hazard_12_a_jump_of_100_metres_a_second_is_not_felt(felt, jump_m):
     hand = Hand(felt)
