@@ -36,6 +36,12 @@ def test_the_wheel_contains_the_protocols_and_the_typeface(installed: Path) -> N
     assert (package / limits).read_bytes() == (ROOT / "study_app" / limits).read_bytes()
 
 
+def test_the_wheel_contains_the_fluid_solvers_tables(installed: Path) -> None:
+    tables = ROOT / "study_app" / "evaluation" / "cfd"
+    shipped = {path.name for path in (installed / "study_app" / "evaluation" / "cfd").glob("*.csv")}
+    assert shipped == {path.name for path in tables.glob("*.csv")} >= {"steady.csv", "fits.csv", "honey-600mmps.csv"}
+
+
 def test_check_works_far_from_the_checkout(installed: Path, tmp_path: Path) -> None:
     environment = os.environ | {"PYTHONPATH": str(installed), "PYTHONSAFEPATH": "1"}
     program = "import study_app, sys; print(study_app.__file__); from study_app.cli import main; main()"

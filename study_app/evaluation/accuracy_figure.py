@@ -32,6 +32,7 @@ LETTERS: Final = 66
 BUDGET_NS: Final = 1e6
 LABEL_PT: Final = 8.2
 COLUMN_NS: Final = 5e3
+SOLVER_HIGH: Final = 0.38
 SLANT_PT: Final = 4.0
 """By so much a decade of time puts a label higher: hairlines from the left then pass below the points to the right."""
 
@@ -94,7 +95,7 @@ class _Panel:
         self._points = worst(rows)
         self._rows = rows
         self._front = [self._points[rung] for rung in front(self._points)]
-        self._solved = [(it.name, it.computing_s * 1e6) for it in found.truths if it.computing_s]
+        self._solved = [it.computing_s * 1e6 for it in found.truths if it.computing_s]
         self._numerical = kind == "numerical"
         self._strip = [row for row in self._points.values() if row.error.rms < ROUNDED]
         names = ", ".join(dict.fromkeys(row.truth for row in rows))
@@ -169,10 +170,10 @@ class _Panel:
             least = min(100 * it.error.rms for it in self._rows if it.rung is row.rung)
             axes.plot([row.ns_per_ms] * 2, [least, 100 * row.error.rms], color=style.TEXT_SOFT, linewidth=0.6, zorder=3)
         self._label(axes, shown)
-        for name, ns in self._solved if not self._numerical else ():
-            axes.axvline(ns, color=style.TEXT_SOFT, linewidth=0.8)
+        for ns in self._solved if not self._numerical else ():
+            axes.axvline(ns, ymax=SOLVER_HIGH, color=style.TEXT_SOFT, linewidth=0.8)
             foot = (ns, axes.get_ylim()[0])
-            axes.annotate(f"fluid solver, {name}", foot, (-2, 3), rotation=90, ha="right", va="bottom", **beside)
+            axes.annotate("fluid solver", foot, (-2, 3), rotation=90, ha="right", va="bottom", **beside)
 
     def _rounding(self, axes: Axes, main: Axes) -> None:
         """Draw the points whose errors are rounding."""

@@ -1,0 +1,241 @@
+"""Axisymmetric flow around a ball at rest in a wide stream, by finite elements (NGSolve, the extra ``cfd``).
+
+In units of the ball's diameter, the stream's speed and the liquid's density. The momentum equation and the condition
+that nothing is compressed, weighted by the distance r from the axis,
+
+    ∂u/∂t + (u·∇)u = dU/dt e_x − ∇p + ∇·2νε(u),   ∇·u = 0,   ν = 1/Re,
+
+on Taylor–Hood elements of order 3 on curved triangles; the stream U(t) on the borders ahead and aside, free outflow
+behind. dU/dt stands in for the pressure that a frame moving with the ball would add: forces are those of the resting
+frame. The drag is the residual of the momentum equation at the ball (Babuška & Miller 1984), more exact than an
+integral of stresses. In time: backward differences of order 2, convection extrapolated with order 2, one matrix for all
+steps.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from study_app.errors import StudyError
+from study_app.haptics.motion import Floats
+
+ORDER: Final = 3
+_ROUNDS: Final = 20
+_SETTLED: Final = 1e-8
+_EDGE: Final = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class Grid:
+    """How far the mesh goes ahead of, behind and aside of the ball, and how long its edges are, in diameters.
+
+    ``ball`` is the longest edge on the ball, ``near`` within two diameters of it and five behind; there the wake has
+    four times that, the rest of the liquid ``far``.
+    """
+
+    ahead: float
+    behind: float
+    aside: float
+    ball: float
+    near: float
+    far: float
+
+
+def library() -> Any:
+    """Import NGSolve.
+
+    Its algebra is kept to one thread: on matrices as small as these more make it ten times slower on busy cores.
+
+    Raises
+    ------
+    StudyError
+        It is not installed.
+    """
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    try:
+        import ngsolve  # noqa: PLC0415 - an extra of 350 MB
+    except ImportError as error:
+        raise StudyError(
+            "the fluid solver NGSolve is not installed: pip install ngsolve (350 MB), or use the stored tables"
+        ) from error
+    return ngsolve
+
+
+class Flow:
+    """The liquid around the ball on one grid; ``unknowns`` is how many numbers describe it.
+
+    Raises
+    ------
+    StudyError
+        NGSolve is not installed.
+    """
+
+    def __init__(self, grid: Grid) -> None:
+        self._ng = ng = library()
+        self._mesh = mesh = _mesh(grid)
+        walls = "ball|ahead|aside"
+        along, across = (ng.H1(mesh, order=ORDER, dirichlet=it) for it in (walls, f"{walls}|axis"))
+        self._space = along * across * ng.H1(mesh, order=ORDER - 1)
+        self._free = self._space.FreeDofs()
+        self.unknowns = int(self._space.ndof)
+        self._trial, self._test = self._space.TnT()
+        self._at_ball = self._one_on("ball")
+        self._stream = self._one_on("ahead|aside")
+
+    def steady(self, reynolds: Sequence[float]) -> list[float]:
+        """Return C_d at rising Reynolds numbers, each found by Newton's method from the one before.
+
+        Raises
+        ------
+        StudyError
+            No steady flow was found.
+        """
+        ng = self._ng
+        flow, residual, step = ng.GridFunction(self._space), self._zeros(), self._zeros()
+        flow.vec.data = self._stream
+        found = []
+        for value in reynolds:
+            form = ng.BilinearForm(self._space)
+            form += self._integral(self._stokes(1 / value) + self._convection(*self._trial[:2]))
+            for _ in range(_ROUNDS):
+                form.Apply(flow.vec, residual)
+                form.AssembleLinearization(flow.vec)
+                step.data = form.mat.Inverse(self._free, inverse="umfpack") * residual
+                flow.vec.data -= step
+                if step.Norm() < _SETTLED * flow.vec.Norm():
+                    break
+            else:
+                raise StudyError(f"no steady flow was found at Re = {value:g}: take smaller steps up to it")
+            form.Apply(flow.vec, residual)
+            found.append(-2 * math.pi * ng.InnerProduct(residual, self._at_ball) / (math.pi / 8))
+        return found
+
+    def unsteady(
+        self, reynolds: float, times: Floats, speed: Callable[[float], float], *, convection: bool = True
+    ) -> Floats:
+        """Return the force along the stream at ``times`` (n,) [ρU²D²], for a stream at rest until the first of them.
+
+        Without ``convection`` the flow creeps.
+
+        Raises
+        ------
+        StudyError
+            The steps are too long for the grid: the flow blew up.
+        """
+        ng = self._ng
+        stokes, mass = (ng.BilinearForm(self._space) for _ in range(2))
+        stokes += self._integral(self._stokes(1 / reynolds))
+        mass += self._integral(self._inertia())
+        push, carried = ng.LinearForm(self._space), ng.LinearForm(self._space)
+        flow = ng.GridFunction(self._space)
+        push += self._integral(ng.y * self._test[0])
+        carried += self._integral(self._convection(*flow.components[:2]))
+        for form in (stokes, mass, push):
+            form.Assemble()
+        matrices: dict[float, tuple[Any, Any]] = {}
+        load, rest, change, before, previous, carried_before, carried_previous = (self._zeros() for _ in range(7))
+        drag, moments = np.zeros(len(times)), times.tolist()  # NGSolve takes no numbers of numpy
+        for k in range(1, len(times)):
+            step = moments[k] - moments[k - 1]
+            growth = step / (moments[k - 1] - moments[k - 2]) if k > 1 else 1.0
+            now, last, first = (1 + 2 * growth) / (1 + growth), 1 + growth, growth**2 / (1 + growth)
+            weight = round(now / step, 9)
+            if weight not in matrices:
+                matrices[weight] = self._with_inverse(stokes, mass, weight)
+            matrix, inverse = matrices[weight]
+            at = [speed(moments[max(k - back, 0)]) for back in range(3)]
+            change.data = first / step * before - last / step * previous
+            load.data = (weight * at[0] - last / step * at[1] + first / step * at[2]) * push.vec - mass.mat * change
+            rest.data = load - (1 + growth) * carried_previous + growth * carried_before
+            flow.vec.data = at[0] * self._stream
+            rest.data -= matrix * flow.vec
+            flow.vec.data += inverse * rest
+            load.data -= matrix * flow.vec
+            if convection:
+                carried.Assemble()
+                carried_before.data, carried_previous.data = carried_previous, carried.vec
+                load.data -= carried.vec
+            before.data, previous.data = previous, flow.vec
+            drag[k] = 2 * math.pi * ng.InnerProduct(load, self._at_ball)
+            if not math.isfinite(drag[k]):
+                raise StudyError(f"the flow blew up at t = {moments[k]:g} D/U: take shorter steps than {step:g} D/U")
+        return drag
+
+    def _with_inverse(self, stokes: Any, mass: Any, weight: float) -> tuple[Any, Any]:
+        """Return the matrix of a time step, and its inverse."""
+        matrix = stokes.mat.CreateMatrix()
+        matrix.AsVector().data = stokes.mat.AsVector() + weight * mass.mat.AsVector()
+        return matrix, matrix.Inverse(self._free, inverse="umfpack")
+
+    def _zeros(self) -> Any:
+        made = self._ng.BaseVector(self.unknowns)
+        made[:] = 0.0
+        return made
+
+    def _one_on(self, border: str) -> Any:
+        """Return the vector of a flow of speed 1 along the stream at a border, and 0 at all other nodes."""
+        flow, made = self._ng.GridFunction(self._space), self._zeros()
+        flow.components[0].Set(1, definedon=self._mesh.Boundaries(border))
+        made.data = flow.vec
+        return made
+
+    def _integral(self, integrand: Any) -> Any:
+        return integrand * self._ng.dx(bonus_intorder=2)
+
+    def _inertia(self) -> Any:
+        (u, w, _), (v, z, _) = self._trial, self._test
+        return self._ng.y * (u * v + w * z)
+
+    def _convection(self, u: Any, w: Any) -> Any:
+        grad, (v, z, _) = self._ng.grad, self._test
+        return self._ng.y * ((u * grad(u)[0] + w * grad(u)[1]) * v + (u * grad(w)[0] + w * grad(w)[1]) * z)
+
+    def _stokes(self, viscosity: float) -> Any:
+        """Return what viscosity and pressure do, and that nothing is compressed."""
+        (u, w, p), (v, z, q), r = self._trial, self._test, self._ng.y
+        du, dw, dv, dz = (self._ng.grad(it) for it in (u, w, v, z))
+        strain = 2 * du[0] * dv[0] + 2 * dw[1] * dz[1] + (du[1] + dw[0]) * (dv[1] + dz[0])
+        around = 2 * w * z / r
+        return viscosity * (r * strain + around) - p * (r * (dv[0] + dz[1]) + z) - q * (r * (du[0] + dw[1]) + w)
+
+
+def _mesh(grid: Grid) -> Any:
+    """Return curved triangles of the half plane above the axis, its edges named."""
+    from netgen.occ import Glue, OCCGeometry, WorkPlane  # noqa: PLC0415 - comes with NGSolve
+
+    def box(ahead: float, long: float, high: float) -> Any:
+        return WorkPlane().MoveTo(-ahead, 0).Rectangle(long, high).Face() - ball
+
+    ball = WorkPlane().Circle(0, 0, 0.5).Face()
+    near, wake = box(2, 7, 2), box(4, 24, 4)
+    wake -= near
+    far = box(grid.ahead, grid.ahead + grid.behind, grid.aside) - near - wake
+    for part, longest in ((near, grid.near), (wake, 4 * grid.near), (far, grid.far)):
+        part.faces.maxh = longest
+    whole = Glue([near, wake, far])
+    for edge in whole.edges:
+        edge.name = _border(grid, edge)
+        if edge.name == "ball":
+            edge.maxh = grid.ball
+    mesh = library().Mesh(OCCGeometry(whole, dim=2).GenerateMesh(maxh=grid.far, grading=0.25))
+    mesh.Curve(ORDER)
+    return mesh
+
+
+def _border(grid: Grid, edge: Any) -> str:
+    x, r = edge.center[0], edge.center[1]
+    if r < _EDGE:
+        return "axis"
+    if math.hypot(edge.start[0], edge.start[1]) < 0.5 + _EDGE and math.hypot(edge.end[0], edge.end[1]) < 0.5 + _EDGE:
+        return "ball"
+    if abs(x + grid.ahead) < _EDGE:
+        return "ahead"
+    if abs(x - grid.behind) < _EDGE:
+        return "behind"
+    return "aside" if abs(r - grid.aside) < _EDGE else "between"
