@@ -1,0 +1,86 @@
+"""The codebook of an export: the columns of every file, every statement, level and setting, and what was left out."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict
+from typing import Any
+
+from study_app import __version__
+from study_app.analysis.measures import AGREEMENT, LEVELS, QUARTILES
+from study_app.analysis.tables import Study
+from study_app.store import blinding
+from study_app.store.columns import MISSING, Column
+
+
+def codebook_bytes(study: Study, files: Mapping[str, Iterable[Column]]) -> bytes:
+    """Return the codebook as JSON; ``files`` maps names to their columns."""
+    described = {name: [_described(column) for column in columns] for name, columns in files.items()}
+    return f"{json.dumps(_codebook(study, described), indent=2, ensure_ascii=False)}\n".encode()
+
+
+def _codebook(study: Study, files: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        "study": {
+            "name": study.name,
+            "title": study.title,
+            "version": study.version,
+            "participants": study.n,
+            "sessions": len(study.participants),
+            "sessions_left_out": study.left_out,
+            "sessions_excluded": len(study.excluded_sessions),
+            "simulated": study.simulated,
+            "pilot": study.pilot,
+        },
+        "program": f"liquid-study {__version__}",
+        "format": "CSV: UTF-8, comma, decimal point, RFC 4180 quoting",
+        "missing": MISSING,
+        "blinded": not study.revealed,
+        "key_opened": list(blinding.reveals(study.folder)),
+        "doubts": [
+            {"file": doubt.path.relative_to(study.folder).as_posix(), "what": doubt.what} for doubt in study.doubts
+        ],
+        "exclusions": [asdict(one) for one in study.exclusions],
+        "blocks": [
+            {
+                "id": block.id,
+                "title": block.title,
+                "levels": {str(level): label for level, label in zip(LEVELS, block.labels, strict=True)},
+                "cannot_judge": block.cannot_judge,
+                "items": [{"id": item.id, "text": item.text, "short": item.short} for item in block.items],
+                "settings": [
+                    {
+                        "code": setting.code,
+                        **(
+                            {"condition": setting.condition, "liquid": setting.liquid, "delay_ms": setting.delay_ms}
+                            if block.revealed
+                            else {}
+                        ),
+                    }
+                    for setting in block.settings
+                ],
+            }
+            for block in study.blocks
+        ],
+        "measures": {
+            "quartiles": QUARTILES,
+            "agree_percent": f"levels {AGREEMENT[0]} to {AGREEMENT[-1]}, of the valid answers",
+            "counted": "main trials of completed sessions; of a repeated trial the last attempt; nothing excluded",
+        },
+        "files": files,
+    }
+
+
+def _described(column: Column) -> dict[str, Any]:
+    described: dict[str, Any] = {"name": column.name, "type": column.kind, "description": column.description}
+    if column.unit:
+        described["unit"] = column.unit
+    if column.levels:
+        described["levels"] = dict(column.levels)
+    if column.minimum is not None:
+        described["minimum"] = column.minimum
+    if column.maximum is not None:
+        described["maximum"] = column.maximum
+    described["may_miss"] = column.may_miss
+    return described
