@@ -60,6 +60,7 @@ MOST_STEP_N: Final = 0.47
 servo's 0.5 N, less what motion within a turn makes of torques."""
 LONGEST_GAP_NS: Final = 20_000_000
 """A reply that waited longer for the loop to look is too old to be given."""
+_BEYOND = 2  # so many positions in a row show an out-stroke: one may be of a packet whose homed bits were garbled
 _READS = 2  # a turn asks the bridge at most so often: one answer may be nothing but status bytes
 _TIMEOUT_MS = 1
 _DATA = 4 * USB_PACKET
@@ -99,7 +100,8 @@ FALCON = np.dtype(
         # the gate
         ("homed", np.int64),  # 1 while all arms are
         ("unhomed", np.int64),  # packets in a row that said otherwise
-        ("pulled_out", np.int64),  # 1 after the out-stroke
+        ("beyond", np.int64),  # positions in a row at the end of the out-stroke
+        ("pulled_out", np.int64),  # 1 after it
         ("share", np.float64),  # of the force that passes
         ("buttons", np.int64),  # as two packets in a row said
         ("seen_buttons", np.int64),  # as the last one said
@@ -307,7 +309,8 @@ def _locate(falcon: Any) -> bool:
 
 @kernel
 def _open_gate(falcon: Any, elapsed_s: float) -> None:
-    if falcon.position_m[2] > OUT_STROKE_M:
+    falcon.beyond = falcon.beyond + 1 if falcon.position_m[2] > OUT_STROKE_M else 0
+    if falcon.beyond >= _BEYOND:
         falcon.pulled_out = 1
     if falcon.pulled_out != 0:
         falcon.share = min(falcon.share + elapsed_s / RAMP_S, 1.0)

@@ -5,8 +5,8 @@ than ``MOST_OWED`` are owed, nothing but an end of force is sent for two turns: 
 positions are not given; else the owed ones are written off as lost.
 
 There is no check sum, so a byte that was garbled into another that may stand there passes the parser. What a hand does
-not do, a leap of an arm away from its motion, therefore needs a second reply that says so; likewise buttons and homed
-arms. All of this works on the exchange's record (``exchange.FALCON``).
+not do, a leap of an arm away from its motion, therefore needs a second reply that says so; likewise buttons, the end of
+the out-stroke and arms no longer homed. All of this works on the exchange's record (``exchange.FALCON``).
 """
 
 from __future__ import annotations
@@ -71,6 +71,7 @@ def believe(falcon: Any) -> bool:
     if status.homed != ALL_HOMED:
         falcon.unhomed += 1
         falcon.tracked = 0
+        falcon.beyond = 0
         if falcon.unhomed >= BELIEVED:
             falcon.homed = 0
             falcon.pulled_out = 0

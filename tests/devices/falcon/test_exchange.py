@@ -204,6 +204,18 @@ class TestTheGate:
         turns.turn(reply(), force_n=PUSH_N)
         assert turns.torques != [0, 0, 0]
 
+    def test_one_garbled_packet_does_not_open_it(self, turns):
+        turns.turn()
+        for _ in range(5):
+            turns.turn(reply(OUT_M, homed=0b011), force_n=PUSH_N)
+        turns.turn(reply(OUT_M, homed=0b111), force_n=PUSH_N)
+        turns.turn(reply(OUT_M, homed=0b011), force_n=PUSH_N)
+        assert (turns.falcon.pulled_out, turns.falcon.share) == (0, 0.0)
+        turns.turn(reply(OUT_M, homed=0b111), force_n=PUSH_N)
+        assert (turns.falcon.pulled_out, turns.torques) == (0, [0, 0, 0])
+        turns.turn(reply(OUT_M, homed=0b111), force_n=PUSH_N)
+        assert turns.falcon.pulled_out == 1
+
     def test_one_garbled_packet_does_not_close_it(self, turns):
         turns.open_gate()
         assert turns.turn(reply(homed=0b011), force_n=PUSH_N)[0] == READ_NOTHING_NEW

@@ -112,8 +112,8 @@ class Turns:
             self.turn(reply())
 
     def pull_out(self):
-        """Pull the grip out and let it go back, faster than any hand but seen twice at either end."""
-        for place_m in (OUT_M, OUT_M, CENTRE_M, CENTRE_M):
+        """Pull the grip out and let it go back, faster than any hand but seen for long enough at either end."""
+        for place_m in (OUT_M, OUT_M, OUT_M, CENTRE_M, CENTRE_M):
             self.turn(reply(place_m))
 
     @property
