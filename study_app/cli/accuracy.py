@@ -30,9 +30,9 @@ def accuracy(scene: str | None, liquid: str | None, path: str, to: Path | None) 
 
     Wakes are measured against their definition, models of a real liquid against experiments and exact solutions.
     """
-    from study_app.evaluation.accuracy import accuracy as measure
-    from study_app.evaluation.accuracy_files import markdown
-    from study_app.evaluation.accuracy_files import write as write_all
+    from study_app.evaluation.accuracy.files import markdown
+    from study_app.evaluation.accuracy.files import write as write_all
+    from study_app.evaluation.accuracy.race import accuracy as measure
     from study_app.evaluation.soaked import make_folder
 
     numerical, physical, notes = _subjects(scene, liquid)
@@ -77,7 +77,7 @@ def _subjects(scene: str | None, liquid: str | None) -> tuple[Scene | None, Scen
 
 
 def _motion(path: str, scene: Scene) -> Motion:
-    from study_app.evaluation.motions import stir
+    from study_app.evaluation.accuracy.motions import stir
     from study_app.haptics import motion, paths
 
     if path == DEFAULT_PATH:

@@ -43,8 +43,8 @@ def assignment(change: str) -> tuple[str, str]:
 @click.option("--liquid", metavar="NAME", help="Only this one; default: every liquid of the file.")
 def scene(scene: str, liquid: str | None) -> None:
     """Print which effects a scene calls for, why, the measured cost of each, and how wrong the force is to expect."""
+    from study_app.evaluation.accuracy.expected import foretold
     from study_app.evaluation.cost import report
-    from study_app.evaluation.expected import foretold
     from study_app.protocol.load import load_scene, load_scenes
 
     chosen = [load_scene(scene, liquid)] if liquid else list(load_scenes(scene).values())

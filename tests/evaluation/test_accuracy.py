@@ -11,14 +11,14 @@ from click.testing import CliRunner
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from study_app.cli import commands
-from study_app.evaluation import ladders
-from study_app.evaluation.accuracy import ROUNDING, Accuracy, Error, Row, Time, accuracy, error_of, front, worst
-from study_app.evaluation.accuracy_figure import LABEL_PT, draw, duration, spread
-from study_app.evaluation.accuracy_files import COLUMNS, csv_text, markdown, write
-from study_app.evaluation.expected import expected, foretold, physical_n
-from study_app.evaluation.motions import stir, stroke
-from study_app.evaluation.rungs import LinearRung, ListRung, TickRung
-from study_app.evaluation.truths import Case, Truth
+from study_app.evaluation.accuracy import ladders
+from study_app.evaluation.accuracy.expected import expected, foretold, physical_n
+from study_app.evaluation.accuracy.figure import LABEL_PT, draw, duration, spread
+from study_app.evaluation.accuracy.files import COLUMNS, csv_text, markdown, write
+from study_app.evaluation.accuracy.motions import stir, stroke
+from study_app.evaluation.accuracy.race import ROUNDING, Accuracy, Error, Row, Time, accuracy, error_of, front, worst
+from study_app.evaluation.accuracy.rungs import LinearRung, ListRung, TickRung
+from study_app.evaluation.accuracy.truths import Case, Truth
 from study_app.haptics.motion import Motion
 from study_app.haptics.scene import Drag, Given, Liquid, LocalWake, MotionBox, Scene, Wake
 from study_app.protocol.load import load_scene

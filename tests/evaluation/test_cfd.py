@@ -12,7 +12,7 @@ from scipy.integrate import quad
 
 from study_app.cli.solver import cfd
 from study_app.errors import StudyError
-from study_app.evaluation import truths
+from study_app.evaluation.accuracy import truths
 from study_app.evaluation.cfd import case, compared, drawn, fitted, flow, solve, tables
 from study_app.evaluation.cfd.case import END, RAMP, STOP, Case
 from study_app.evaluation.style import file_bytes

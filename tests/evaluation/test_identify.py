@@ -11,8 +11,8 @@ from scipy.stats import t as student
 
 from study_app.cli import commands
 from study_app.errors import StudyError
-from study_app.evaluation import identified, identify_figure, measured, parameters, search
-from study_app.evaluation.identify import fit
+from study_app.evaluation.identify import figure, measured, parameters, preset, search
+from study_app.evaluation.identify.fit import fit
 from study_app.haptics import paths
 from study_app.haptics.motion import Motion
 from study_app.haptics.offline import simulate
@@ -392,18 +392,18 @@ def test_the_preset_is_the_fitted_scene(scene, tmp_path):
     (liquid,) = scene.liquids
     (tmp_path / "measured.csv").write_text("t_s\n")
     found = fit(scene, liquid.id, ["density_kg_m3"], REACH, noisy(scene, REACH, 0.02))
-    preset = tmp_path / "preset.toml"
-    preset.write_text(identified.preset(found, tmp_path / "measured.csv"), encoding="utf-8")
-    assert load_scene(preset, liquid.id) == found.scene
+    file = tmp_path / "preset.toml"
+    file.write_text(preset.preset(found, tmp_path / "measured.csv"), encoding="utf-8")
+    assert load_scene(file, liquid.id) == found.scene
     assert found.scene != scene
     for command in ("check", "scene"):
-        told = CliRunner().invoke(commands, [command, str(preset)], catch_exceptions=False)
+        told = CliRunner().invoke(commands, [command, str(file)], catch_exceptions=False)
         assert (told.exit_code, f"{liquid.id}: effects named" in told.output) == (0, True)
 
 
 def test_the_preset_says_how_sure_its_numbers_are(fitted):
     found, path = fitted
-    lines = identified.preset(found, path).splitlines()
+    lines = preset.preset(found, path).splitlines()
     lower, upper = found.intervals["drag_coefficient"]
     value = found.values["drag_coefficient"]
     assert f"drag_coefficient = {value!r}  # 95 %: {lower:.5g} … {upper:.5g}" in lines
@@ -412,7 +412,7 @@ def test_the_preset_says_how_sure_its_numbers_are(fitted):
 
 def test_the_residuals_in_the_table_are_measured_less_fitted(fitted, tmp_path):
     found, path = fitted
-    written = identified.write(found, tmp_path / "new", path)
+    written = preset.write(found, tmp_path / "new", path)
     assert sorted(it.name for it in written) == sorted(it.name for it in (tmp_path / "new").iterdir())
     rows = np.genfromtxt(tmp_path / "new" / "tank-fit.csv", delimiter=",", names=True)
     force_n = force_of(found.scene, REVERSE)
@@ -423,7 +423,7 @@ def test_the_residuals_in_the_table_are_measured_less_fitted(fitted, tmp_path):
 
 def test_the_figure_is_whole_and_shows_the_residual(fitted):
     found, _ = fitted
-    drawn = identify_figure.draw(found)
+    drawn = figure.draw(found)
     drawn.draw_without_rendering()
     frame = drawn.bbox
     boxes = [axes.get_tightbbox() for axes in drawn.axes] + [it.get_window_extent() for it in drawn.texts]
@@ -459,9 +459,9 @@ def test_from_a_file_to_a_preset(tmp_path):
     )
     assert told.exit_code == 0
     assert f"honey: {len(REACH.t_s)} rows over 1.8 s; residual 0.0283 N RMS" in told.output
-    preset = load_scene(tmp_path / "out" / "honey.toml", "honey")
-    assert preset.body.drag_coefficient == pytest.approx(0.61, rel=0.01)
-    assert preset.model_copy(update={"body": true.body}) == true
+    written = load_scene(tmp_path / "out" / "honey.toml", "honey")
+    assert written.body.drag_coefficient == pytest.approx(0.61, rel=0.01)
+    assert written.model_copy(update={"body": true.body}) == true
 
 
 def test_a_motion_along_one_line_is_read_from_its_velocities(tmp_path):
@@ -504,3 +504,13 @@ def test_a_file_that_cannot_be_used_is_one_line(tmp_path, monkeypatch, capsys, t
     assert printed.out == ""
     (line,) = printed.err.splitlines()
     assert said in line
+
+
+def test_what_has_no_greatest_value_is_searched_within_finite_numbers():
+    tail = LocalWake(length=300, scaling=400)
+    liquid = Liquid(id="tank", density_kg_m3=1000, effects=("drag", "local_wake"), local_wake=tail)
+    (reach,) = parameters.find(Scene(liquids=(liquid,)), "tank", ["reach_m"])
+    least, most = search.u_range(reach)
+    assert reach.most == math.inf
+    assert search.coordinate(reach).to_value(most) == pytest.approx(1e6 * reach.value)
+    assert least < most < math.inf

@@ -8,8 +8,8 @@ import pytest
 from scipy.integrate import quad
 
 from study_app.errors import StudyError
-from study_app.evaluation import truths
-from study_app.evaluation.motions import stir, with_velocity
+from study_app.evaluation.accuracy import truths
+from study_app.evaluation.accuracy.motions import stir, with_velocity
 from study_app.evaluation.references import exact_wakes, respond, wakes
 from study_app.haptics.motion import Motion
 from study_app.haptics.scene import Drag, Given, Liquid, MotionBox, Scene, Wake

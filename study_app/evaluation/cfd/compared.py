@@ -13,11 +13,11 @@ from typing import Final
 import numpy as np
 
 from study_app.errors import StudyError
+from study_app.evaluation.accuracy.truths import measured_drag_n
 from study_app.evaluation.cfd.drawn import draw
 from study_app.evaluation.cfd.fitted import MODELS, Fitted, judge
 from study_app.evaluation.cfd.tables import Table
 from study_app.evaluation.style import file_bytes
-from study_app.evaluation.truths import measured_drag_n
 from study_app.haptics.laws import LAWS
 from study_app.haptics.scene import Liquid
 from study_app.store.atomic import write_file

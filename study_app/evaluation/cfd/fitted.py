@@ -15,8 +15,8 @@ import numpy as np
 
 from study_app.evaluation.cfd.case import RAMP, STOP, Case
 from study_app.evaluation.cfd.tables import Table
-from study_app.evaluation.identify import fit
-from study_app.evaluation.measured import along_a_line
+from study_app.evaluation.identify.fit import fit
+from study_app.evaluation.identify.measured import along_a_line
 from study_app.haptics.motion import Floats, Motion
 from study_app.haptics.offline import simulate
 from study_app.haptics.override import override_all

@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 
 from study_app.errors import StudyError
-from study_app.evaluation.accuracy import machine
+from study_app.evaluation.accuracy.race import machine
 from study_app.evaluation.cfd.case import END, RAMP, STOP, Case, cases, linear_drags, moments, speed
 from study_app.evaluation.cfd.flow import ORDER, Flow, Grid, library
 from study_app.evaluation.cfd.tables import MOTION, STEADY, STEADY_FILE, notes_of, text

@@ -17,12 +17,13 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from study_app.errors import StudyError
-from study_app.evaluation.measured import Measured, at_rate
-from study_app.evaluation.parameters import Parameter, replace
+from study_app.evaluation.identify.measured import Measured, at_rate
+from study_app.evaluation.identify.parameters import Parameter, replace
 from study_app.haptics.motion import Floats
 from study_app.haptics.offline import simulate
 from study_app.haptics.scene import Scene
 
+_FURTHEST: Final = 1e6
 _LEAST_POSITIVE: Final = 1e-12
 _HIGHEST_EXPONENT: Final = 700.0
 _SHORTEST_START: Final = 5
@@ -64,14 +65,17 @@ def coordinate(parameter: Parameter) -> Coordinate:
 
 
 def u_range(parameter: Parameter) -> tuple[float, float]:
-    """Return the least and the greatest u that the parameter's own model permits."""
+    """Return the least and the greatest u that the parameter's own model permits.
+
+    What has no greatest value and is searched by its logarithm grows to a million times what it was, and no further.
+    """
     it = coordinate(parameter)
     if it is _RATE:
         return 0.0, 1e3
-    least = max(parameter.least, _LEAST_POSITIVE) if it is not _LINEAR else parameter.least
-    return (it.to_u(least) if math.isfinite(least) else least), (
-        it.to_u(parameter.most) if math.isfinite(parameter.most) else math.inf
-    )
+    if it is _LINEAR:
+        return parameter.least, parameter.most
+    least = max(parameter.least, _LEAST_POSITIVE)
+    return it.to_u(least), it.to_u(min(parameter.most, _FURTHEST * max(parameter.value, least)))
 
 
 class Problem:

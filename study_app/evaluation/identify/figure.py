@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from study_app.evaluation import style
-from study_app.evaluation.identify import Fit
+from study_app.evaluation.identify.fit import Fit
 from study_app.haptics.motion import Floats
 
 MEASURED: Final = "#b4bec7"

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
-from study_app.evaluation.accuracy import Accuracy, Row
-from study_app.evaluation.accuracy_figure import draw
+from study_app.evaluation.accuracy.figure import draw
+from study_app.evaluation.accuracy.race import Accuracy, Row
 from study_app.evaluation.style import file_bytes
 from study_app.store.atomic import write_file
 

@@ -14,7 +14,7 @@ from typing import Any, ClassVar, Final, Literal, TypeAlias
 
 import numpy as np
 
-from study_app.evaluation.literal import NumpyTail, PlainTail, list_follow, list_wake, new_list
+from study_app.evaluation.accuracy.literal import NumpyTail, PlainTail, list_follow, list_wake, new_list
 from study_app.evaluation.references import lowered
 from study_app.haptics.bounds import resistance_n
 from study_app.haptics.compiled import kernel

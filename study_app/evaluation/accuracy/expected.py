@@ -11,14 +11,14 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from study_app.evaluation import truths
-from study_app.evaluation.accuracy import ROUNDING, Error, error_of
+from study_app.evaluation.accuracy import truths
+from study_app.evaluation.accuracy.ladders import with_effects
+from study_app.evaluation.accuracy.motions import stroke
+from study_app.evaluation.accuracy.race import ROUNDING, Error, error_of
+from study_app.evaluation.accuracy.rungs import COUNT_M
+from study_app.evaluation.accuracy.truths import CYCLES, Case, Truth
 from study_app.evaluation.cost import measure
-from study_app.evaluation.ladders import with_effects
-from study_app.evaluation.motions import stroke
 from study_app.evaluation.references import local_wakes, lowered, resistance_nspm, respond
-from study_app.evaluation.rungs import COUNT_M
-from study_app.evaluation.truths import CYCLES, Case, Truth
 from study_app.haptics.bounds import GRAVITY_MPS2
 from study_app.haptics.gate import resolve
 from study_app.haptics.motion import Floats, Motion

@@ -11,9 +11,10 @@ from typing import Any, Final
 
 import numpy as np
 
-from study_app.evaluation import identify_figure, style
-from study_app.evaluation.identify import CONFIDENCE, Fit
-from study_app.evaluation.parameters import Parameter
+from study_app.evaluation import style
+from study_app.evaluation.identify import figure
+from study_app.evaluation.identify.fit import CONFIDENCE, Fit
+from study_app.evaluation.identify.parameters import Parameter
 from study_app.evaluation.soaked import make_folder
 from study_app.haptics import motion
 from study_app.haptics.offline import Table
@@ -53,7 +54,7 @@ def write(found: Fit, to: Path, source: Path) -> tuple[Path, ...]:
     write_file(written[0], preset(found, source).encode())
     write_file(written[1], f"{text(found)}\n".encode())
     motion.write(written[2], residuals(found))
-    drawn = identify_figure.draw(found)
+    drawn = figure.draw(found)
     for kind in style.FORMATS:
         written.append(to / f"{name}.{kind}")
         write_file(written[-1], style.file_bytes(drawn, kind, f"{found.liquid_id}: measured and fitted force"))

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from study_app.evaluation.literal import NumpyTail, PlainTail
-from study_app.evaluation.rungs import InterpretedRung, LinearRung, ListRung, Rung, TickRung, given
+from study_app.evaluation.accuracy.literal import NumpyTail, PlainTail
+from study_app.evaluation.accuracy.rungs import InterpretedRung, LinearRung, ListRung, Rung, TickRung, given
 from study_app.haptics.bounds import REFERENCE
 from study_app.haptics.gate import resolve
 from study_app.haptics.laws import Law

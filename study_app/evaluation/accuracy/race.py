@@ -15,10 +15,10 @@ from typing import Final, Literal, NamedTuple, TypeAlias
 import numba
 import numpy as np
 
-from study_app.evaluation import ladders, truths
-from study_app.evaluation.motions import with_velocity
-from study_app.evaluation.rungs import Rung, given
-from study_app.evaluation.truths import Truth
+from study_app.evaluation.accuracy import ladders, truths
+from study_app.evaluation.accuracy.motions import with_velocity
+from study_app.evaluation.accuracy.rungs import Rung, given
+from study_app.evaluation.accuracy.truths import Truth
 from study_app.haptics.motion import Floats, Motion
 from study_app.haptics.scene import Scene
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from study_app.errors import StudyError
-from study_app.evaluation.motions import along_x, stroke, vectors_x
+from study_app.evaluation.accuracy.motions import along_x, stroke, vectors_x
 from study_app.evaluation.references import respond
 from study_app.haptics.motion import Floats, Motion
 from study_app.haptics.scene import Liquid, Scene

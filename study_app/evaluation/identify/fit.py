@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
-from study_app.evaluation.measured import Measured, along_x
-from study_app.evaluation.parameters import Parameter, find
-from study_app.evaluation.search import Problem, coordinate, solve, u_range
+from study_app.evaluation.identify.measured import Measured, along_x
+from study_app.evaluation.identify.parameters import Parameter, find
+from study_app.evaluation.identify.search import Problem, coordinate, solve, u_range
 from study_app.haptics.gate import resolve
 from study_app.haptics.motion import Floats, Motion
 from study_app.haptics.scene import Scene

@@ -1,0 +1,1 @@
+"""Parameters of a liquid from measured motion and force."""
