@@ -1,0 +1,317 @@
+"""Which tests apply to which block, what is corrected with what, and what may be said."""
+
+from __future__ import annotations
+
+import json
+import random
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from study_app.analysis.conduct import delivered, orders
+from study_app.analysis.decided import Decided
+from study_app.analysis.evaluate import evaluate
+from study_app.analysis.judging import judged
+from study_app.analysis.results import BlockFound, Results, plain
+from study_app.analysis.statistics.families import false_discovery, holm
+from study_app.analysis.statistics.friedman import friedman
+from study_app.analysis.tables import load_study
+from study_app.errors import AnalysisError
+from study_app.protocol.load import load, parse, source_bytes
+from tests.analysis.conftest import Answer, make_results, twelve
+from tests.analysis.conftest import Results as Folder
+
+DECIDED = Decided(True, False, 0.05, 1.0, ("a", "b"), (), (), (), None)
+
+
+def found(folder: Folder) -> Results:
+    return evaluate(load_study(folder.folder))
+
+
+def blocks(folder: Folder) -> tuple[BlockFound, BlockFound]:
+    liquids, delays = found(folder).blocks
+    return liquids, delays
+
+
+def opened(folder: Folder, people: int) -> Folder:
+    twelve(folder, people=people)
+    folder.open()
+    return folder
+
+
+def without(table: str, folder: Path) -> Folder:
+    """Return an empty study of the thesis whose protocol lacks lines of ``[analysis]``."""
+    text = source_bytes("rek2024").decode()
+    head, tail = text.split("\n[analysis]\n")
+    kept = (
+        ""
+        if table == "all"
+        else "\n[analysis]\n" + "".join(f"{line}\n" for line in tail.splitlines() if not line.startswith(table))
+    )
+    if table in ("all", "names"):
+        head = "\n".join(line for line in head.splitlines() if not line.startswith("label = "))
+    return make_results(folder, parse((head + kept).encode(), "rek2024.toml"))
+
+
+# --- families and verdicts ---
+
+
+def test_primary_statements_are_a_holm_family_and_the_others_exploratory() -> None:
+    draw = random.Random(1)  # noqa: S311 - reproducible
+    outcomes = {
+        item: friedman([[draw.gauss(shift * place, 1) for place in range(3)] for _ in range(8)])
+        for item, shift in zip("abcd", (2.0, 0.1, 1.5, 0.0), strict=True)
+    }
+    tested = {one.item: one for one in judged(outcomes, DECIDED, "family")}
+    assert list(tested) == list("abcd")
+    ps = {item: outcome.p for item, outcome in outcomes.items()}
+    assert (tested["a"].p_adjusted, tested["b"].p_adjusted) == holm([ps["a"], ps["b"]])
+    assert (tested["c"].p_adjusted, tested["d"].p_adjusted) == false_discovery([ps["c"], ps["d"]])
+    assert [tested[item].members for item in "abcd"] == [2, 2, 2, 2]
+    assert [tested[item].verdict for item in "abcd"] == ["shown", "not shown", "suggested", "not shown"]
+    assert [tested[item].primary for item in "abcd"] == [True, True, False, False]
+
+
+def test_what_could_not_have_been_shown_is_out_of_reach() -> None:
+    three = friedman([[1, 2, 3], [1, 2, 3], [3, 1, 2]])
+    assert three.smallest_p == pytest.approx(1 / 36)
+    (one, _) = judged({"a": three, "b": three}, DECIDED, "family")
+    assert (one.verdict, one.p_adjusted) == ("out of reach", 1.0)
+    (alone,) = judged({"a": three}, DECIDED, "family")
+    assert alone.verdict == "not shown"  # one test of its own could have come to .028
+    flat = friedman([[4, 4, 4]] * 5)
+    (none,) = judged({"a": flat}, DECIDED, "family")
+    assert (none.verdict, none.p_adjusted) == ("not tested", None)
+
+
+def test_results_hold_no_number_that_is_none() -> None:
+    with pytest.raises(AnalysisError, match="a fault of the program"):
+        plain({"a": (1.0, float("nan"))})
+
+
+# --- blocks ---
+
+
+@pytest.fixture(scope="module")
+def of_twelve(tmp_path_factory: pytest.TempPathFactory) -> tuple[BlockFound, BlockFound]:
+    return blocks(opened(make_results(tmp_path_factory.mktemp("twelve") / "rek2024", load("rek2024")), 12))
+
+
+def test_the_thesis_study_of_twelve(of_twelve: tuple[BlockFound, BlockFound]) -> None:
+    liquids, delays = of_twelve
+    assert liquids.names == ("Water", "Honey", "Light oil")
+    assert liquids.overall is not None
+    assert liquids.overall.n == 12
+    assert [one.item for one in liquids.omnibus] == [item.id for item in liquids.items]
+    assert {(one.members, one.correction, one.primary) for one in liquids.omnibus} == {(9, "Holm", True)}
+    assert (
+        {one.tested.item for one in liquids.pairs}
+        == {one.item for one in liquids.omnibus if one.verdict == "shown"}
+        != set()
+    )
+    assert {one.tested.members for one in liquids.pairs} == {3}
+    assert liquids.named is not None
+    assert liquids.named.right == ("like_water", "like_honey", "like_oil")
+    assert sum(map(sum, liquids.named.found.table)) == 36
+    assert len(liquids.mixed) == 9
+    assert list(delays.delays_ms) == [0, 50, 75, 100, 125, 150, 200]
+    assert [one.outcome.method.split("(")[1][:-1] for one in delays.trends] == ["increasing"] * 4 + ["decreasing"]
+    assert {one.verdict for one in delays.trends} == {"shown"}
+    assert all(one.steps.lowest_ms is not None for one in delays.lowest)
+    assert len(delays.against) == 5 * 6
+    assert {(one.control_ms, one.found.bound) for one in delays.against} == {(0.0, 1.0)}
+    assert delays.threshold is not None
+    assert delays.threshold.effect is not None
+    assert 50 < delays.threshold.effect < 200
+    assert not delays.omnibus
+    assert not (*liquids.absent, *delays.absent)
+
+
+def test_equivalence_goes_up_from_the_shortest_delay_and_stops_at_the_first_that_is_not(
+    of_twelve: tuple[BlockFound, BlockFound],
+) -> None:
+    _, delays = of_twelve
+    for item, up_to in (delays.equivalent_up_to or {}).items():
+        verdicts = [
+            one.found.verdict == "equivalent" and one.found.checks_agree is not False
+            for one in delays.against
+            if one.item == item
+        ]
+        run = verdicts.index(False) if False in verdicts else len(verdicts)
+        assert up_to == ([None, *delays.delays_ms[1:]][run])
+
+
+def test_of_five_no_pair_and_no_model_is_there_and_it_says_why(rek: Folder) -> None:
+    liquids, delays = blocks(opened(rek, 5))
+    assert (liquids.pairs, liquids.mixed, delays.mixed) == ((), (), ())
+    assert [one.what for one in liquids.absent] == ["comparison of two settings", "mixed model of the settings"]
+    assert "5 participants cannot show it: the smallest p that 5 pairs can give is 0.0625" in liquids.absent[0].why
+    assert "0.1875, which is above 0.05" in liquids.absent[0].why
+    assert [one.what for one in delays.absent] == ["mixed model of the delay"]
+
+
+@pytest.mark.parametrize("people", [1, 2, 6, 7])
+def test_any_number_of_people_can_be_evaluated(rek: Folder, people: int) -> None:
+    results = found(opened(rek, people))
+    json.dumps(plain(results), allow_nan=False)
+    assert [one.n for one in results.blocks] == [people, people]
+    pairs = any(
+        one.what == "comparison of two settings" and "cannot show" in one.why for one in results.blocks[0].absent
+    )
+    assert pairs == (people < 7)
+
+
+def test_while_sealed_only_codes_are_compared(rek: Folder) -> None:
+    twelve(rek, people=6)
+    results = found(rek)
+    for block in results.blocks:
+        assert block.names == tuple(block.settings[place].code for place in range(len(block.settings)))
+        assert len(block.omnibus) == len(block.items)
+        assert {one.outcome.test for one in block.omnibus} == {"Friedman"}
+        assert {block.pairs, block.named, block.trends, block.lowest, block.against, block.mixed} == {(), None}
+        assert (block.overall, block.threshold, block.delays_ms) == (None, None, ())
+        assert all("after unblinding" in one.why for one in block.absent)
+    assert results.performance is None
+    assert [one.what for one in results.blocks[1].absent] == [
+        *("test of a trend (Page)", "lowest delay that shows", "test of equivalence", "detection threshold")
+    ]
+    assert {(one.code, one.delay_ms, one.achieved_ms) for one in results.delivered} == {(None, None, None)}
+
+
+def test_codes_and_names_give_the_same_friedman(rek: Folder) -> None:
+    twelve(rek, people=6)
+    sealed, _ = blocks(rek)
+    rek.open()
+    known, _ = blocks(rek)
+    assert [one.outcome.p for one in sealed.omnibus] == pytest.approx([one.outcome.p for one in known.omnibus])
+
+
+def test_nothing_decided_makes_everything_exploratory(tmp_path: Path) -> None:
+    results = found(opened(without("all", tmp_path / "rek2024"), 8))
+    liquids, delays = results.blocks
+    assert not results.decided.made
+    assert {one.primary for one in liquids.omnibus} == {False}
+    assert {one.correction for one in liquids.omnibus} == {"Benjamini-Hochberg"}
+    assert "shown" not in {one.verdict for one in liquids.omnibus}
+    why = {one.what: one.why for one in (*liquids.absent, *delays.absent)}
+    assert "chosen by the answers" in why["test of equivalence"]
+    assert "does not say which statements name" in why["test of recognition"]
+    assert "rise or fall with delay (Different, Task harder" in why["test of a trend (Page)"]
+    assert "no statement that asks" in why["detection threshold"]
+
+
+def test_a_bound_that_was_not_decided_is_not_made_up(tmp_path: Path) -> None:
+    _, delays = blocks(opened(without("equivalence_bound", tmp_path / "rek2024"), 8))
+    assert (delays.against, delays.equivalent_up_to) == ((), {})
+    assert len(delays.trends) == 5
+
+
+@pytest.mark.parametrize("level", [1, 4, 7])
+def test_equal_answers_are_no_variation_and_no_evidence(rek: Folder, level: int) -> None:
+    for number in range(1, 9):
+        rek.add(f"P{number:03d}", lambda _condition, _item: level)
+    rek.open()
+    results = found(rek)
+    json.dumps(plain(results), allow_nan=False)
+    liquids, delays = results.blocks
+    assert {one.verdict for one in (*liquids.omnibus, *delays.trends)} == {"not tested"}
+    assert {one.found.verdict for one in delays.against} == {"inconclusive"}
+    assert liquids.named is not None
+    assert liquids.named.found.undecided == 24
+
+
+def test_levels_that_nobody_chose_change_nothing(rek: Folder, tmp_path: Path) -> None:
+    other = make_results(tmp_path / "other", rek.protocol)
+    for number in range(1, 8):
+        person = f"P{number:03d}"
+        rek.add(person, _among_low(person, stretched=False))
+        other.add(person, _among_low(person, stretched=True))
+    rek.open()
+    other.open()
+    for one, two in zip(blocks(rek), blocks(other), strict=True):
+        for mine, theirs in zip((*one.omnibus, *one.trends), (*two.omnibus, *two.trends), strict=True):
+            assert mine.outcome.p == pytest.approx(theirs.outcome.p)
+
+
+def _among_low(person: str, *, stretched: bool) -> Callable[[str, str], Answer]:
+    """Return answers of 1 to 3, or the same ones as 3, 5 and 7."""
+
+    def answer(condition: str, item: str) -> int:
+        low = random.Random(f"{person} {condition} {item}").randrange(1, 4)  # noqa: S311 - reproducible
+        return 2 * low + 1 if stretched else low
+
+    return answer
+
+
+def test_missing_answers_drop_the_participant_and_are_never_neutral(rek: Folder) -> None:
+    twelve(rek, people=8)
+    whole = {one.item: one.outcome for one in _omnibus(rek)}
+
+    def missing(condition: str, item: str) -> Answer:
+        return None if (condition, item) == ("honey", "immersive") else 4
+
+    rek.add("P100", missing)
+    rek.open()
+    liquids, _ = blocks(rek)
+    one = next(one for one in liquids.omnibus if one.item == "immersive")
+    assert (one.outcome.n, one.outcome.dropped) == (8, 1)
+    assert one.outcome.p == pytest.approx(whole["immersive"].p)
+    assert [other.item for other in liquids.incomplete] == ["immersive"]
+    assert liquids.incomplete[0].outcome.n == 9
+    assert next(row for row in liquids.measures if row["item"] == "immersive" and row["missing"])["n"] == 8
+
+
+def _omnibus(folder: Folder) -> tuple:  # type: ignore[type-arg]
+    return found(folder).blocks[0].omnibus
+
+
+def test_two_settings_are_compared_as_a_pair(small: Folder) -> None:
+    for number in range(1, 9):
+        low = 1 + number % 4
+
+        def answer(condition: str, _item: str, low: int = low) -> int:
+            return 6 if condition == "heavyzembla" else low
+
+        small.add(f"P{number:03d}", answer)
+    small.open()
+    (block,) = found(small).blocks
+    assert {one.outcome.test for one in block.omnibus} == {"Wilcoxon signed ranks"}
+    assert block.omnibus[0].outcome.p == pytest.approx(2 / 2**8)
+
+
+# --- how it was run ---
+
+
+def test_delays_as_they_were_achieved(rek: Folder) -> None:
+    opened(rek, 3)
+    at = {(one.block, one.delay_ms): one for one in delivered(load_study(rek.folder))}
+    assert (at["delays", 125.0].achieved_ms, at["delays", 125.0].trials, at["delays", 125.0].valid) == (128.5, 3, 3)
+    rek.add("P100", lambda _condition, _item: 4, changes={"delay_error_mean_ms": -40.0, "valid": False})
+    at = {(one.block, one.delay_ms): one for one in delivered(load_study(rek.folder))}
+    one = at["delays", 125.0]
+    assert (one.error_worst_ms, one.error_mean_ms, one.valid) == (-40.0, (3 * 3.5 - 40) / 4, 3)
+
+
+def test_orders_are_counted_as_run(rek: Folder) -> None:
+    twelve(rek)
+    counts = orders(load_study(rek.folder))["delays"]
+    assert counts.orders == 12
+    assert [sum(line) for line in counts.positions] == [12] * 7
+    assert sum(map(sum, counts.follows)) == 12 * 6
+
+
+def test_what_progress_raises_ends_it(rek: Folder) -> None:
+    opened(rek, 2)
+    told: list[tuple[str, float]] = []
+    evaluate(load_study(rek.folder), progress=lambda what, share: told.append((what, share)))
+    assert told
+    assert [share for _, share in told] == sorted(share for _, share in told)
+    assert all(0 <= share <= 1 for _, share in told)
+
+    def stop(_what: str, _share: float) -> None:
+        raise KeyboardInterrupt
+
+    progress: Callable[[str, float], object] = stop
+    with pytest.raises(KeyboardInterrupt):
+        evaluate(load_study(rek.folder), progress=progress)
