@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import Final
 
 from matplotlib.figure import Figure
@@ -46,46 +47,59 @@ def liquids(study: Study, block: Block | None = None, *, fonts: Sequence[str] | 
         [item.short for item in block.items],
         block.labels,
         title=captions.title(block),
-        marks=_marks(study),
+        marks=marks(study),
         counts=captions.counts(study, block),
         fonts=fonts or style.screen_fonts(),
     ).figure
 
 
-def delays(study: Study, block: Block | None = None, *, fonts: Sequence[str] | None = None) -> Figure:
+def delays(
+    study: Study,
+    block: Block | None = None,
+    *,
+    fonts: Sequence[str] | None = None,
+    lowest: Mapping[str, float] = MappingProxyType({}),
+) -> Figure:
     """Draw the answers over the delay that was asked for, a small plot per statement; by code while blinded.
 
-    Parameters and errors as in :func:`liquids`. A participant's repeated answers are drawn as their median.
+    Parameters and errors as in :func:`liquids`. A participant's repeated answers are drawn as their median. ``lowest``
+    maps items to the lowest delay at which a trend shows [ms], which is marked.
     """
     block = block or _only(study, "delays")
     _require_answers(study, block)
     answers = study.answers(block)
     people = sorted(answers["participant"].unique())
-    plots = [multiples.Plot(item.short, by_participant(answers, people, block.codes, item.id)) for item in block.items]
+    plots = [
+        multiples.Plot(item.short, by_participant(answers, people, block.codes, item.id), lowest.get(item.id))
+        for item in block.items
+    ]
     return multiples.draw(
         plots,
         block.codes,
         [setting.delay_ms or 0.0 for setting in block.settings] if block.revealed else None,
         title=captions.title(block),
-        marks=_marks(study),
+        marks=marks(study),
         counts=captions.counts(study, block),
         foot=captions.foot(block),
         fonts=fonts or style.screen_fonts(),
     ).figure
 
 
-def render(study: Study, block: Block, form: str) -> bytes:
-    """Return the figure of a block as a file of ``form`` (png, svg or pdf).
+def render(study: Study, block: Block, form: str, lowest: Mapping[str, float] = MappingProxyType({})) -> bytes:
+    """Return the figure of a block as a file of ``form`` (png, svg or pdf); ``lowest`` as in :func:`delays`.
 
     Raises
     ------
     AnalysisError
         No session was completed.
     """
-    draw = liquids if block.kind == "liquids" else delays
-    return style.file_bytes(
-        draw(study, block, fonts=style.fonts_for(form)), form, f"{study.name}: {captions.title(block)}"
+    fonts = style.fonts_for(form)
+    drawn = (
+        liquids(study, block, fonts=fonts)
+        if block.kind == "liquids"
+        else delays(study, block, fonts=fonts, lowest=lowest)
     )
+    return style.file_bytes(drawn, form, f"{study.name}: {captions.title(block)}")
 
 
 def plot(folder: Path, to: Path, *, warn: Callable[[str], object] | None = None) -> tuple[Path, ...]:
@@ -137,12 +151,13 @@ def _require_answers(study: Study, block: Block) -> None:
         )
 
 
-def _marks(study: Study) -> list[Mark]:
-    marks = []
+def marks(study: Study) -> list[Mark]:
+    """Return what must not be overlooked in a figure of a study."""
+    found = []
     if study.simulated:
-        marks.append(Mark("SIMULATED participants", style.WARN, style.WARN_GROUND))
+        found.append(Mark("SIMULATED participants", style.WARN, style.WARN_GROUND))
     if study.pilot:
-        marks.append(Mark("PILOT", style.WARN, style.WARN_GROUND))
+        found.append(Mark("PILOT", style.WARN, style.WARN_GROUND))
     if not study.revealed:
-        marks.append(Mark("Blinded: by code", style.SEALED, style.SEALED_GROUND))
-    return marks
+        found.append(Mark("Blinded: by code", style.SEALED, style.SEALED_GROUND))
+    return found

@@ -32,10 +32,14 @@ SPREAD: Final = 0.24
 
 @dataclass(frozen=True, slots=True)
 class Plot:
-    """One statement: its short text and (participants, settings) answers, NaN where there is none."""
+    """One statement: its short text and (participants, settings) answers, NaN where there is none.
+
+    ``lowest_ms`` is the lowest delay at which a trend shows, where one does.
+    """
 
     title: str
     values: Array
+    lowest_ms: float | None = None
 
 
 @style.own_settings()
@@ -64,7 +68,7 @@ def draw(
     row_pt = title_pt + 6 + PLOT_PT + 14
     sheet = Sheet(style.PAGE_WIDTH_PT, TOP_PT + rows * row_pt + (rows - 1) * 6 + FOOT_PT, fonts)
     sheet.heading(title, marks, counts)
-    _legend(sheet, lines=delays_ms is not None)
+    legend(sheet, lines=delays_ms is not None)
     for place, plot in enumerate(plots):
         row, column = divmod(place, PLOTS_A_ROW)
         x = MARGIN_PT + SCALE_PT + column * (width + GAP_PT)
@@ -75,7 +79,8 @@ def draw(
         axes.set_label(f"item{place + 1}")
         _levels(sheet, axes, numbers=column == 0)
         if delays_ms is not None:
-            _over_delay(sheet, axes, plot.values, np.asarray(delays_ms, dtype=float))
+            over_delay(sheet, axes, plot.values, np.asarray(delays_ms, dtype=float), SPREAD)
+            _lowest(sheet, axes, plot.lowest_ms, float(np.mean(delays_ms)))
         else:
             _over_codes(sheet, axes, plot.values, settings, width)
         _counts(sheet, axes, plot.values)
@@ -91,13 +96,14 @@ def _levels(sheet: Sheet, axes: Axes, *, numbers: bool) -> None:
         axes.set_yticks(LEVELS, [str(level) for level in LEVELS], fontproperties=sheet.font(6.5))
 
 
-def _over_delay(sheet: Sheet, axes: Axes, values: Array, delays_ms: Array) -> None:
+def over_delay(sheet: Sheet, axes: Axes, values: Array, delays_ms: Array, spread: float) -> None:
+    """Draw (participants, delays) values: a thin line each, at most ``spread`` apart, quartile band, thick median."""
     reach = float(np.ptp(delays_ms)) or 1.0
     axes.set_xlim(delays_ms.min() - 0.06 * reach, delays_ms.max() + 0.06 * reach)
     ticks = MaxNLocator(nbins=4, steps=[1, 2, 2.5, 5, 10]).tick_values(delays_ms.min(), delays_ms.max())
     ticks = [tick for tick in ticks if delays_ms.min() <= tick <= delays_ms.max()]
     axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks], fontproperties=sheet.font(6.5))
-    offsets = np.linspace(-SPREAD / 2, SPREAD / 2, len(values)) if len(values) > 1 else np.zeros(1)
+    offsets = np.linspace(-spread / 2, spread / 2, len(values)) if len(values) > 1 else np.zeros(1)
     for number, (line, offset) in enumerate(zip(values, offsets, strict=True), start=1):
         (drawn,) = axes.plot(
             delays_ms,
@@ -126,6 +132,24 @@ def _over_delay(sheet: Sheet, axes: Axes, values: Array, delays_ms: Array) -> No
         zorder=4,
     )
     drawn.set_gid(f"{axes.get_label()}-median")
+
+
+def _lowest(sheet: Sheet, axes: Axes, lowest_ms: float | None, middle_ms: float) -> None:
+    """Mark the lowest delay at which a trend shows: dashed, with its number on the side that has more room."""
+    if lowest_ms is None:
+        return
+    line = axes.axvline(lowest_ms, color=style.TEXT, linewidth=0.9, linestyle=(0, (3, 2)), zorder=3)
+    line.set_gid(f"{axes.get_label()}-lowest")
+    left = lowest_ms > middle_ms
+    axes.annotate(
+        f"≤ {lowest_ms:g}",
+        (lowest_ms, TOP),
+        xytext=(-2 if left else 2, -6),
+        textcoords="offset points",
+        ha="right" if left else "left",
+        fontproperties=sheet.font(6, "bold"),
+        color=style.TEXT,
+    )
 
 
 def _over_codes(sheet: Sheet, axes: Axes, values: Array, codes: Sequence[str], width_pt: float) -> None:
@@ -193,7 +217,8 @@ def _counts(sheet: Sheet, axes: Axes, values: Array) -> None:
     )
 
 
-def _legend(sheet: Sheet, *, lines: bool) -> None:
+def legend(sheet: Sheet, *, lines: bool) -> None:
+    """Write at the right, under the heading, what median, band and single marks are."""
     words = ("median", "middle half (IQR)", "one participant")
     y, x = 30.0, sheet.width_pt - MARGIN_PT + 12 - sum(sheet.text_width(word, 7) + 30 for word in words)
     middle = y - 2.4
