@@ -1,0 +1,193 @@
+"""The sections on how the study was run: sessions, exclusions, delays achieved, orders, motion and force."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from typing import Final
+
+from study_app.analysis.performance import DEFINITIONS as TRIAL_DEFINITIONS
+from study_app.analysis.performance import OF_REACHES, OF_TRIALS, Performance
+from study_app.analysis.reaches import DEFINITIONS as REACH_DEFINITIONS
+from study_app.analysis.report.page import bullets, heading, paragraph, table
+from study_app.analysis.report.words import counted, listed, ms, name, number, settings_noun
+from study_app.analysis.results import BlockFound, Delivered, Results
+from study_app.analysis.tables import Study
+from study_app.protocol.design import Evenness
+from study_app.store.exclusions import named
+
+UNITS: Final = {"s": "s", "m": "m", "mm": "mm", "n": "N", "percent": "%"}
+SHOWN: Final = 20
+"""So many exclusions and doubts are listed; all of them stand in report.json."""
+
+
+def conduct(study: Study, results: Results) -> Iterator[str]:
+    """Yield the section on sessions and on how the study was run."""
+    yield heading(2, "How it was run")
+    states = Counter(map(str, study.participants["status"]))
+    yield paragraph(
+        f"{counted(len(study.participants), 'session').capitalize()}: "
+        f"{listed([f'{count} {status}' for status, count in states.most_common()])}. Counted: "
+        f"{counted(study.n, 'participant')}."
+    )
+    yield heading(3, "Exclusions")
+    gone = [f"{named(one)}: {one.reason} ({one.rule_or_person}, {one.excluded_at})" for one in study.exclusions]
+    if study.left_out:
+        gone.append(f"{counted(study.left_out, 'session')} not completed: left out of every number")
+    yield bullets(_first(gone)) if gone else paragraph("Nothing is excluded: every completed session counts whole.")
+    if study.doubts:
+        yield heading(3, "Files that are not as they were recorded")
+        yield bullets(
+            _first([f"{doubt.path.relative_to(study.folder).as_posix()} {doubt.what}" for doubt in study.doubts])
+        )
+    yield from _delivered(study, results)
+    yield from _orders(results)
+
+
+def _first(lines: list[str]) -> list[str]:
+    more = len(lines) - SHOWN
+    return [*lines[:SHOWN], *([f"and {more} more, in report.json"] if more > 0 else [])]
+
+
+def _delivered(study: Study, results: Results) -> Iterator[str]:
+    yield heading(3, "Was shown what was asked for?")
+    blocks = {found.id: found for found in results.blocks}
+    yield table(
+        ("Block", "Setting", "asked", "achieved", "mean error", "worst trial", "trials", "within limits"),
+        [
+            [
+                blocks[one.block].title,
+                "all" if one.code is None else name(blocks[one.block], one.code),
+                "sealed" if one.delay_ms is None else ms(one.delay_ms),
+                "–" if one.achieved_ms is None else f"{number(one.achieved_ms, 1)} ms",
+                _ms(one.error_mean_ms),
+                _ms(one.error_worst_ms),
+                _trials(one),
+                f"{one.valid} of {one.trials}",
+            ]
+            for one in results.delivered
+        ],
+        words=2,
+    )
+    limits = study.protocol.get("limits", {})
+    yield paragraph(
+        "Age of what was drawn, less the delay asked for: mean over trials of each trial's mean, and the trial whose "
+        "mean was farthest off; on the program's clock, without the display's own latency. Within limits: "
+        + "; ".join(
+            f"{what.replace('_ms', '').replace('_', ' ')} at most {limit:g} ms" for what, limit in limits.items()
+        )
+        + ". Trials beyond them are counted all the same, unless they are excluded above.",
+        "soft",
+    )
+
+
+def _ms(value: float | None) -> str:
+    return "–" if value is None else f"{'+' if value > 0 else ''}{number(value, 1)} ms"
+
+
+def _trials(one: Delivered) -> str:
+    return str(one.trials) if one.measured == one.trials else f"{one.trials}, {one.measured} measured"
+
+
+def _orders(results: Results) -> Iterator[str]:
+    yield heading(3, "Orders as run")
+    for found in results.blocks:
+        counts = results.orders.get(found.id)
+        if counts is None or not counts.orders or len(counts.codes) < 2:
+            continue
+        names = {code: _order_name(found, code) for code in counts.codes}
+        yield paragraph(f"{found.title}, {counted(counts.orders, 'order')}: {_evenness(counts)}")
+        yield table(
+            ("Place", *names.values()),
+            [[str(place), *(str(count) for count in line)] for place, line in enumerate(counts.positions, start=1)],
+        )
+    yield paragraph("How often each setting came at each place of its block.", "soft")
+
+
+def _order_name(found: BlockFound, code: str) -> str:
+    return name(found, code) if found.revealed else code
+
+
+def _evenness(counts: Evenness) -> str:
+    cells = [count for line in counts.positions for count in line]
+    after = counts.after_another
+    places = (
+        f"each came at each place {counted(cells[0], 'time')}"
+        if counts.positions_even
+        else f"a setting came at a place {min(cells)} to {max(cells)} times, so that settings and places mix unevenly"
+    )
+    follows = (
+        "each followed each other one equally often"
+        if counts.follows_even
+        else f"one followed another {min(after)} to {max(after)} times"
+    )
+    return f"{places}; {follows}."
+
+
+def motion(results: Results) -> Iterator[str]:
+    """Yield the section on motion and force."""
+    yield heading(2, "Motion and force")
+    measured = results.performance
+    if measured is None:
+        yield paragraph("After unblinding: a thick liquid is known by its force, and a delay by the motion.")
+        return
+    for found in results.blocks:
+        rows = _motion_rows(found, measured)
+        if rows:
+            yield heading(3, found.title)
+            measures = _measures(found, measured)
+            yield table((settings_noun(found).capitalize(), "n", *(_label(one) for one in measures)), rows)
+    yield paragraph(_recordings(measured))
+    yield bullets(
+        f"{_label(measure)}: {words}." for measure, words in {**TRIAL_DEFINITIONS, **REACH_DEFINITIONS}.items()
+    )
+    yield paragraph(
+        "Median over participants (quartiles); each participant counts by his or her own median. These measures are "
+        "described and not tested.",
+        "soft",
+    )
+
+
+def _motion_rows(found: BlockFound, measured: Performance) -> list[list[str]]:
+    cells: dict[str, dict[str, str]] = {}
+    people: dict[str, int] = {}
+    for one in measured.moved:
+        if one.block == found.id and one.n:
+            digits = 2 if one.measure.endswith(("_s", "_n", "_m", "percent")) else 1
+            cells.setdefault(one.code, {})[one.measure] = (
+                f"{number(one.median, digits)} ({number(one.q1, digits)}–{number(one.q3, digits)})"
+            )
+            people[one.code] = max(people.get(one.code, 0), one.n)
+    measures = _measures(found, measured)
+    return [
+        [name(found, code), str(people[code]), *(cells[code].get(measure, "–") for measure in measures)]
+        for code in [setting.code for setting in found.settings]
+        if code in cells
+    ]
+
+
+def _measures(found: BlockFound, measured: Performance) -> list[str]:
+    there = {one.measure for one in measured.moved if one.block == found.id}
+    return [measure for measure in (*OF_TRIALS, *OF_REACHES) if measure in there]
+
+
+def _label(measure: str) -> str:
+    words, _, unit = measure.rpartition("_")
+    if unit not in UNITS:
+        return measure.replace("_", " ")
+    return f"{words.replace('_', ' ')}, {UNITS[unit]}"
+
+
+def _recordings(measured: Performance) -> str:
+    if not measured.trials:
+        return "No trial that counts was one of reaching, so that there are no measures of reaches."
+    told = f"Reaches: from the recordings of {measured.recorded} of {measured.trials} trials of reaching"
+    if measured.unread:
+        told += f"; of the others: {'; '.join(measured.unread)}"
+    invalid = (
+        f" {counted(measured.invalid, 'trial').capitalize()} exceeded the protocol's limits of timing and "
+        f"{'is' if measured.invalid == 1 else 'are'} in these numbers."
+        if measured.invalid
+        else " No trial that counts exceeded the protocol's limits of timing."
+    )
+    return f"{told}.{invalid}"

@@ -1,0 +1,194 @@
+"""Every number in files: a row a test, a row a measure of motion, and all of it as JSON."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict
+from importlib import metadata
+from platform import python_version
+from typing import Any, Final
+
+from study_app import __version__
+from study_app.analysis.report.words import name
+from study_app.analysis.results import BlockFound, Results, Tested, plain
+from study_app.analysis.statistics.outcome import Outcome
+from study_app.analysis.tables import Study
+from study_app.store import blinding
+from study_app.store.checksums import sha256
+from study_app.store.columns import Column
+from study_app.store.layout import StudyFolder
+from study_app.store.tables import csv_bytes
+
+FORMAT: Final = 1
+LIBRARIES: Final = ("numpy", "scipy", "pandas", "matplotlib", "pyarrow")
+
+TESTS: Final = (
+    Column("block", "text", "Id of the block."),
+    Column("question", "text", "What is asked."),
+    Column("item", "text", "Id of the statement; n/a where the test is over several.", may_miss=True),
+    Column("comparison", "text", "Which settings, where not all.", may_miss=True),
+    Column("test", "text", "The test."),
+    Column("n", "integer", "Participants used.", minimum=0),
+    Column("dropped", "integer", "Participants not used, for missing answers.", minimum=0),
+    Column("statistic_name", "text", "What the statistic is."),
+    Column("statistic", "number", "The statistic.", may_miss=True),
+    Column("p", "number", "p, not corrected.", minimum=0, maximum=1, may_miss=True),
+    Column("p_adjusted", "number", "p, corrected within the family.", minimum=0, maximum=1, may_miss=True),
+    Column("smallest_p", "number", "The smallest p that could have come out.", minimum=0, maximum=1, may_miss=True),
+    Column("family", "text", "What is corrected together.", may_miss=True),
+    Column("members", "integer", "Tests in the family.", minimum=1, may_miss=True),
+    Column("correction", "text", "How p is corrected.", may_miss=True),
+    Column("primary", "flag", "true where it was decided on before the study.", may_miss=True),
+    Column("verdict", "text", "What may be said.", may_miss=True),
+    Column("effect_name", "text", "What the effect is."),
+    Column("effect", "number", "The effect.", may_miss=True),
+    Column("low", "number", "Lower end of the effect's interval.", may_miss=True),
+    Column("high", "number", "Upper end of the effect's interval.", may_miss=True),
+    Column("level", "number", "Confidence of the interval.", may_miss=True),
+    Column("interval", "text", "How the interval was made, or why there is none.", may_miss=True),
+    Column("method", "text", "How p was found."),
+    Column("note", "text", "What must be said with it.", may_miss=True),
+)
+MOTION: Final = (
+    Column("block", "text", "Id of the block."),
+    Column("code", "text", "Code of the setting."),
+    Column("setting", "text", "What the setting is."),
+    Column("measure", "text", "The measure, its unit at the end."),
+    Column("n", "integer", "Participants with the measure.", minimum=0),
+    Column("median", "number", "Median over participants.", may_miss=True),
+    Column("q1", "number", "Lower quartile over participants.", may_miss=True),
+    Column("q3", "number", "Upper quartile over participants.", may_miss=True),
+)
+
+
+def tests_csv(results: Results) -> bytes:
+    """Return a table with a row for every test."""
+    return csv_bytes(TESTS, [row for found in results.blocks for row in _tests(found)])
+
+
+def motion_csv(results: Results) -> bytes:
+    """Return a table with a row for every measure of motion and force under every setting."""
+    moved = () if results.performance is None else results.performance.moved
+    blocks = {found.id: found for found in results.blocks}
+    return csv_bytes(MOTION, [{**plain(one), "setting": name(blocks[one.block], one.code)} for one in moved])
+
+
+def _tests(found: BlockFound) -> Iterator[dict[str, Any]]:
+    if found.overall is not None:
+        yield _row(found, "settings differ, all statements", found.overall)
+    for question, tests in (
+        ("settings differ", found.omnibus),
+        ("answers follow the delay", found.trends),
+        ("settings differ, mixed model", found.mixed),
+        ("settings differ, incomplete participants too", found.incomplete),
+    ):
+        for one in tests:
+            yield _judged(found, question, one)
+    for pair in found.pairs:
+        compared = f"{name(found, pair.first)} − {name(found, pair.second)}"
+        yield _judged(found, "two settings differ", pair.tested) | {"comparison": compared}
+    if found.named is not None:
+        yield _row(found, "liquids are recognised", found.named.found) | {"verdict": found.named.verdict}
+    for lowest in found.lowest:
+        for step in lowest.steps.steps:
+            row = _row(found, "answers follow the delay, stepping down", step.page)
+            yield row | {"item": lowest.item, "comparison": f"up to {step.longest_ms:g} ms"}
+    for against in found.against:
+        row = _row(found, "a delay is equivalent", against.found) | {"item": against.item}
+        compared = f"{against.delay_ms:g} ms − {against.control_ms:g} ms"
+        yield row | {"comparison": compared, "verdict": against.found.verdict}
+    if found.threshold is not None:
+        yield _row(found, "a delay is noticed", found.threshold)
+
+
+def _judged(found: BlockFound, question: str, one: Tested) -> dict[str, Any]:
+    return _row(found, question, one.outcome) | {
+        "item": one.item,
+        "family": one.family,
+        "members": one.members,
+        "correction": one.correction,
+        "p_adjusted": one.p_adjusted,
+        "primary": one.primary,
+        "verdict": one.verdict,
+    }
+
+
+def _row(found: BlockFound, question: str, outcome: Outcome) -> dict[str, Any]:
+    interval = outcome.interval
+    blank = {column.name: None for column in TESTS}
+    return blank | {
+        "block": found.id,
+        "question": question,
+        **{
+            field: getattr(outcome, field)
+            for field in (
+                *("test", "n", "dropped", "statistic_name", "statistic", "p", "smallest_p", "method"),
+                *("effect_name", "effect"),
+            )
+        },
+        "low": None if interval is None else interval.low,
+        "high": None if interval is None else interval.high,
+        "level": None if interval is None else interval.level,
+        "interval": outcome.no_interval or None if interval is None else interval.method,
+        "note": outcome.note or None,
+    }
+
+
+def document(study: Study, results: Results, texts: Mapping[str, Any]) -> bytes:
+    """Return everything as JSON; ``texts`` are the findings in words."""
+    content = {
+        "format": FORMAT,
+        "program": f"liquid-study {__version__}",
+        "versions": versions(),
+        "study": {
+            "name": study.name,
+            "title": study.title,
+            "version": study.version,
+            "participants": study.n,
+            "sessions": len(study.participants),
+            "sessions_left_out": study.left_out,
+            "sessions_excluded": len(study.excluded_sessions),
+            "simulated": study.simulated,
+            "pilot": study.pilot,
+            "blinded": not study.revealed,
+            "key_opened": list(blinding.reveals(study.folder)),
+        },
+        "sessions": sessions(study),
+        "exclusions": [asdict(one) for one in study.exclusions],
+        "doubts": [{"file": _within(study, doubt.path), "what": doubt.what} for doubt in study.doubts],
+        "files": files(study),
+        **texts,
+        "results": plain(results),
+    }
+    return f"{json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False)}\n".encode()
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of what computed the results."""
+    return {
+        "liquid-study": __version__,
+        "python": python_version(),
+        **{library: metadata.version(library) for library in LIBRARIES},
+    }
+
+
+def sessions(study: Study) -> list[dict[str, Any]]:
+    """Return of every session what made it what it was: its seed, its protocol's hash, the program's version."""
+    columns = ["participant", "session", "status", "counted", "seed", "protocol_hash", "key_hash", "version", "device"]
+    rows = study.participants[columns].astype(object).where(study.participants[columns].notna(), None)
+    return [{str(key): plain(value) for key, value in row.items()} for row in rows.to_dict("records")]
+
+
+def files(study: Study) -> dict[str, str]:
+    """Return the SHA-256 of every file that the numbers come from; recordings are in their session's checksums."""
+    place = StudyFolder(study.folder)
+    found = [place.exclusions, place.key, place.reveals]
+    for session in place.sessions():
+        tables = [session.table(study.name, of) for of in ("responses", "trials")]
+        found += [session.receipt, session.journal, session.checksums, *tables]
+    return {_within(study, path): sha256(path) for path in found if path.is_file()}
+
+
+def _within(study: Study, path: Any) -> str:
+    return str(path.relative_to(study.folder).as_posix())

@@ -1,0 +1,143 @@
+"""The paragraph for a paper: what was done, so that it could be done again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from study_app import __version__
+from study_app.analysis.measures import QUARTILES
+from study_app.analysis.report.words import counted, listed, number, settings_noun, test_name
+from study_app.analysis.results import BlockFound, Results
+from study_app.analysis.tables import Study
+
+
+def methods(study: Study, results: Results) -> str:
+    """Return the methods paragraph."""
+    return " ".join(sentence for sentence in _sentences(study, results) if sentence)
+
+
+def _sentences(study: Study, results: Results) -> Iterator[str]:
+    blocks = [found for found in results.blocks if found.n]
+    yield _sample(study)
+    if not blocks:
+        return
+    yield _presented(study, results)
+    yield (
+        "Answers were given on scales of seven points and are taken as ordinal: medians, quartiles "
+        f"({QUARTILES}), never means, except in the test of equivalence, which is about the mean difference."
+    )
+    for found in blocks:
+        yield from _liquids(found) if found.kind == "liquids" else _delays(found, results)
+    yield from _common(results, blocks)
+    yield f"Sessions and analysis: liquid-study {__version__}."
+
+
+def _sample(study: Study) -> str:
+    people = counted(study.n, "participant")
+    kind = " (SIMULATED, no people)" if study.simulated else ""
+    out = study.left_out + len(study.excluded_sessions)
+    gone = f"; {counted(out, 'further session')} {'was' if out == 1 else 'were'} left out" if out else ""
+    return (
+        f"{people[:1].upper()}{people[1:]}{kind} took part in “{study.title}” (protocol {study.name}, version "
+        f"{study.version}){gone}, each under all settings."
+    )
+
+
+def _presented(study: Study, results: Results) -> str:
+    parts = []
+    for found in results.blocks:
+        noun = settings_noun(found)
+        order = study.protocol.get("blocks", {}).get(found.id, {}).get("order", "")
+        words = {
+            "fixed": "in one order for all",
+            "shuffled": "in an order drawn for each participant",
+            "constrained": "in a constrained order drawn for each participant",
+            "williams": "in the orders of a Williams design",
+            "latin": "in the orders of a Latin square",
+        }.get(order, "")
+        delays = f" ({listed([f'{delay:g}' for delay in found.delays_ms])} ms)" if found.delays_ms else ""
+        asked = f", each followed by {counted(len(found.items), 'statement')}"
+        parts.append(f"{counted(len(found.settings), noun)}{delays} {words}".strip() + asked)
+    blind = (
+        "known by codes alone until the key was opened" if study.revealed else "known by codes, the key being sealed"
+    )
+    return f"Presented were {'; '.join(parts)}; {blind}."
+
+
+def _liquids(found: BlockFound) -> Iterator[str]:
+    noun = settings_noun(found)
+    if found.overall is not None:
+        yield (
+            f"The {noun}s were compared over all {counted(len(found.items), 'statement')} at once by permuting them "
+            "within participants, the statistic being the sum of the statements' Friedman statistics."
+        )
+    if found.omnibus:
+        one = found.omnibus[0]
+        yield (
+            f"Each statement was tested by {test_name(one.outcome)} ({one.outcome.method}), with "
+            f"{one.outcome.effect_name} as the effect, p adjusted over {counted(one.members, 'statement')} by "
+            f"{one.correction}."
+        )
+    if found.pairs:
+        yield (
+            "Where these showed a difference, pairs were compared by Wilcoxon's signed ranks (exact; equal pairs left "
+            "out) with the matched rank-biserial correlation, Holm-adjusted within the statement."
+        )
+    if found.named is not None:
+        yield (
+            "A participant was taken to have named the liquid whose statement he or she rated highest; equal highest "
+            "ratings are undecided and count as no hit. Hits were tested against exchanging the liquids within "
+            "participants (exact, one-sided)."
+        )
+
+
+def _delays(found: BlockFound, results: Results) -> Iterator[str]:
+    if not found.delays_ms:
+        yield from _liquids(found)
+        return
+    if found.trends:
+        one = found.trends[0]
+        yield (
+            f"Trends over the delay were tested by Page's L ({one.outcome.method.split(',')[0]}), one-sided in the "
+            f"direction stated beforehand, p adjusted over {counted(one.members, 'statement')} by {one.correction}; "
+            "where a trend showed, the longest delay was dropped and the test repeated until it no longer did, which "
+            "gives an upper bound of the lowest delay that is noticed (the error rate holds for each statement)."
+        )
+    if found.against:
+        bound, level = found.against[0].found.bound, 100 - 200 * results.decided.alpha
+        points = "point" if bound == 1 else "points"
+        yield (
+            f"Equivalence to {found.delays_ms[0]:g} ms was tested by two one-sided t tests on paired differences with "
+            f"a bound of ±{bound:g} {points}, decided before the first session, and {level:g} % "
+            "intervals; a difference that is neither shown nor excluded is called inconclusive."
+        )
+    if found.threshold is not None:
+        yield (
+            "The detection threshold is the 50 % point between guesses and lapses of a logistic function fitted by "
+            "maximum likelihood to agreement (5 to 7), with a profile interval, all participants pooled."
+        )
+
+
+def _common(results: Results, blocks: list[BlockFound]) -> Iterator[str]:
+    decided = results.decided
+    if decided.binding:
+        which = "all statements were primary" if not decided.primary else f"primary: {', '.join(decided.primary)}"
+        yield (
+            f"Decided before the first session: alpha = {number(decided.alpha, 3).rstrip('0')}, {which}; different "
+            "questions are not corrected for each other."
+        )
+    else:
+        yield f"Nothing was decided beforehand: all results are exploratory, at {decided.alpha:g}."
+    if any(found.mixed for found in blocks):
+        yield (
+            "As a check, answers were fitted by cumulative logit models with a random intercept for each participant "
+            "(adaptive quadrature, likelihood ratio)."
+        )
+    again = " and Skillings and Mack's test uses those who missed some" if any(f.incomplete for f in blocks) else ""
+    yield (f"Missing answers were never replaced; tests use participants who answered under all settings{again}.")
+    measured = results.performance
+    if measured is not None and measured.recorded:
+        yield (
+            "Movement times run from the lighting of a target to the entry that was held, from recordings at the rate "
+            "of the servo, the first reach of each trial left out."
+        )

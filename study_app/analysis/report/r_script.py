@@ -1,0 +1,138 @@
+"""A short script in base R that computes the main numbers again and says where they differ from the report's."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final
+
+from study_app.analysis.results import BlockFound, Results
+from study_app.analysis.statistics.friedman import Friedman
+from study_app.analysis.tables import Study
+
+START: Final = """\
+# Computes the main numbers of report.html again, in base R (4.0 or newer, no packages), from the table of responses
+# beside this file, and says where they differ:  Rscript report.R
+# p: exact in the report, approximate here where base R has no exact test; such p are printed and not compared.
+
+answers <- read.csv("{table}", colClasses = "character", na.strings = "n/a", encoding = "UTF-8")
+answers <- answers[answers$counted == "true", ]
+answers$response <- as.numeric(answers$response)
+differing <- 0
+
+same <- function(what, reported, computed) {{
+  ok <- isTRUE(all.equal(reported, computed, tolerance = 1e-6, check.attributes = FALSE))
+  if (!ok) differing <<- differing + 1
+  cat(sprintf("%-64s report %12.6g   R %12.6g   %s\\n", what, reported, computed, if (ok) "" else "DIFFERS"))
+}}
+about <- function(what, reported, computed)
+  cat(sprintf("%-64s report %12.6g   R %12.6g   (approximate)\\n", what, reported, computed))
+
+# One row a participant, one column a setting; a participant's repeated answers count by their median.
+wide <- function(block, item, codes) {{
+  rows <- answers[answers$block == block & answers$item == item, ]
+  tapply(rows$response, list(rows$participant, factor(rows$code, codes)), median, na.rm = TRUE)
+}}
+whole <- function(table) table[complete.cases(table), , drop = FALSE]
+
+friedman <- function(what, table, chi2, p) {{
+  found <- suppressWarnings(friedman.test(whole(table)))
+  same(paste(what, "Friedman chi2"), chi2, unname(found$statistic))
+  same(paste(what, "p by chi2"), p, found$p.value)
+}}
+page <- function(what, table, falling, L, p) {{
+  x <- whole(table); if (falling) x <- -x
+  ranks <- t(apply(x, 1, rank)); n <- nrow(x); k <- ncol(x)
+  found <- sum(ranks %*% seq_len(k))
+  spread <- sum((ranks - (k + 1) / 2)^2) / (k - 1) * k * (k^2 - 1) / 12
+  same(paste(what, "Page's L"), L, found)
+  about(paste(what, "p"), p, pnorm((found - n * k * (k + 1)^2 / 4) / sqrt(spread), lower.tail = FALSE))
+}}
+pair <- function(what, table, first, second, V, p) {{
+  found <- suppressWarnings(wilcox.test(table[, first], table[, second], paired = TRUE, exact = FALSE, correct = FALSE))
+  same(paste(what, "Wilcoxon V"), V, unname(found$statistic))
+  about(paste(what, "p"), p, found$p.value)
+}}
+equivalent <- function(what, table, first, second, bound, p, low, high, level) {{
+  d <- table[, second] - table[, first]; d <- d[!is.na(d)]
+  lower <- t.test(d, mu = -bound, alternative = "greater")$p.value
+  upper <- t.test(d, mu = bound, alternative = "less")$p.value
+  same(paste(what, "equivalence p"), p, max(lower, upper))
+  limits <- t.test(d, conf.level = level)$conf.int
+  same(paste(what, "interval, low"), low, limits[1])
+  same(paste(what, "interval, high"), high, limits[2])
+}}
+hits <- function(what, block, items, codes, right, hits) {{
+  ratings <- lapply(items, function(item) wide(block, item, codes))
+  people <- Reduce(union, lapply(ratings, rownames)); found <- 0
+  for (person in people) for (place in seq_along(codes)) {{
+    rated <- sapply(ratings, function(table) if (person %in% rownames(table)) table[person, place] else NA)
+    if (!anyNA(rated) && sum(rated == max(rated)) == 1)
+      found <- found + identical(items[which.max(rated)], right[place])
+  }}
+  same(paste(what, "right names"), hits, found)
+}}
+
+"""
+
+END: Final = """
+cat(if (differing == 0) "every number that R computes is the report's\\n" else paste(differing, "numbers differ\\n"))
+"""
+
+
+def r_script(study: Study, results: Results) -> str:
+    """Return the script."""
+    table = f"study-{study.name}_description-responses_data.csv"
+    calls = [line for found in results.blocks if found.n for line in _calls(found)]
+    return START.format(table=table) + "\n".join(calls) + "\n" + END
+
+
+def _calls(found: BlockFound) -> Iterator[str]:
+    block = _text(found.id)
+    codes = _vector([setting.code for setting in found.settings])
+    for one in found.omnibus:
+        if isinstance(one.outcome, Friedman) and one.outcome.statistic is not None and one.outcome.p_chi2 is not None:
+            numbers = f"{_number(one.outcome.statistic)}, {_number(one.outcome.p_chi2)}"
+            yield f"friedman({_text(one.item)}, wide({block}, {_text(one.item)}, {codes}), {numbers})"
+    for one in found.trends:
+        if one.outcome.statistic is not None and one.outcome.p is not None:
+            falling = "TRUE" if "decreasing" in one.outcome.method else "FALSE"
+            numbers = f"{falling}, {_number(one.outcome.statistic)}, {_number(one.outcome.p)}"
+            yield f"page({_text(one.item)}, wide({block}, {_text(one.item)}, {codes}), {numbers})"
+    for pair in found.pairs:
+        outcome = pair.tested.outcome
+        if outcome.statistic is not None and outcome.p is not None:
+            item = pair.tested.item
+            what = _text(f"{item}, {pair.first} and {pair.second}")
+            numbers = f"{_text(pair.first)}, {_text(pair.second)}, {_number(outcome.statistic)}, {_number(outcome.p)}"
+            yield f"pair({what}, wide({block}, {_text(item)}, {codes}), {numbers})"
+    yield from _against(found, block, codes)
+    if found.named is not None and found.named.found.statistic is not None:
+        right = ", ".join("NA_character_" if label is None else _text(label) for label in found.named.right)
+        labels = _vector(found.named.labels)
+        yield f"hits({block}, {block}, {labels}, {codes}, c({right}), {_number(found.named.found.statistic)})"
+
+
+def _against(found: BlockFound, block: str, codes: str) -> Iterator[str]:
+    by_delay = {setting.delay_ms: setting.code for setting in found.settings}
+    for one in found.against:
+        interval = one.found.interval
+        if one.found.p is None or interval is None:
+            continue
+        first, second = _text(by_delay[one.control_ms]), _text(by_delay[one.delay_ms])
+        what = _text(f"{one.item}, {one.delay_ms:g} ms")
+        numbers = (one.found.bound, one.found.p, interval.low, interval.high, interval.level)
+        told = ", ".join(_number(value) for value in numbers)
+        yield f"equivalent({what}, wide({block}, {_text(one.item)}, {codes}), {first}, {second}, {told})"
+
+
+def _number(value: float) -> str:
+    return repr(float(value))
+
+
+def _text(words: str) -> str:
+    escaped = words.replace("\\", "\\\\").replace('"', '\\"')
+    return f'"{escaped}"'
+
+
+def _vector(words: tuple[str, ...] | list[str]) -> str:
+    return f"c({', '.join(_text(word) for word in words)})"

@@ -1,0 +1,39 @@
+"""The command that writes a study's report."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import click
+
+
+@click.command()
+@click.argument("results", type=click.Path(path_type=Path))
+@click.option("--to", type=click.Path(path_type=Path), required=True, metavar="DIR", help="Where the report goes.")
+def report(results: Path, to: Path) -> None:
+    """Write the report of a study: tests, figures, tables, what can be said and what cannot, and how to repeat it."""
+    from study_app.analysis.report.writing import report as write_report
+
+    line = _Line()
+    try:
+        files = write_report(results, to, progress=line, warn=lambda words: click.echo(words, err=True))
+    finally:
+        line.clear()
+    click.echo(f"{files[0]}  and {len(files) - 1} files beside it")
+
+
+class _Line:
+    """One line of progress on a terminal, written over again and again; on anything else nothing."""
+
+    def __init__(self) -> None:
+        self._shown = sys.stderr.isatty()
+
+    def __call__(self, what: str, share: float) -> None:
+        if self._shown:
+            click.echo(f"\r\033[K{share:4.0%}  {what}", err=True, nl=False)
+
+    def clear(self) -> None:
+        """Take the line away."""
+        if self._shown:
+            click.echo("\r\033[K", err=True, nl=False)

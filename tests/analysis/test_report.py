@@ -1,0 +1,319 @@
+"""The report: whole, self-contained, the same each time, honest about few participants, and fit for odd input."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import re
+import shutil
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner
+
+from study_app.analysis.report.words import counted, listed, number, p_equals, p_value
+from study_app.analysis.report.writing import report
+from study_app.analysis.tables import load_study
+from study_app.cli import commands
+from study_app.errors import AnalysisError, StudyError
+from study_app.protocol.load import load
+from tests.analysis.conftest import CANNOT_JUDGE, HIDDEN, Answer, Results, make_results, twelve
+
+FORBIDDEN = re.compile(
+    r"(?i:no (significant |measurable |visible )?(effect|difference was|influence|impact)|\bhad no\b)"
+    r"|\bnan\b|\bNaN\b|\binf\b|\bNone\b|[{}]"
+)
+"""What no report may say: that there is nothing, a number that is none, or a template that was not filled."""
+
+
+class Text(HTMLParser):
+    """Collects what a reader sees, and checks that every element ends where it should."""
+
+    VOID = frozenset({"meta", "img", "br"})
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.told: list[str] = []
+        self.tags: set[str] = set()
+        self.fetched: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.add(tag)
+        self.fetched += [value or "" for name, value in attrs if name in ("src", "href")]
+        if tag not in self.VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        if "style" not in self.open:
+            self.told.append(data)
+
+
+def read(folder: Path) -> str:
+    """Return what the page tells, having checked that it is one file without scripts."""
+    page = Text()
+    page.feed((folder / "report.html").read_text(encoding="utf-8"))
+    assert page.open == []
+    assert not page.tags & {"script", "link", "iframe", "object", "form"}
+    assert all(place.startswith("data:image/png;base64,") for place in page.fetched)
+    told = re.sub(r"\s+", " ", " ".join(page.told))
+    assert (found := FORBIDDEN.search(told)) is None, told[max(0, found.start() - 80) : found.end() + 40]
+    return told
+
+
+def numbers(folder: Path) -> dict[str, Any]:
+    def refuse(constant: str) -> None:
+        raise AssertionError(constant)
+
+    told: dict[str, Any] = json.loads((folder / "report.json").read_bytes(), parse_constant=refuse)
+    return told
+
+
+def rows(folder: Path, name: str) -> list[dict[str, str]]:
+    return list(csv.DictReader(io.StringIO((folder / name).read_text(encoding="utf-8"))))
+
+
+@pytest.fixture(scope="module")
+def of_twelve(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A report of twelve, opened."""
+    folder = tmp_path_factory.mktemp("twelve")
+    results = twelve(make_results(folder / "rek2024", load("rek2024")))
+    results.open()
+    assert report(results.folder, folder / "report")[0].name == "report.html"
+    return folder / "report"
+
+
+def test_a_study_of_twelve_tells_what_was_found(of_twelve: Path) -> None:
+    names = {path.name for path in of_twelve.iterdir()}
+    assert {"report.json", "report.R", "methods.txt", "tests.csv", "motion.csv", "codebook.json"} <= names
+    for figure in ("liquids", "recognition", "delays"):
+        assert {f"{figure}.{form}" for form in ("png", "svg", "pdf", "txt")} <= names
+    told = read(of_twelve)
+    assert "SIMULATED" in told
+    for heading in (
+        *("In short", "What this study cannot show", "Do the liquids differ, statement by statement?"),
+        *("Which of them differ?", "Were the liquids recognised?", "Do answers follow the delay?"),
+        *("The lowest delay that shows", "Each delay against 0 ms", "Motion and force", "How it was run", "Exclusions"),
+        *("Was shown what was asked for?", "Orders as run", "Methods, to paste", "To repeat it"),
+    ):
+        assert heading in told
+    assert "What was drawn was" in told
+    assert "upper bound" in told
+    found = numbers(of_twelve)
+    assert found["study"]["participants"] == 12
+    assert found["results"]["seed"] == 1
+    assert found["methods"] in told
+    assert (of_twelve / "methods.txt").read_text(encoding="utf-8").strip() == found["methods"]
+    assert set(found["versions"]) >= {"liquid-study", "numpy", "scipy"}
+    assert "blinding/key.sealed" in found["files"]
+    assert sum(name.endswith("receipt.json") for name in found["files"]) == 12
+
+
+def test_every_test_is_a_row_with_what_a_reader_needs(of_twelve: Path) -> None:
+    tests = rows(of_twelve, "tests.csv")
+    assert {row["question"] for row in tests} >= {"settings differ", "liquids are recognised", "a delay is noticed"}
+    for row in tests:
+        assert row["n"] != "n/a"
+        assert "n/a" not in (row["p"], row["effect"]) or {row["note"], row["interval"]} != {"n/a"}
+        assert row["interval"] != "n/a"
+    found = numbers(of_twelve)
+    omnibus = found["results"]["blocks"][0]["omnibus"]
+    listed_ps = [row["p_adjusted"] for row in tests if row["family"] == "liquids: settings differ"]
+    assert [float(p) for p in listed_ps] == pytest.approx([one["p_adjusted"] for one in omnibus])
+
+
+def test_of_five_it_says_what_cannot_be_shown_and_what_a_delay_can_mean(rek: Results, tmp_path: Path) -> None:
+    twelve(rek, people=5).open()
+    report(rek.folder, tmp_path / "report")
+    told = read(tmp_path / "report")
+    assert "5 participants cannot show it: the smallest p that 5 pairs can give is 0.0625" in told
+    assert "no bootstrap interval and no mixed model" in told
+    assert re.search(r"What “\d+ ms” can and cannot mean", told)
+    assert "is no evidence that" in told
+    assert "80 % power would take about" in told
+    assert "inconclusive" in told
+    assert "nothing was asked about delays between them" in told
+
+
+def test_the_same_results_give_the_same_bytes(rek: Results, tmp_path: Path) -> None:
+    twelve(rek, people=3).open()
+    for name in ("one", "two"):
+        report(rek.folder, tmp_path / name)
+    for path in (tmp_path / "one").iterdir():
+        assert path.read_bytes() == (tmp_path / "two" / path.name).read_bytes(), path.name
+
+
+def test_while_sealed_nothing_is_told_that_blinding_hides(small: Results, tmp_path: Path) -> None:
+    for number_ in range(1, 8):
+        small.add(f"P{number_:03d}", lambda condition, _item: 6 if condition == "heavyzembla" else 2)
+    report(small.folder, tmp_path / "report")
+    told = read(tmp_path / "report")
+    assert "Blinded: by code" in told
+    assert "after unblinding" in told
+    for path in (tmp_path / "report").iterdir():
+        content = path.read_bytes().decode("utf-8", "replace").lower()
+        assert not [word for word in HIDDEN if word in content], path.name
+
+
+def test_the_exclusions_and_what_was_not_completed_are_listed(rek: Results, tmp_path: Path) -> None:
+    twelve(rek, people=6)
+    rek.add("P100", lambda _condition, _item: 4, status="withdrawn", trials=3)
+    rek.exclude("P001", reason="fell <asleep> & left")
+    rek.exclude("P002", trial=2, reason="the phone rang")
+    rek.open()
+    report(rek.folder, tmp_path / "report")
+    told = read(tmp_path / "report")
+    assert "participant P001, session 1: fell <asleep> & left" in told
+    assert "participant P002, session 1, trial 2: the phone rang" in told
+    assert "1 session not completed" in told
+    assert numbers(tmp_path / "report")["study"]["participants"] == 5
+
+
+def test_one_participant_all_equal_and_missing_answers_give_a_report_that_says_so(rek: Results, tmp_path: Path) -> None:
+    rek.add("P001", lambda _condition, _item: 4)
+    rek.open()
+    report(rek.folder, tmp_path / "one")
+    assert "1 participant" in read(tmp_path / "one")
+
+    def gaps(condition: str, item: str) -> Answer:
+        return None if (condition, item) in (("honey", "immersive"), ("delay_50", "harder")) else 4
+
+    for number_ in range(2, 7):
+        rek.add(f"P{number_:03d}", gaps)
+    report(rek.folder, tmp_path / "equal")
+    told = read(tmp_path / "equal")
+    assert "not tested (no variation: every participant answered alike under all settings)" in told
+    assert "Skillings-Mack" in told
+    numbers(tmp_path / "equal")
+
+
+def test_answers_off_the_scale_are_missing_and_never_neutral(small: Results, tmp_path: Path) -> None:
+    for number_ in range(1, 9):
+        small.add(
+            f"P{number_:03d}",
+            lambda condition, item: CANNOT_JUDGE if item == "warm" else 6 if condition == "heavyzembla" else 3,
+        )
+    small.open()
+    report(small.folder, tmp_path / "report")
+    assert "no participant answered under both settings" in read(tmp_path / "report")
+
+
+def test_sessions_without_a_completed_one_give_a_report_without_findings(rek: Results, tmp_path: Path) -> None:
+    rek.add("P001", lambda _condition, _item: 4, status="withdrawn", trials=2)
+    report(rek.folder, tmp_path / "report")
+    told = read(tmp_path / "report")
+    assert "there are no findings" in told
+    assert "nobody's answers count yet" in told
+    assert not (tmp_path / "report" / "liquids.png").exists()
+
+
+def test_a_hand_edited_answer_of_nine_is_one_clear_error(rek: Results, tmp_path: Path) -> None:
+    twelve(rek, people=2)
+    path = rek.responses("P001")
+    lines = path.read_text(encoding="utf-8").splitlines()
+    place = lines[0].split(",").index("response")
+    cells = lines[3].split(",")
+    cells[place] = "9"
+    path.write_text("\n".join([*lines[:3], ",".join(cells), *lines[4:]]) + "\n", encoding="utf-8")
+    with pytest.raises(AnalysisError, match="row 3, column response: '9' is not a whole number from 1 to 7"):
+        report(rek.folder, tmp_path / "report")
+    assert not (tmp_path / "report").exists()
+
+
+def test_another_study_mixed_in_or_an_empty_folder_is_one_clear_error(
+    rek: Results, small: Results, tmp_path: Path
+) -> None:
+    twelve(rek, people=2)
+    foreign = small.add("P077", lambda _condition, _item: 4)
+    shutil.copytree(foreign.path.parent, rek.folder / "data" / "sub-P077")
+    with pytest.raises(AnalysisError, match="keep each study in a folder of its own"):
+        report(rek.folder, tmp_path / "report")
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(AnalysisError, match="holds no sessions"):
+        report(tmp_path / "empty", tmp_path / "report")
+    assert not (tmp_path / "report").exists()
+
+
+def _answered(small: Results) -> None:
+    for number_ in (1, 2):
+        small.add(f"P{number_:03d}", lambda condition, _item: 6 if condition == "heavyzembla" else 3)
+
+
+def test_it_can_be_cancelled_at_every_step_and_then_nothing_is_written(small: Results, tmp_path: Path) -> None:
+    _answered(small)
+    small.open()
+    told: list[tuple[str, float]] = []
+    report(small.folder, tmp_path / "whole", progress=lambda what, share: told.append((what, share)))
+    shares = [share for _, share in told]
+    assert shares == sorted(shares)
+    assert shares[-1] <= 1
+    for step in (0, len(told) // 2):
+        asked: list[bool] = []
+
+        def cancelled(asked: list[bool] = asked, step: int = step) -> bool:
+            asked.append(True)
+            return len(asked) > step
+
+        with pytest.raises(StudyError, match="cancelled; nothing was written"):
+            report(small.folder, tmp_path / "not", cancelled=cancelled)
+        assert len(asked) == step + 1
+        assert not (tmp_path / "not").exists()
+
+
+def test_the_script_in_r_has_every_number_of_the_report(of_twelve: Path) -> None:
+    script = (of_twelve / "report.R").read_text(encoding="utf-8")
+    assert 'read.csv("study-rek2024_description-responses_data.csv"' in script
+    for left, right in ("()", "{}"):
+        assert script.count(left) == script.count(right)
+    found = numbers(of_twelve)["results"]["blocks"]
+    for one in (*found[0]["omnibus"], *found[1]["trends"]):
+        assert repr(one["outcome"]["statistic"]) in script
+    for one in found[1]["against"]:
+        assert repr(one["found"]["p"]) in script
+
+
+def test_the_command_writes_it_and_tells_errors_in_one_line(small: Results, tmp_path: Path) -> None:
+    _answered(small)
+    done = CliRunner().invoke(commands, ["report", str(small.folder), "--to", str(tmp_path / "report")])
+    assert done.exit_code == 0, done.output
+    assert "report.html" in done.output
+    assert (tmp_path / "report" / "report.html").is_file()
+    failed = CliRunner().invoke(commands, ["report", str(tmp_path / "nowhere"), "--to", str(tmp_path / "x")])
+    assert isinstance(failed.exception, AnalysisError)
+
+
+@pytest.mark.parametrize(
+    ("told", "expected"),
+    [
+        (p_value(0.0499), ".050"),
+        (p_value(0.00004), "< .0001"),
+        (p_value(0.00044), ".0004"),
+        (p_value(0.9999), "1"),
+        (p_value(None), "–"),
+        (p_equals(0.00001), "p < .0001"),
+        (p_equals(0.031), "p = .031"),
+        (number(-0.0001), "0.00"),
+        (number(-1.25, 1), "−1.2"),
+        (number(None), "–"),
+        (counted(1, "delay"), "1 delay"),
+        (counted(3, "delay"), "three delays"),
+        (listed(["a", "b", "c"]), "a, b and c"),
+        (listed(["a"]), "a"),
+    ],
+)
+def test_numbers_in_words(told: str, expected: str) -> None:
+    assert told == expected
+
+
+def test_an_unreadable_place_leaves_nothing(small: Results, tmp_path: Path) -> None:
+    _answered(small)
+    (tmp_path / "file").write_text("x")
+    with pytest.raises(AnalysisError, match="cannot be written"):
+        report(small.folder, tmp_path / "file" / "report")
+    assert load_study(small.folder).n == 2
