@@ -24,7 +24,7 @@ def _sentences(study: Study, results: Results) -> Iterator[str]:
     yield _presented(study, results)
     yield (
         "Answers were given on scales of seven points and are taken as ordinal: medians, quartiles "
-        f"({QUARTILES}), never means, except in the test of equivalence, which is about the mean difference."
+        f"({QUARTILES.replace(' (', ', ').rstrip(')')}), never means, except in the test of equivalence, which is about the mean difference."
     )
     for found in blocks:
         yield from _liquids(found) if found.kind == "liquids" else _delays(found, results)
