@@ -180,9 +180,9 @@ def test_a_servo_that_takes_no_turn_is_not_waited_for(scenes, monkeypatch):
 
 def test_memory_that_is_kept_is_found(scenes):
     kept = []
-    found = stepped(scenes, lambda _run: kept.append(bytearray(b"x") * (12 << 20)))
-    assert found.growth_bytes > 10 << 20
-    assert [finding for finding in found.findings if "memory grew by 1" in finding]
+    found = stepped(scenes, lambda _run: kept.append(bytearray(b"x") * (96 << 20)))
+    assert found.growth_bytes > 48 << 20  # what was freed before may have held a part of it
+    assert [finding for finding in found.findings if "memory grew by" in finding]
 
 
 def test_a_force_above_the_limit_is_found(scenes):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from study_app.haptics.limits import slope_limit
 from study_app.protocol.describe import describe
 from study_app.protocol.feeling import effects, warnings
 from study_app.protocol.load import load, load_scene, load_scenes, parse
@@ -44,7 +45,7 @@ def test_a_pair_whose_drag_nobody_feels_is_alike():
 def test_a_clipped_liquid_is_named_with_what_is_left_of_it():
     (norm,) = [warning for warning in warnings(dense(20_000)) if "clipped" in warning]
     assert norm == "thick is clipped: at 0.1 m/s of the hand the slope limit, which keeps the servo stable, lets " + (
-        "6.00 of its 17.07 N through"
+        f"{slope_limit(1e-3, 1) * 0.1:.2f} of its 17.07 N through"
     )
     weak = dense(5_000)
     weak = weak.model_copy(update={"device": weak.device.model_copy(update={"force_limit_n": 3})})
