@@ -201,10 +201,11 @@ class _Terminal:
 
     def _listen(self) -> None:
         typed = b""
-        while more := os.read(self._descriptor, 1024):
-            *lines, typed = (typed + more).split(b"\n")
-            for line in lines:
-                self._lines.put(line.decode(errors="replace"))
+        with suppress(OSError):  # in the background nothing can be read from a terminal
+            while more := os.read(self._descriptor, 1024):
+                *lines, typed = (typed + more).split(b"\n")
+                for line in lines:
+                    self._lines.put(line.decode(errors="replace"))
         self._lines.put(None)
 
 

@@ -10,6 +10,8 @@ from contextlib import contextmanager
 from PySide6.QtCore import Qt, QTimer, SignalInstance
 from PySide6.QtGui import QGuiApplication, QSessionManager
 
+from study_app.haptics.suspension import allow_suspension, refuse_suspension
+
 HEARTBEAT_MS = 100  # how long a signal may wait to be heard
 HANG_UP = 1  # the number of SIGHUP, which a log-off counts as everywhere
 
@@ -25,7 +27,7 @@ def log_off_signal() -> SignalInstance:
 def ended_from_outside(end: Callable[[int], None]) -> Iterator[None]:
     """Let Ctrl+C, requests to terminate and a log-off call ``end`` with a signal's number, once.
 
-    Signals are heard from the event loop. A log-off waits for ``end``, and for nothing else.
+    Signals are heard from the event loop. Ctrl-Z does nothing: the force would stay. A log-off waits for ``end``, and for nothing else.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -47,6 +49,7 @@ def ended_from_outside(end: Callable[[int], None]) -> Iterator[None]:
     numbers = [getattr(signal, name) for name in names if hasattr(signal, name)]
     before = {number: signal.signal(number, hear) for number in numbers}
     logging_off = log_off_signal()
+    refuse_suspension(heard)
     logging_off.connect(log_off, Qt.ConnectionType.DirectConnection)
     heart = QTimer()
     heart.timeout.connect(lambda: None)  # Python hears signals only while it runs; Qt waits outside it
@@ -55,6 +58,7 @@ def ended_from_outside(end: Callable[[int], None]) -> Iterator[None]:
         yield
     finally:
         heart.stop()
+        allow_suspension(heard)
         logging_off.disconnect(log_off)
         for number, handler in before.items():
             signal.signal(number, handler)

@@ -20,6 +20,7 @@ from study_app.haptics.loop import CONTROL, ClockCalls, DeviceCalls, Output, let
 from study_app.haptics.pack import pack, pack_into
 from study_app.haptics.safety import new_safety
 from study_app.haptics.scene import Scene
+from study_app.haptics.suspension import allow_suspension, refuse_suspension
 from study_app.haptics.telemetry import Telemetry
 
 _FOREVER = -1
@@ -64,8 +65,9 @@ class LoopThread:
         run(*self._arguments, 0)
 
     def start(self) -> None:
-        """Turn in a thread of its own until `end`."""
+        """Turn in a thread of its own until `end`; until then Ctrl-Z does not stop it with its force on."""
         self._begin()
+        refuse_suspension(self)
         ready = threading.Event()
         self.thread = threading.Thread(target=self._turn, args=(ready,), name="servo", daemon=True)
         self.thread.start()
@@ -107,6 +109,7 @@ class LoopThread:
         self.thread = None
         self.live = False
         let_go(self._device)
+        allow_suspension(self)
         self.hand_over(self._rest, 0)
 
     def _silence(self) -> ServoFault:

@@ -150,7 +150,13 @@ def test_a_session_runs_from_the_first_page_to_the_last_in_its_windows(short_dem
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_a_signal_ends_with_a_status_and_its_exit_code(short_demo, results, number):
     before = signal.getsignal(number)
-    person = Person(once=lambda _participant: os.kill(os.getpid(), number))
+
+    def suspend_and_end(_participant):
+        if hasattr(signal, "SIGTSTP"):
+            assert signal.getsignal(signal.SIGTSTP) is not signal.SIG_DFL  # Ctrl-Z would leave the force on
+        os.kill(os.getpid(), number)
+
+    person = Person(once=suspend_and_end)
     code = app.run(short_demo, participant="P001", windowed=True, results=results)
     person.deleteLater()
     assert code == 128 + number

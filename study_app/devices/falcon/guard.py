@@ -20,6 +20,7 @@ from typing import Final, Self
 from study_app.devices.falcon.transport import Transport, open_transport
 from study_app.devices.falcon.wire import FLAG_HOMING, quiet_packet
 from study_app.errors import DeviceError
+from study_app.haptics.suspension import allow_suspension, refuse_suspension
 
 WORD: Final = b"done\n"
 READY: Final = b"ready\n"
@@ -36,8 +37,9 @@ _LEAVE_S = 5.0
 class Guard:
     """The guard of the Falcon that ``open_transport(name)`` opens.
 
-    As a context manager it starts on entry and stands down on exit; if an exception is on its way out, it does not
-    stand down, but sends its packets as soon as the Falcon is closed.
+    It can act when the program has died, not while it is suspended: from its start until it is dismissed Ctrl-Z does
+    nothing. As a context manager it starts on entry and stands down on exit; if an exception is on its way out, it does
+    not stand down, but sends its packets as soon as the Falcon is closed.
     """
 
     def __init__(self, name: str) -> None:
@@ -70,6 +72,7 @@ class Guard:
             _close(child)
             raise DeviceError("the Falcon's guard process does not start, so no force may be sent: install again")
         self._child = child
+        refuse_suspension(self)
 
     @property
     def watching(self) -> bool:
@@ -90,6 +93,7 @@ class Guard:
         For a link that was lost: the Falcon may push on, and be back before anybody opens it.
         """
         child, self._child = self._child, None
+        allow_suspension(self)
         if child is None or child.stdin is None:
             return
         child.stdin.close()
@@ -97,6 +101,7 @@ class Guard:
 
     def _end(self, word: bytes) -> None:
         child, self._child = self._child, None
+        allow_suspension(self)
         if child is None or child.stdin is None:
             return
         with suppress(OSError):  # it may have gone

@@ -23,7 +23,7 @@ QUIET = [quiet_packet(FLAG_HOMING)] * PACKETS
 PUSHING = b"<PPPAPPPAPPPABA>"  # 4095 on every motor, homing on
 
 PROGRAM = """
-import sys
+import os, signal, sys
 from study_app.devices.falcon.guard import Guard
 from study_app.devices.falcon.transport import open_transport
 transport = open_transport(sys.argv[1])
@@ -45,7 +45,9 @@ def server(tmp_path):
 def program(bridge, then="sys.stdin.read()", *, guarded=True):
     """Return a program that pushes."""
     code = PROGRAM.format(packet=PUSHING, then=then, guarded="guard.start()" if guarded else "")
-    running = subprocess.Popen([sys.executable, "-c", code, bridge], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    running = subprocess.Popen(
+        [sys.executable, "-c", code, bridge], stdin=subprocess.PIPE, stdout=subprocess.PIPE, process_group=0
+    )
     assert running.stdout.readline() == b"pushing\n"
     return running
 
@@ -70,6 +72,19 @@ def test_a_program_that_is_killed_leaves_no_torque(server, how):
     server.wait_for(1 + PACKETS)
     assert server.sent() == [PUSHING, *QUIET]
     assert server.controls() == []  # the bridge stays as it was
+
+
+@pytest.mark.parametrize("how", [signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU])
+def test_a_program_that_is_guarded_is_not_suspended_while_it_pushes(server, how):
+    running = program(server.bridge, "sys.stdin.readline(); os.kill(os.getpid(), signal.SIGKILL)")
+    running.send_signal(how)
+    running.stdin.write(b"\n")
+    running.stdin.flush()
+    assert not os.WIFSTOPPED(os.waitpid(running.pid, os.WUNTRACED)[1])
+    running.kill()
+    ended(running)
+    server.wait_for(1 + PACKETS)
+    assert server.sent() == [PUSHING, *QUIET]
 
 
 @pytest.mark.parametrize(
