@@ -22,9 +22,10 @@ def _sentences(study: Study, results: Results) -> Iterator[str]:
     if not blocks:
         return
     yield _presented(study, results)
+    quartiles = QUARTILES.replace(" (", ", ").rstrip(")")
     yield (
-        "Answers were given on scales of seven points and are taken as ordinal: medians, quartiles "
-        f"({QUARTILES.replace(' (', ', ').rstrip(')')}), never means, except in the test of equivalence, which is about the mean difference."
+        f"Answers were given on scales of seven points and are taken as ordinal: medians, quartiles ({quartiles}), "
+        "never means, except in the test of equivalence, which is about the mean difference."
     )
     for found in blocks:
         yield from _liquids(found) if found.kind == "liquids" else _delays(found, results)
