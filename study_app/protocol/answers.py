@@ -89,13 +89,18 @@ def rater(draw: Draw) -> Rater:
 
 def rate(items: Iterable[str], felt: Felt, person: Rater, draw: Draw) -> dict[str, int]:
     """Return an answer from 1 to 7 for each item id, in the order given."""
-    impression = _impression(felt, person)
+    asked = tuple(items)
     answers = {}
-    for item in items:
-        opinion = OPINIONS.get(item, _no_opinion)(impression)
+    for item, opinion in zip(asked, opinions(asked, felt, person), strict=True):
         points = opinion + person.leaning + person.noise * _normal(draw)
         answers[item] = min(POINTS, max(1, math.floor(points + 0.5)))
     return answers
+
+
+def opinions(items: Iterable[str], felt: Felt, person: Rater) -> list[float]:
+    """Return what a person thinks of each item, from 1 to 7, before leaning and noise make an answer of it."""
+    impression = _impression(felt, person)
+    return [OPINIONS.get(item, _no_opinion)(impression) for item in items]
 
 
 def _normal(draw: Draw) -> float:

@@ -1,0 +1,292 @@
+"""Power of a study: from simulated people to tables, the same whoever works, and what is told of it."""
+
+from __future__ import annotations
+
+import csv
+import importlib
+import io
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import types
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from study_app.analysis.power import sweep as sweeping
+from study_app.analysis.power.counting import BATCH, EFFECTS, FULL, Counts, count
+from study_app.analysis.power.found import Curve, Powers, interval, powers
+from study_app.analysis.power.listed import COLUMNS, power_csv, power_markdown
+from study_app.analysis.power.planned import Plan, plan
+from study_app.analysis.power.simulating import people
+from study_app.analysis.power.sweep import sweep
+from study_app.analysis.power.writing import write
+from study_app.analysis.statistics.trend import step_down
+from study_app.cli import commands
+from study_app.errors import AnalysisError
+from study_app.protocol.answers import Felt
+from study_app.protocol.load import load, parse
+from study_app.store.cells import problems
+from tests.analysis.conftest import SMALL
+
+SIZES = (5, 9)
+
+
+def felt_in(protocol: Any) -> dict[tuple[str, str], tuple[Felt, ...]]:
+    """Liquids that are told apart by their force, delays by what was seen."""
+    return {
+        (block.id, condition): (
+            Felt(0.3 + 0.6 * number, 4.0, 0.1, 0.01, 0.03, 0.006 + protocol.delay_s(condition)),
+            Felt(0.4 + 0.6 * number, 4.0, 0.1, 0.02, 0.03, 0.006 + protocol.delay_s(condition)),
+        )
+        for block in protocol.blocks.values()
+        for number, condition in enumerate(block.conditions)
+    }
+
+
+def planned(name: str = "rek2024") -> Plan:
+    protocol = load(name)
+    return plan(protocol, felt_in(protocol))
+
+
+def swept(of: Plan, studies: int = 30, **how: Any) -> tuple[int, Counts]:
+    *_, last = sweep(of, SIZES, studies, 1, **{"jobs": 1, **how})
+    return last
+
+
+def same(one: Counts, other: Counts) -> bool:
+    return one.keys() == other.keys() and all(np.array_equal(one[what], other[what]) for what in one)
+
+
+@pytest.fixture(scope="module")
+def counted() -> tuple[int, Counts]:
+    return swept(planned())
+
+
+@pytest.fixture(scope="module")
+def found(counted: tuple[int, Counts]) -> Powers:
+    studies, counts = counted
+    return powers(planned(), SIZES, studies, studies, 1, counts)
+
+
+def curves(of: Powers, question: str, item: str | None = None) -> dict[str | None, Curve]:
+    return {one.setting: one for one in of.curves if (one.question, one.item) == (question, item)}
+
+
+@pytest.mark.parametrize("how", [{"jobs": 2}, {"jobs": 2, "by": "threads"}], ids=["processes", "threads"])
+def test_the_numbers_do_not_depend_on_who_works(counted: tuple[int, Counts], how: dict[str, Any]) -> None:
+    studies, counts = swept(planned(), **how)
+    assert studies == 30
+    assert same(counts, counted[1])
+
+
+def test_another_seed_gives_other_numbers(counted: tuple[int, Counts]) -> None:
+    *_, (_, other) = sweep(planned(), SIZES, 30, 2, jobs=1)
+    assert not same(other, counted[1])
+
+
+def test_a_size_is_answered_alike_whichever_others_are_asked_for(counted: tuple[int, Counts]) -> None:
+    *_, (_, alone) = sweep(planned(), (9,), 30, 1, jobs=1)
+    for what, numbers in alone.items():
+        if what[1] != "means":  # of all participants that were simulated
+            assert np.array_equal(numbers[0], counted[1][what][1]), what
+
+
+def test_the_first_studies_of_many_are_those_of_few() -> None:
+    of = planned()
+    few, many = (people(of, size, 1, 3) for size in SIZES)
+    for one, other in zip(few, many, strict=True):
+        assert np.array_equal(one.thought, other.thought[:5])
+        assert np.array_equal(one.beside, other.beside[:5])
+
+
+def test_every_batch_tells_how_far_it_is() -> None:
+    told = [done for done, _ in sweep(planned(), (5,), 2 * BATCH + 3, 1, jobs=1)]
+    assert told == [BATCH, 2 * BATCH, 2 * BATCH + 3]
+
+
+def test_power_grows_with_participants_and_effects_and_is_alpha_without_any(counted: tuple[int, Counts]) -> None:
+    studies, counts = counted
+    slack = 4 * np.sqrt(0.25 / studies)
+    for block in ("liquids", "delays"):
+        shares = counts[block, "found"] / studies
+        assert (np.diff(shares, axis=0) > -slack).all()
+        assert (np.diff(shares[:, : FULL + 1], axis=1) > -slack).all()
+        assert (counts[block, "any"][:, 0] / studies <= 0.05 + slack / 2).all()
+    assert (counts["delays", "found"][1, FULL, 0] / studies) > 0.9  # a delay of 200 ms is noticed
+
+
+def test_the_answers_are_those_of_the_answer_model() -> None:
+    """Without spread over draws, the mean answer over many people is the model's opinion, rounded now and then."""
+    of = planned()
+    answers = people(of, 400, 1, 0)[1].answers(1.0)
+    assert set(np.unique(answers)) <= set(range(1, 8))
+    different = answers[:, :, [item.id for item in of.blocks[1].items].index("different")]
+    assert different[:, 0].mean() == pytest.approx(1.9, abs=0.2)
+    assert different[:, -1].mean() == pytest.approx(6.1, abs=0.2)
+    none = people(of, 400, 1, 0)[1].answers(0.0).mean(axis=0)
+    assert np.ptp(none, axis=0).max() < 0.25
+    assert (np.diff(different.mean(axis=0)) > -0.1).all()
+
+
+def test_the_lowest_delay_is_the_step_downs_of_the_report() -> None:
+    """Of studies whose trend is shown, as often as the report's own function, by exact p."""
+    of = planned()
+    delays = of.blocks[1]
+    assert delays.delays_ms is not None
+    counts = count(of, (9,), 1, 0, BATCH)
+    place = [item.id for item in delays.items].index("harder")
+    lowest = []
+    for study in range(BATCH):
+        found = step_down(people(of, 9, 1, study)[1].answers(1.0)[:, :, place], delays.delays_ms).lowest_ms
+        lowest.append(np.inf if found is None else found)
+    expected = [sum(one <= delay for one in lowest) for delay in delays.delays_ms]
+    assert np.abs(counts["delays", "lowest"][0, place, 1:] - expected[1:]).max() <= 2  # p at the edge is drawn
+
+
+def test_what_can_be_found_is_between_effects_that_were_tried(found: Powers) -> None:
+    honey = curves(found, "settings differ", "like_honey")[None]
+    assert honey.detectable is not None
+    few, many = honey.detectable
+    assert many is not None
+    assert few is None or many < few
+    assert honey.effect is not None
+    assert 0 < many < EFFECTS[-1] * honey.effect
+
+
+def test_participants_needed_are_where_the_power_stays_above() -> None:
+    one = Curve("b", "trend", "i", "", None, (0.85, 0.7, 0.81, 0.9), None, None, None)
+    assert one.needed((5, 8, 12, 16)) == 12
+    assert Curve("b", "trend", "i", "", None, (0.1, 0.2), None, None, None).needed((5, 8)) is None
+
+
+def test_the_interval_is_wilsons() -> None:
+    # Brown, Cai & DasGupta 2001: never outside 0 to 1, and not empty at the ends
+    low, high = interval(0.5, 100)
+    assert (low, high) == (pytest.approx(0.4038, abs=1e-4), pytest.approx(0.5962, abs=1e-4))
+    assert interval(0.0, 20) == (0.0, pytest.approx(0.1611, abs=1e-4))
+
+
+def test_tables_and_figures_are_written_and_say_simulated(found: Powers, tmp_path: Path) -> None:
+    written = write(found, tmp_path / "power")
+    assert {path.name for path in written} == {
+        "power.md",
+        "power.csv",
+        *(f"power-{block}.{form}" for block in ("liquids", "delays") for form in ("png", "svg", "pdf")),
+    }
+    content = (tmp_path / "power" / "power.csv").read_bytes()
+    assert list(problems(content, COLUMNS)) == []
+    rows = list(csv.DictReader(io.StringIO(content.decode())))
+    assert len(rows) == len(found.curves) * len(SIZES)
+    assert {row["simulated"] for row in rows} == {"true"}
+    text = (tmp_path / "power" / "power.md").read_text(encoding="utf-8")
+    assert "**SIMULATED.**" in text
+    assert "Ended early" not in text
+    assert "nan" not in text.lower()
+    assert "SIMULATED participants" in (tmp_path / "power" / "power-delays.svg").read_text(encoding="utf-8")
+
+
+def test_the_same_numbers_give_the_same_files(found: Powers, tmp_path: Path) -> None:
+    one, other = (write(found, tmp_path / name) for name in ("one", "other"))
+    assert [path.read_bytes() for path in one] == [path.read_bytes() for path in other]
+
+
+def test_what_was_ended_early_says_so(counted: tuple[int, Counts]) -> None:
+    studies, counts = counted
+    found = powers(planned(), SIZES, studies, 1000, 1, counts)
+    assert "Ended early: 30 of 1000 studies" in power_markdown(found)
+    assert power_csv(found).count(b",30,") >= len(found.curves)
+
+
+def test_a_study_of_two_liquids_without_decisions_can_be_planned_too(tmp_path: Path) -> None:
+    """Two settings, repeated, with statements that the model does not know."""
+    protocol = parse(SMALL.encode(), "small.toml")
+    of = plan(protocol, felt_in(protocol))
+    assert of.unknown == ("smooth", "warm")
+    studies, counts = swept(of)
+    found = powers(of, SIZES, studies, studies, 1, counts)
+    assert not [one for one in found.curves if one.over == "all statements at once"]
+    assert "knows nothing of smooth, warm" in power_markdown(found)
+    assert write(found, tmp_path / "power")
+
+
+def test_a_protocol_that_compares_nothing_is_refused() -> None:
+    protocol = load("demo")
+    alone = {name: block.model_copy(update={"questionnaire": None}) for name, block in protocol.blocks.items()}
+    with pytest.raises(AnalysisError, match="compares nothing"):
+        plan(protocol.model_copy(update={"blocks": alone}), felt_in(protocol))
+
+
+@pytest.mark.parametrize(("by", "needs"), [("dask", "distributed"), ("ray", "ray")])
+def test_an_engine_that_is_not_installed_is_one_clear_line(
+    monkeypatch: pytest.MonkeyPatch, by: Any, needs: str
+) -> None:
+    def missing(name: str) -> types.ModuleType:
+        if name.partition(".")[0] == needs:
+            raise ModuleNotFoundError(name)
+        return importlib.import_module(name)
+
+    monkeypatch.setattr(sweeping.importlib, "import_module", missing)
+    with pytest.raises(AnalysisError, match=f"--engine {by} needs the package '{needs}'.*pip install {needs}") as told:
+        list(sweep(planned(), (5,), 20, 1, by=by))
+    assert "\n" not in str(told.value)
+
+
+@pytest.mark.parametrize("sizes", ["5,many", "1", "5,2000", ""])
+def test_sizes_that_make_no_sense_are_refused(sizes: str) -> None:
+    result = CliRunner().invoke(commands, ["power", "rek2024", "--sizes", sizes])
+    assert result.exit_code == 2
+
+
+def test_the_command_ended_by_the_user_writes_what_it_has(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, counted: tuple[int, Counts]
+) -> None:
+    def until(*_: Any, **__: Any) -> Iterator[tuple[int, Counts]]:
+        yield counted
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(sweeping, "sweep", until)
+    monkeypatch.setattr("study_app.session.feelings.feelings", lambda protocol, **_: felt_in(protocol))
+    to = tmp_path / "power"
+    result = CliRunner().invoke(commands, ["power", "rek2024", "--sizes", "5,9", "--to", str(to)])
+    assert result.exit_code == 130
+    assert "Ended early: 30 of 1000" in (to / "power.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals to a group of processes are POSIX's")
+def test_an_interrupt_ends_the_workers_too() -> None:
+    """Ctrl-C reaches every process of the terminal: what is done is kept, nothing hangs, no traceback of a worker."""
+    program = textwrap.dedent(
+        """
+        import sys
+        from study_app.analysis.power.sweep import sweep
+        from tests.analysis.power.test_power import planned
+        if __name__ == "__main__":
+            try:
+                for done, counts in sweep(planned(), (5,), 1_000_000, 1, jobs=2):
+                    print(done, flush=True)
+            except KeyboardInterrupt:
+                print("ended", flush=True)
+        """
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-c", program],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        cwd=Path(__file__).parents[3],
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline().strip() == str(BATCH)
+    os.killpg(process.pid, signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert out.splitlines()[-1] == "ended"
+    assert "Traceback" not in err
+    assert process.returncode == 0
