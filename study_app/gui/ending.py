@@ -27,7 +27,8 @@ def log_off_signal() -> SignalInstance:
 def ended_from_outside(end: Callable[[int], None]) -> Iterator[None]:
     """Let Ctrl+C, requests to terminate and a log-off call ``end`` with a signal's number, once.
 
-    Signals are heard from the event loop. Ctrl-Z does nothing: the force would stay. A log-off waits for ``end``, and for nothing else.
+    Signals are heard from the event loop. A log-off waits for ``end``, and for nothing else. Ctrl-Z does nothing: what
+    pushes would push on.
     """
     if threading.current_thread() is not threading.main_thread():
         yield

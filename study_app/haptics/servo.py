@@ -19,7 +19,7 @@ from study_app.haptics.thread import LoopThread
 ELEMENTS = 10_000
 
 _FAULTS = {
-    STATUS_DEVICE_LOST: "stopped answering; plug it in again and start anew",
+    STATUS_DEVICE_LOST: "stopped answering or lost its guard; switch it off if it pushes, plug it in again, start anew",
     STATUS_STALE_FAULT: "sent nothing usable for 50 ms; check its cable and start anew",
     STATUS_NON_FINITE: "was to be sent a force that is not a finite number; check the scene's parameters",
 }

@@ -22,7 +22,7 @@ from study_app.devices.falcon.homing import PATIENCE_S, home
 from study_app.devices.falcon.kinematics import REACHED, inverse, new_mechanism
 from study_app.devices.falcon.transport import Transport, open_transport
 from study_app.devices.falcon.wire import ERROR_NO_DEVICE
-from study_app.errors import DeviceError
+from study_app.errors import DeviceError, DeviceLost
 from study_app.haptics.layout import READING, records
 
 FORCE_LIMIT_N: Final = 8.0
@@ -73,6 +73,7 @@ class FalconDevice(Device):
         self._transport: Transport | None = None
         self._guard: Guard | None = None
         self._calibration: calibration.Calibration | None = None
+        self._guard_died = False
         self._found: dict[str, Any] = {}
         self._reading = records(READING, 1)
         mechanism = new_mechanism(self._geometry, calibration.UNCALIBRATED_UNITS_PER_NM)
@@ -94,13 +95,14 @@ class FalconDevice(Device):
         if self._transport is not None:
             return
         transport = self._open_bridge()
+        self._guard_died = False
         try:
             self._found = {"serial": transport.serial, "firmware": self._run_program(transport)}
             self._found |= self._hasten(transport)
             self._calibrate(transport.serial)
             self._transport = transport
             if self.guarded:
-                self._guard = Guard(transport.name)
+                self._guard = Guard(transport.name, self._lose_guard)
                 self._guard.start()
             self._home(transport)
         except BaseException:
@@ -137,6 +139,13 @@ class FalconDevice(Device):
     def held(self) -> tuple[Any, Any]:
         """The encoder counts of its last reply and the motor units it was last told, each (3,)."""
         return self._falcon.status.encoders.copy(), self._falcon.units.copy()
+
+    def check(self) -> None:
+        """Raise ``DeviceLost`` if its guard has died: no force is sent any more, and its reads say that it is lost."""
+        if self._guard_died:
+            raise DeviceLost(
+                "the Falcon's guard process has died, so its force was ended: close what may have ended it, start anew"
+            )
 
     def describe(self) -> dict[str, Any]:
         """Return what the receipt says of it."""
@@ -211,8 +220,14 @@ class FalconDevice(Device):
     def _home(self, transport: Transport) -> None:
         mechanism = self._falcon.mechanism.copy()
         self._memory[:] = new_exchange(transport.calls(), mechanism, self._geometry)
+        self._falcon.unguarded = int(self._guard_died)
         home(self._falcon, self._turn, transport.now_s, self._tell, patience_s=self._patience_s)
         self._begin_anew()
+
+    def _lose_guard(self) -> None:
+        """Let nothing pass any more; called by the guard's thread."""
+        self._guard_died = True
+        self._falcon.unguarded = 1
 
     def _begin_anew(self) -> None:
         """Let the force come in over half a second from the next turn on, and count from there."""
@@ -228,6 +243,7 @@ class FalconDevice(Device):
         now_ns = round(1e9 * transport.now_s())
         self.read.ctypes(self.context, now_ns, int(self._reading.ctypes.data))
         self.write.ctypes(self.context, 0.0, 0.0, 0.0)
+        self.check()
         if self._falcon.lost:
             raise usb_failure(ERROR_NO_DEVICE, "homing it")
         if self._cancelled is not None and self._cancelled():

@@ -103,6 +103,7 @@ FALCON = np.dtype(
         ("beyond", np.int64),  # positions in a row at the end of the out-stroke
         ("pulled_out", np.int64),  # 1 after it
         ("share", np.float64),  # of the force that passes
+        ("unguarded", np.int64),  # 1: its guard has died: nothing passes, and it is given up
         ("buttons", np.int64),  # as two packets in a row said
         ("seen_buttons", np.int64),  # as the last one said
         # who owes whom
@@ -184,7 +185,7 @@ def _read(context: int, now_ns: int, reading: int) -> int:
     falcon.turns += 1
     falcon.apart += 1
     packets = _receive(falcon, context)
-    if falcon.lost != 0:
+    if falcon.lost != 0 or falcon.unguarded != 0:
         return READ_LOST
     gap = falcon.started == 0 or elapsed_ns <= 0 or elapsed_ns > LONGEST_GAP_NS
     falcon.started = 1
@@ -231,7 +232,7 @@ def push(falcon: Any) -> None:
     for axis in range(3):
         falcon.force_n[axis] *= falcon.share
     none = falcon.force_n[0] == 0.0 and falcon.force_n[1] == 0.0 and falcon.force_n[2] == 0.0
-    if none or falcon.homed == 0:
+    if none or falcon.homed == 0 or falcon.unguarded != 0:
         for i in range(3):
             falcon.units[i] = 0
         return

@@ -13,9 +13,10 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from types import TracebackType
-from typing import Final, Self
+from typing import IO, Final, Self
 
 from study_app.devices.falcon.transport import Transport, open_transport
 from study_app.devices.falcon.wire import FLAG_HOMING, quiet_packet
@@ -40,11 +41,18 @@ class Guard:
     It can act when the program has died, not while it is suspended: from its start until it is dismissed Ctrl-Z does
     nothing. As a context manager it starts on entry and stands down on exit; if an exception is on its way out, it does
     not stand down, but sends its packets as soon as the Falcon is closed.
+
+    Parameters
+    ----------
+    name : of the Falcon
+    died : is called, in a thread of its own, should the guard end before it is dismissed: then no force may be sent
     """
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, died: Callable[[], object] | None = None) -> None:
         self._name = name
+        self._died = died
         self._child: subprocess.Popen[bytes] | None = None
+        self._listener: threading.Thread | None = None
 
     def start(self) -> None:
         """Start it, and wait until it watches.
@@ -73,11 +81,18 @@ class Guard:
             raise DeviceError("the Falcon's guard process does not start, so no force may be sent: install again")
         self._child = child
         refuse_suspension(self)
+        self._listener = threading.Thread(target=self._listen, args=(child, child.stdout), name="guard", daemon=True)
+        self._listener.start()
 
     @property
     def watching(self) -> bool:
         """Whether it was started, and is alive."""
         return self._child is not None and self._child.poll() is None
+
+    def _listen(self, child: subprocess.Popen[bytes], said: IO[bytes]) -> None:
+        said.read()  # it says no more; so this ends when the guard does
+        if self._child is child and self._died is not None:
+            self._died()
 
     def stand_down(self) -> None:
         """Tell it that all is well: the torque is zero and the Falcon closed. A second call does nothing."""
@@ -97,7 +112,7 @@ class Guard:
         if child is None or child.stdin is None:
             return
         child.stdin.close()
-        threading.Thread(target=_see_off, args=(child,), name="guard", daemon=True).start()
+        threading.Thread(target=_see_off, args=(child, self._listener), name="guard", daemon=True).start()
 
     def _end(self, word: bytes) -> None:
         child, self._child = self._child, None
@@ -113,6 +128,8 @@ class Guard:
         except subprocess.TimeoutExpired:
             child.kill()
             child.wait()
+        if self._listener is not None:
+            self._listener.join()
         _close(child)
 
     def __enter__(self) -> Self:
@@ -128,8 +145,10 @@ class Guard:
             self.release()
 
 
-def _see_off(child: subprocess.Popen[bytes]) -> None:
+def _see_off(child: subprocess.Popen[bytes], listener: threading.Thread | None) -> None:
     child.wait()
+    if listener is not None:
+        listener.join()
     _close(child)
 
 

@@ -96,6 +96,7 @@ class Grip:
         device = self._device
         answer = device.read.ctypes(device.context, self._now_ns, int(self._reading.ctypes.data))
         if answer == READ_LOST:
+            device.check()
             raise usb_failure(ERROR_NO_DEVICE, "weighing with it")
         if answer == READ_NEW:
             self._blind = 0
