@@ -73,7 +73,7 @@ MEASURED: Final = (
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Delivered:
     """A table: its name, its columns in their order, and a frame that has them."""
 

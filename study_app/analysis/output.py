@@ -21,11 +21,14 @@ def write_files(to: Path, files: Mapping[str, bytes]) -> tuple[Path, ...]:
     AnalysisError
         The folder cannot be written; it is as before.
     """
-    created = not to.exists()
     token = secrets.token_hex(4)
-    staged = {name: to / f".{name}.{token}.tmp" for name in files}
+    staged = {name: (to / name).with_name(f".{Path(name).name}.{token}.tmp") for name in files}
+    within = sorted({folder for path in staged.values() for folder in (path.parent, *path.parent.parents)})
+    created = [folder for folder in within if folder.is_relative_to(to) and not folder.exists()]
     try:
         to.mkdir(parents=True, exist_ok=True)
+        for folder in created:
+            folder.mkdir(exist_ok=True)
         for name, content in files.items():
             with staged[name].open("xb") as file:
                 file.write(content)
@@ -37,9 +40,9 @@ def write_files(to: Path, files: Mapping[str, bytes]) -> tuple[Path, ...]:
         for path in staged.values():
             with contextlib.suppress(OSError):
                 path.unlink(missing_ok=True)
-        if created:
+        for folder in reversed(created):
             with contextlib.suppress(OSError):
-                to.rmdir()
+                folder.rmdir()
         why = error.strerror or type(error).__name__
         raise AnalysisError(
             f"{to} cannot be written ({why}): choose another folder with --to, free space, or mend the permissions"

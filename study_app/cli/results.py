@@ -13,11 +13,24 @@ from study_app.cli.words import EXIT_FOUND, SESSION
 @click.command()
 @click.argument("results", type=click.Path(path_type=Path))
 @click.option("--to", required=True, type=click.Path(path_type=Path), metavar="DIR", help="Folder to write into.")
-def export(results: Path, to: Path) -> None:
+@click.option(
+    "--wide", is_flag=True, help="Also the answers with a row a participant, a column a statement and setting."
+)
+@click.option("--parquet", is_flag=True, help="Also every table as Parquet.")
+@click.option(
+    "--sav", is_flag=True, help="Also the answers, long and wide, for SPSS, jamovi and JASP; needs pyreadstat."
+)
+@click.option(
+    "--psych-ds", is_flag=True, help="Also a folder of all tables that keeps the rules of Psych-DS, to share."
+)
+def export(results: Path, to: Path, *, wide: bool, parquet: bool, sav: bool, psych_ds: bool) -> None:
     """Write the tidy tables of all participants, with a codebook."""
+    from study_app.analysis.export import Extra
     from study_app.analysis.export import export as export_study
 
-    for written in export_study(results, to, warn=partial(click.echo, err=True)):
+    asked: dict[Extra, bool] = {"wide": wide, "parquet": parquet, "sav": sav, "psych-ds": psych_ds}
+    extras = [name for name, wanted in asked.items() if wanted]
+    for written in export_study(results, to, extras=extras, warn=partial(click.echo, err=True)):
         click.echo(written)
 
 

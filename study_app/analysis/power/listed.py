@@ -143,7 +143,7 @@ def _explained(question: Question, found: Powers) -> list[str]:
             return ["Page's test in the direction that the protocol states."]
         case "lowest delay":
             return [
-                "Page's test stepping down from the longest delay: what it finds bounds the noticeable delay from above."
+                "Page's test stepping down from the longest delay: what it finds bounds the noticeable one from above."
             ]
         case "equivalence":
             return [
