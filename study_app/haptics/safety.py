@@ -49,9 +49,14 @@ def new_safety(device_limit_n: float = math.inf) -> Any:
 
 @kernel
 def begin_scene(safety: Record) -> None:
-    """Let the force of another scene fade in, its energy at 0; a start fade that is not over begins again."""
+    """Let the force of another scene fade in, its energy at 0; a start fade that is not over begins again.
+
+    A brake that was sent for the scene before is let go on the next turn, which says so.
+    """
+    settling = safety.account.settling
     safety.fade = 0.0
     open_account(safety.account)
+    safety.account.settling = settling
 
 
 @part

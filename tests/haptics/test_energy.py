@@ -148,6 +148,21 @@ def test_a_debt_is_paid_by_damping_past_the_slew_limit_within_what_the_loop_bear
     assert sent_n == pytest.approx(slewed_n - (v / 0.04 - 1) * (slewed_n + brake_n), rel=1e-6)
 
 
+def test_a_brake_is_let_go_and_told_even_where_a_scene_begins_in_between():
+    hand = pushed()
+    for k in range(20):
+        hand.turn((0.18 + 1e-4 * k, 0.0, 0.0))
+    account(hand).balance_j = -1.1e-3
+    account(hand).strongest_n, account(hand).longest_m = 8.0, 0.01
+    braked_n = hand.turn((0.18 + 1e-4 * 20, 0.0, 0.0)).device_force_n[0]
+    assert hand.safety[0].slewed_n[0] - braked_n > 0.5
+    begin_scene(hand.safety[0])
+    after = hand.turn((0.18 + 1e-4 * 21, 0.0, 0.0))
+    assert after.limiters & LIMITER_ENERGY
+    assert abs(after.device_force_n[0] - hand.safety[0].slewed_n[0]) < 1e-12
+    assert hand.turn((0.18 + 1e-4 * 22, 0.0, 0.0)).limiters & LIMITER_ENERGY == 0
+
+
 def test_what_is_left_is_not_spent_within_10_ms():
     hand = pushed()
     for k in range(20):
