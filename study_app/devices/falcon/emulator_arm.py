@@ -35,9 +35,15 @@ ARMS = np.dtype(
     align=True,
 )
 
+LEAST_LEVER_M = 0.012
+"""Where the rod gives way by less for a turn of its arm [m/rad] the arm is nearly stretched: there it has its stop. All
+that a Falcon is used for is twice as far from that."""
+
 _STEP_M = 2e-5  # of the differences: truncated at 1e-7 of a derivative, rounded at 1e-11
 _STEP_RAD = 2e-4
 _ENOUGH_RAD = 1e-14
+_SLACK_M = 1e-9
+_STOP_HALVINGS = 20
 _SECANTS = 12
 _HALVINGS = 60
 
@@ -62,6 +68,53 @@ def bend(arms: Any, hand_m: Any) -> None:
 
 
 @kernel
+def stop(arms: Any, handle: Any) -> None:
+    """Keep a ``plant.HANDLE`` where the arms reach, and bend them: it stays before their stops, on its way outward."""
+    bend(arms, handle.position_m)
+    if _reached(arms, handle.position_m):
+        return
+    x, y, z = handle.position_m[0], handle.position_m[1], handle.position_m[2]
+    low, high = 0.0, 1.0
+    for _ in range(_STOP_HALVINGS):
+        share = 0.5 * (low + high)
+        _put(handle, share * x, share * y, share * z)
+        bend(arms, handle.position_m)
+        if _reached(arms, handle.position_m):
+            low = share
+        else:
+            high = share
+    _put(handle, low * x, low * y, low * z)
+    for i in range(3):
+        handle.velocity_mps[i] = 0.0
+    bend(arms, handle.position_m)
+
+
+@kernel
+def _put(handle: Any, x: float, y: float, z: float) -> None:
+    handle.position_m[0], handle.position_m[1], handle.position_m[2] = x, y, z
+
+
+@kernel
+def _reached(arms: Any, hand_m: Any) -> bool:
+    """Tell whether the arms, as bent, hold the grip there, and none is stretched."""
+    x, y, z = hand_m[0], hand_m[1], hand_m[2] + arms.centre_m
+    held = 0
+    for i in range(3):
+        at = arms.angle_rad[i]
+        if abs(_stretch(arms, i, at, x, y, z)) < _SLACK_M and -_per_rad(arms, i, x, y, z) > LEAST_LEVER_M:
+            held += 1
+    return held == 3
+
+
+@kernel
+def _per_rad(arms: Any, arm: int, x: float, y: float, z: float) -> float:
+    """Return by how much the rod of ``arm`` gets too long for a turn of the arm [m/rad]."""
+    at, turn = arms.angle_rad[arm], _STEP_RAD
+    longer: float = _stretch(arms, arm, at + turn, x, y, z) - _stretch(arms, arm, at - turn, x, y, z)
+    return longer / (2.0 * turn)
+
+
+@kernel
 def count(arms: Any, arm: int) -> int:
     """Return the encoder's count from its zero, for the angle as last found."""
     counted: int = math.floor((arms.angle_rad[arm] - arms.zero_rad[arm]) / arms.rad_per_count + 0.5)
@@ -75,11 +128,11 @@ def strain(arms: Any, torque: Any, hand_m: Any) -> None:
     A step of the grip changes the rod's length, a turn of the arm must change it back: so many radians a metre.
     """
     x, y, z = hand_m[0], hand_m[1], hand_m[2] + arms.centre_m
-    d, turn = _STEP_M, _STEP_RAD
+    d = _STEP_M
     arms.force_n[0], arms.force_n[1], arms.force_n[2] = 0.0, 0.0, 0.0
     for i in range(3):
         at = arms.angle_rad[i]
-        per_rad = (_stretch(arms, i, at + turn, x, y, z) - _stretch(arms, i, at - turn, x, y, z)) / (2.0 * turn)
+        per_rad = _per_rad(arms, i, x, y, z)
         if per_rad == 0.0:
             continue
         arm_nm = -torque[i] / arms.units_per_nm

@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 
 from study_app.devices.falcon import wire
-from study_app.devices.falcon.emulator_arm import bend, count, strain
+from study_app.devices.falcon.emulator_arm import count, stop, strain
 from study_app.devices.falcon.emulator_faults import (
     CORRUPT,
     DELAY,
@@ -206,7 +206,7 @@ def live(e: Any, now_ns: int, longest_ns: int) -> None:
         move_hand(e.hand, then_ns, step_s)
         _load(e)
         move(e.handle, e.hand.was_m, e.hand.place_m, step_s)
-        bend(e.arms, e.handle.position_m)
+        stop(e.arms, e.handle)
     e.moved_ns = now_ns
 
 
