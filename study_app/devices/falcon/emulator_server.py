@@ -1,4 +1,4 @@
-"""An emulated Falcon served in real time on a Unix socket, in the framing of ``transport_socket``.
+"""An emulated Falcon served in real time on a Unix socket, as ``framing`` says.
 
 So other programs, another driver or our own guard, can be put in front of it. Emulated time is the machine's: a
 transfer is computed at once up to where it ends, and its answer is held back until that moment has come.
@@ -21,7 +21,7 @@ import numpy as np
 
 from study_app.devices.falcon import wire
 from study_app.devices.falcon.emulator import Emulator
-from study_app.devices.falcon.transport_socket import ANSWER, BULK_IN, BULK_OUT, CONTROL, DESCRIPTOR, IDENTITY, REQUEST
+from study_app.devices.falcon.framing import ANSWER, BULK_IN, BULK_OUT, CONTROL, DESCRIPTOR, IDENTITY, REQUEST
 from study_app.errors import DeviceError
 
 _IDLE_S: Final = 0.02  # how long nobody may ask before it is looked at anyway

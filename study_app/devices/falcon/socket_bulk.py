@@ -11,15 +11,15 @@ from numba import types
 
 from study_app.devices.falcon import wire
 from study_app.devices.falcon.bulk import BULK
-from study_app.devices.falcon.transport_socket import ANSWER, BULK_IN, BULK_OUT, REQUEST
+from study_app.devices.falcon.framing import ANSWER, BULK_IN, BULK_OUT, REQUEST
 from study_app.haptics.cfunctions import c_function, external, record_at
 from study_app.haptics.compiled import kernel
 from study_app.haptics.layout import records
 
 _REQUEST = np.dtype(
     [("kind", "u1"), ("endpoint", "u1"), ("value", "<u2"), ("length", "<u2"), ("timeout_ms", "<u2")]
-)  # transport_socket.REQUEST
-_ANSWER = np.dtype([("code", "<i4"), ("length", "<u4")])  # transport_socket.ANSWER
+)  # framing.REQUEST
+_ANSWER = np.dtype([("code", "<i4"), ("length", "<u4")])  # framing.ANSWER
 CONNECTION = np.dtype(
     [
         ("file", np.int64),  # descriptor of the socket

@@ -14,7 +14,7 @@ from usb.backend import IBackend
 
 from study_app.devices.falcon import wire
 from study_app.devices.falcon.failures import usb_failure
-from study_app.devices.falcon.transport_socket import (
+from study_app.devices.falcon.framing import (
     ANSWER,
     BULK_IN,
     BULK_OUT,

@@ -12,9 +12,9 @@ if not hasattr(socket, "AF_UNIX"):
 
 from study_app.devices.falcon import guard as guarding
 from study_app.devices.falcon.failures import FalconNotFound
+from study_app.devices.falcon.framing import DESCRIPTOR
 from study_app.devices.falcon.guard import PACKETS, Guard, watch
 from study_app.devices.falcon.transport import open_transport
-from study_app.devices.falcon.transport_socket import DESCRIPTOR
 from study_app.devices.falcon.wire import FLAG_HOMING, quiet_packet
 from study_app.errors import DeviceError
 from tests.devices.falcon.bridges import Server, compiled, warm

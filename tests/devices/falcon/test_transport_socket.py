@@ -12,8 +12,9 @@ if not hasattr(socket, "AF_UNIX"):
 
 from study_app.devices.falcon import transport_socket, wire
 from study_app.devices.falcon.failures import FalconLost, FalconNotFound, UsbFailure
+from study_app.devices.falcon.framing import BULK_IN, BULK_OUT, CONTROL, DESCRIPTOR
 from study_app.devices.falcon.transport import open_transport
-from study_app.devices.falcon.transport_socket import BULK_IN, BULK_OUT, CONTROL, DESCRIPTOR, SocketTransport
+from study_app.devices.falcon.transport_socket import SocketTransport
 from tests.devices.falcon.bridges import Compiled, Server, both, compiled, warm
 
 
@@ -204,7 +205,7 @@ def test_a_server_that_goes_while_asked_who_it_is(server, path):
 @compiled
 def test_the_records_are_the_framing():
     from study_app.devices.falcon import socket_bulk
-    from study_app.devices.falcon.transport_socket import ANSWER, REQUEST
+    from study_app.devices.falcon.framing import ANSWER, REQUEST
 
     record = np.zeros(1, socket_bulk._REQUEST)
     record[0] = (2, 0x81, 0x1234, 0x5678, 0x9ABC)
