@@ -89,6 +89,9 @@ def test_steady_drag_is_compared_only_where_experiments_are_known():
     speeds = [case.motion.velocity_mps[-1, 0] for case in truth.cases]
     assert max(speeds) == pytest.approx(0.6)
     assert min(speeds) * 1420 * 0.068 / 10 >= 0.1585
+    oseen = 24 / 0.1585 * (1 + 3 / 16 * 0.1585)
+    assert f"up to {100 * (169.8 / oseen - 1):.0f} % above Oseen's law" in truth.source
+    assert "Oseen" not in truths.steady(scene(HONEY.model_copy(update={"viscosity_pa_s": 0.01}))).source
     slow = scene(HONEY.model_copy(update={"viscosity_pa_s": 1e4}))
     assert truths.steady(slow) is None
 
