@@ -210,6 +210,8 @@ def test_a_model_of_what_was_solved_without_convection_has_no_error(stored):
 def test_tables_and_figure_tell_what_was_found(stored, fits):
     said = compared.fits_markdown(fits)
     assert said.count("\n| ") == len(NAMES) * (1 + len(fitted.MODELS))
+    assert "| drag, constant C_d | drag_coefficient 10* |" in said  # honey at 0.2 m/s; a scene permits no more
+    assert said.count("drag_coefficient 6.81 |") == 1
     assert "| 100 | 1.08" in compared.steady_markdown(tables.steady())
     drawing = drawn.draw(tuple(stored.values()), fits)
     assert [ax.get_title(loc="left").split(",")[0] for ax in drawing.axes] == ["glycerin", "honey"]

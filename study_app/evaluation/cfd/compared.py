@@ -15,8 +15,9 @@ import numpy as np
 from study_app.errors import StudyError
 from study_app.evaluation.accuracy.truths import measured_drag_n
 from study_app.evaluation.cfd.drawn import draw
-from study_app.evaluation.cfd.fitted import MODELS, Fitted, judge
+from study_app.evaluation.cfd.fitted import MODELS, Fitted, judge, scene_of
 from study_app.evaluation.cfd.tables import Table
+from study_app.evaluation.identify.parameters import find
 from study_app.evaluation.style import file_bytes
 from study_app.haptics.laws import LAWS
 from study_app.haptics.scene import Liquid
@@ -30,6 +31,7 @@ MITTAL: Final = {50.0: 1.57, 100.0: 1.09}
 """C_d of a sphere by a spectral method: Mittal 1999, Int. J. Numer. Meth. Fluids 30:921, as quoted in the validation of
 Notus CFD, https://doc.notus-cfd.org ("steady flows past a sphere")."""
 CONSTANT: Final = 0.47
+EDGE: Final = 1e-6
 
 
 def clift(reynolds: float) -> float:
@@ -63,7 +65,7 @@ def fits_markdown(fits: Sequence[Fitted]) -> str:
         ]
         lines += [_row(it) for it in fits if it.case == case]
         parts.append("\n".join(lines))
-    return "\n\n".join(parts)
+    return "\n\n".join([*parts, "\\* at the edge of what a scene permits: the best value may lie beyond."])
 
 
 def fits_csv(fits: Sequence[Fitted]) -> bytes:
@@ -119,11 +121,19 @@ def write(tables: Sequence[Table], drag: Table, fits: Sequence[Fitted], to: Path
 
 
 def _row(it: Fitted) -> str:
-    fitted = ", ".join(f"{name} {value:.3g}" for name, value in it.values.items()) or "nothing"
+    edges = _at_the_edge(it)
+    fitted = ", ".join(f"{name} {value:.3g}{'*' if name in edges else ''}" for name, value in it.values.items())
+    fitted = fitted or "nothing"
     return (
         f"| {it.model.name} | {fitted} | {it.rms_n:.2g} N ({it.share:.1%}) | {it.worst_n:.2g} N | {it.within:.0%} | "
         f"{_signed(it.push, 0)} | {it.carried:.1%} |"
     )
+
+
+def _at_the_edge(it: Fitted) -> set[str]:
+    """Return which fitted parameters are the least or the greatest that a scene permits."""
+    ranges = find(scene_of(it.model, it.case), it.case.liquid_id, it.model.free) if it.model.free else ()
+    return {one.name for one in ranges if not one.least * (1 + EDGE) < it.values[one.name] < one.most * (1 - EDGE)}
 
 
 def _measured(reynolds: float) -> float:
