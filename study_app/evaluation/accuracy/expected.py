@@ -75,7 +75,9 @@ def _of_one(scene: Scene, index: int) -> tuple[float, float, float, str]:
     motion = stroke(speed_mps, rate_per_s, CYCLES, alone.rate_hz)
     if liquid.viscosity_pa_s is not None and not {"wake", "local_wake"} & set(kept):
         true_n = physical_n(alone, speed_mps, rate_per_s, motion.t_s)
-        against = "drag by experiments, added mass, creeping history and buoyancy"
+        against = (
+            "drag by experiments, added mass, buoyancy and the history of creeping flow, which is the most it can be"
+        )
     else:
         kept = tuple(it for it in kept if it in {"drag", "wake", "local_wake"})
         alone = with_effects(alone, *kept)
