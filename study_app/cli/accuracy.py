@@ -78,9 +78,10 @@ def _subjects(scene: str | None, liquid: str | None) -> tuple[Scene | None, Scen
 
 def _motion(path: str, scene: Scene) -> Motion:
     from study_app.evaluation.accuracy.motions import stir
+    from study_app.evaluation.identify.measured import at_rate
     from study_app.haptics import motion, paths
 
     if path == DEFAULT_PATH:
         return stir(scene.scale, scene.rate_hz)
     programmed = path in paths.NAMES or not (Path(path).suffix or Path(path).exists())
-    return paths.path(path, rate_hz=scene.rate_hz) if programmed else motion.read(Path(path))
+    return paths.path(path, rate_hz=scene.rate_hz) if programmed else at_rate(motion.read(Path(path)), scene.rate_hz)

@@ -4,6 +4,8 @@ import csv
 import io
 import itertools
 import math
+import threading
+import time
 
 import numpy as np
 import pytest
@@ -11,12 +13,26 @@ from click.testing import CliRunner
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from study_app.cli import commands
+from study_app.cli.accuracy import _motion
+from study_app.errors import StudyError
 from study_app.evaluation.accuracy import ladders
 from study_app.evaluation.accuracy.expected import expected, foretold, physical_n
 from study_app.evaluation.accuracy.figure import LABEL_PT, draw, duration, spread
 from study_app.evaluation.accuracy.files import COLUMNS, csv_text, markdown, write
 from study_app.evaluation.accuracy.motions import stir, stroke
-from study_app.evaluation.accuracy.race import ROUNDING, Accuracy, Error, Row, Time, accuracy, error_of, front, worst
+from study_app.evaluation.accuracy.race import (
+    FINE_S,
+    ROUNDING,
+    Accuracy,
+    Error,
+    Row,
+    Time,
+    accuracy,
+    error_of,
+    front,
+    race,
+    worst,
+)
 from study_app.evaluation.accuracy.rungs import LinearRung, ListRung, TickRung
 from study_app.evaluation.accuracy.truths import Case, Truth
 from study_app.haptics.motion import Motion
@@ -245,6 +261,23 @@ def test_the_front_takes_rounding_errors_and_times_within_a_twentieth_as_equal()
     assert [rung.name for rung in front(alike)] == ["truer", "truest"]
 
 
+class WaitingRung(TickRung):
+    """A rung that is kept waiting by another thread, and notes for how long [ns]."""
+
+    def take(self, start, stop):
+        other, began = threading.Thread(target=sum, args=(range(1_000_000),)), time.perf_counter_ns()
+        other.start()
+        other.join()
+        self.waited_ns = time.perf_counter_ns() - began
+
+
+@pytest.mark.skipif(time.get_clock_info("thread_time").resolution > FINE_S, reason="no fine clock of a thread")
+def test_what_others_take_is_not_counted():
+    rung = WaitingRung("waiting", "waiting", "tick", TANK)
+    took = race((rung,), first_seconds(stir(10, 1000), 1.5), 1, 1, 1.0)[rung]
+    assert took.median_ns * rung.BATCH < 0.5 * rung.waited_ns
+
+
 def test_labels_keep_apart_and_below_the_top():
     places = spread([10.0, 11.0, 90.0, 99.0, 99.5], LABEL_PT, 100.0)
     assert all(b - a >= LABEL_PT - 1e-9 for a, b in itertools.pairwise(places))
@@ -318,6 +351,21 @@ def test_what_the_command_cannot_do_is_said_in_a_line():
 
 
 @compiled
+def test_a_motion_that_meets_no_force_is_refused():
+    rest = Motion(np.arange(100) / 1000, np.zeros((100, 3)))
+    with pytest.raises(StudyError, match="along a rest water exerts no force"):
+        accuracy(TANK, None, rest, named="a rest")
+
+
+def test_a_motion_file_of_another_rate_is_brought_to_the_scenes(tmp_path):
+    rows = "\n".join(f"{k / 50},{k / 100},0,0" for k in range(21))
+    (tmp_path / "slow.csv").write_text(f"t_s,x_m,y_m,z_m\n{rows}\n", encoding="utf-8")
+    read = _motion(str(tmp_path / "slow.csv"), TANK)
+    assert read.t_s == pytest.approx(np.arange(401) / 1000)
+    assert read.position_m[:, 0] == pytest.approx(read.t_s / 2)
+
+
+@compiled
 def test_the_command_prints_the_table_of_one_liquid(tmp_path):
     small = tmp_path / "small.toml"
     small.write_text("[liquids.gel]\ndensity_kg_m3 = 1000\n", encoding="utf-8")
@@ -327,6 +375,7 @@ def test_the_command_prints_the_table_of_one_liquid(tmp_path):
     assert told.exit_code == 0, told.output
     assert "gel gives no viscosity" in told.output
     assert "central differences" in told.output
+    assert "the motion is short: calls, of some µs, count in times of 5 ticks a batch" in told.output
     assert "| drag |" in told.output
 
 

@@ -190,14 +190,14 @@ class _Panel:
             it.plot([-0.012, 0.012], [edge - 0.01, edge + 0.01], **slash)
 
     def _beside(self, row: Row) -> dict[str, Any]:
-        """Return where a point of the strip has its label: the chosen to its right, others in turn above and below."""
+        """Return where a point of the strip has its label: the chosen below, others in turn above and below."""
         lists = sorted((it for it in self._strip if not it.chosen and it.error.rms < ROUNDING), key=_time)
         if row.chosen:
-            return {"xytext": (9, 0), "textcoords": "offset points", "ha": "left", "va": "center"}
+            return {"xytext": (0, -6), "textcoords": "offset points", "ha": "center", "va": "top"}
         if row in lists[1::2]:
             return {"xytext": (0, -4), "textcoords": "offset points", "ha": "center", "va": "top"}
-        side = "right" if row in lists[1:] else "left"
-        return {"xytext": (4 if side == "right" else -4, 4), "textcoords": "offset points", "ha": side, "va": "bottom"}
+        side = "right" if row in lists[1:] else "center"
+        return {"xytext": (4 if side == "right" else 0, 4), "textcoords": "offset points", "ha": side, "va": "bottom"}
 
     def _point(self, axes: Axes, row: Row) -> None:
         look = LOOKS[row.rung.family]

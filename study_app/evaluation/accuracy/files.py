@@ -88,10 +88,11 @@ def markdown(found: Accuracy) -> str:
 
 
 _WHAT: Final = (
-    "Times are medians over repeats, in one interleaved run, of the median and the 99th percentile of batches of 1,000 "
-    "ticks. RMS error in % of the RMS of the true force, greatest in % of the greatest. Direction: RMS angle where the "
-    "true force is felt. Fewer ticks a second: the error of the force alone, not what they cost in stability. "
-    "● nothing measured is both faster and truer; ◎ what the gate chooses, and the program runs."
+    "Times are computing times of one thread: medians over repeats, in one interleaved run, of the median and the 99th "
+    "percentile of batches of 1,000 ticks; what other programs take is left out. RMS error in % of the RMS of the true "
+    "force, greatest in % of the greatest. Direction: RMS angle where the true force is felt. Fewer ticks a second: "
+    "the error of the force alone, not what they cost in stability. ● no model is both faster, in times of real time, "
+    "and truer, each against the truth that it misses most; ◎ what the gate chooses, and the program runs."
 )
 _HEADINGS: Final = (
     "",
