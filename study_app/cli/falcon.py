@@ -30,7 +30,8 @@ def emulate_falcon(
     """Serve an emulated Falcon to other programs, in real time, until Ctrl-C.
 
     It answers as the USB bridge does, from the boot loader on, in the framing that
-    study_app/devices/falcon/transport_socket.py describes; --device falcon-socket:PATH puts our own driver there.
+    study_app/devices/falcon/framing.py describes; --device falcon-socket:PATH puts our own driver there.
+    Lights, homing and torques are printed as they change, on a terminal only.
     """
     from study_app.devices.falcon.emulator import Emulator
     from study_app.devices.falcon.emulator_server import EmulatorServer

@@ -16,7 +16,7 @@ from study_app.devices.falcon import wire
 from study_app.devices.falcon.bulk import BulkCalls
 from study_app.devices.falcon.emulator_arm import set_arms
 from study_app.devices.falcon.emulator_boot import RUNNING
-from study_app.devices.falcon.emulator_faults import Faults
+from study_app.devices.falcon.emulator_faults import POWER_OFF, Faults, spelt
 from study_app.devices.falcon.emulator_ftdi import power_up
 from study_app.devices.falcon.emulator_host import (
     EMULATOR,
@@ -152,7 +152,7 @@ class Emulator(HandOrders):
 
     def take(self, fault: str) -> None:
         """Take a fault as a command line gives it: ``drop=0.01``, ``frozen`` or ``power-off``."""
-        if fault.replace("-", "_") == "power_off":
+        if spelt(fault.strip()) == POWER_OFF:
             self.power(False)
         else:
             self.faults.take(fault)

@@ -31,6 +31,9 @@ SWITCHES: Final = (
     "status_noise",  # modem status bytes of all kinds
 )
 
+POWER_OFF: Final = "power-off"
+"""On a command line: its mains adapter is pulled, which is the emulator's affair."""
+
 FAULTS = np.dtype(
     [
         ("chance", np.float64, (len(CHANCES),)),  # of each turn
@@ -133,9 +136,14 @@ class Faults:
         try:
             chance = float(value)
         except ValueError:
-            known = ", ".join((*(f"{known}=CHANCE" for known in CHANCES), *SWITCHES))
+            known = ", ".join((*(f"{known}=CHANCE" for known in CHANCES), *map(spelt, SWITCHES), POWER_OFF))
             raise DeviceError(f"fault '{word}' is not known; choose of: {known}") from None
         self.chance(name, chance)
+
+
+def spelt(name: str) -> str:
+    """Return a switch's name as a command line gives it and messages say it."""
+    return name.replace("_", "-")
 
 
 def _place(name: str) -> int:
@@ -146,5 +154,5 @@ def _place(name: str) -> int:
 
 def _switch(name: str) -> str:
     if name not in SWITCHES:
-        raise DeviceError(f"fault '{name}' cannot be switched on; choose one of: {', '.join(SWITCHES)}")
+        raise DeviceError(f"fault '{name}' cannot be switched on; choose one of: {', '.join(map(spelt, SWITCHES))}")
     return name
