@@ -199,21 +199,24 @@ def pull(grip: Grip, ask: Ask) -> Notes:
         words = f"Place {number} of {len(PLACES_M)}: pull straight down with the scale, at 200 to 500 g, and hold it so"
         grip.wait(ask("pull", words))
         counts, units = grip.weigh()
-        reading = grip.wait(ask("reading", "What did the scale show, in grams?"))
-        notes.append((counts, _newtons(reading), units))
+        notes.append((counts, _read_scale(grip, ask), units))
         grip.wait(ask("let-go", "Take the scale off, and let go."))
     grip.wait(ask("take-off", "Hold the grip: it goes limp now."))
     return _noted(notes)
 
 
-def _newtons(reading: str) -> float:
-    try:
-        load_n = float(reading.replace(",", ".")) / 1000 * GRAVITY_MPS2
-    except ValueError:
-        load_n = -1.0
-    if not 0.0 < load_n <= MOST_N:
-        raise DeviceError(f"'{reading}' is no reading of the scale in grams, more than 0 and up to 600: start again")
-    return load_n
+def _read_scale(grip: Grip, ask: Ask) -> float:
+    """Return what the scale showed [N], asking until it is a weight."""
+    words = "What did the scale show, in grams?"
+    while True:
+        reading = grip.wait(ask("reading", words))
+        try:
+            load_n = float(reading.replace(",", ".")) / 1000 * GRAVITY_MPS2
+        except ValueError:
+            load_n = -1.0
+        if 0.0 < load_n <= MOST_N:
+            return load_n
+        words = f"'{reading}' is no reading of the scale in grams, more than 0 and up to 600. What did it show?"
 
 
 def _noted(notes: list[tuple[Any, float, Any]]) -> Notes:
