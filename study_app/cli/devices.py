@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from study_app.devices.falcon.weighing import Ask, Notes
 
 _WIDTH = 100
+_PREPARING = "Preparing …"
 FIRMWARE = click.option("--firmware", type=click.Path(path_type=Path), metavar="PATH", help="Its program.")
 DEVICE = click.option("--device", "name", default="falcon", show_default=True, metavar="NAME", help="Which Falcon.")
 
@@ -58,6 +59,7 @@ def doctor(name: str, firmware: Path | None, faults: tuple[str, ...]) -> None:
 
     NAME is falcon, falcon:SERIAL, falcon-emulated or falcon-socket:PATH. Exit code 3 where something is wrong.
     """
+    click.echo(_PREPARING)  # what is imported and compiled next takes long the first time
     from study_app.devices.falcon.diagnosis import diagnose
     from study_app.devices.falcon.doctor import examine
 
@@ -74,13 +76,16 @@ def report(examined: Examined) -> list[str]:
 
     facts = examined.facts
     lines = ["", *(f"seen: {words}" for words in examined.seen), ""]
-    found = 0
+    found, unseen = 0, []
     for number, mode in enumerate(MODES, start=1):
         shown = mode.shown_by(facts)
         word = "not looked at" if shown is None else "FOUND" if shown else "ok"
         lines.append(f"{number:>2}  {word:<13}  {mode.symptom}")
+        if shown is None:
+            unseen.append(mode.symptom)
         if shown:
             found += 1
+        if shown and not (mode.id == "firmware-file" and facts.program == "refused"):  # the refusal says it all
             lines.append(_indented(f"cause: {mode.cause}", 19))
             lines.append(_indented(f"cure: {mode.cure(facts.platform)}", 19))
             lines.append(_indented(f"known by: {mode.detected}", 19))
@@ -89,7 +94,12 @@ def report(examined: Examined) -> list[str]:
     lines.append("")
     if examined.failure is not None:
         lines.append(_indented(examined.failure, 0))
-    lines.append("Nothing is wrong with it." if not found and examined.failure is None else f"Found: {found}.")
+    if found or examined.failure is not None:
+        lines.append(f"Found: {found}.")
+    elif unseen:
+        lines.append(_indented(f"Nothing wrong was found. Not looked at: {'; '.join(unseen)}.", 0))
+    else:
+        lines.append("Nothing is wrong with it.")
     return lines
 
 
@@ -107,6 +117,7 @@ def calibrate(name: str, firmware: Path | None, grams: float | None, *, scale: b
     """
     if scale == (grams is not None):
         raise click.UsageError("calibrate needs either --grams G, a weight to hang on the grip, or --scale")
+    click.echo(_PREPARING)
     from study_app.devices.falcon import calibration, weighing
     from study_app.devices.falcon.geometry import DEFAULT_GEOMETRY, geometry_named
 

@@ -45,7 +45,8 @@ class TestDoctor:
     def test_a_falcon_in_order_is_told_so(self):
         told = liquid_study("doctor", "--device", "falcon-emulated")
         assert told.exit_code == 0, told.output
-        assert "Nothing is wrong with it." in told.output
+        assert told.output.startswith("Preparing …\n")
+        assert "Nothing wrong was found. Not looked at: it shakes or twitches." in told.output
         assert told.output.count(" ok ") >= 15
         assert "FOUND" not in told.output
 
@@ -65,6 +66,15 @@ class TestDoctor:
         told = liquid_study("doctor", "--device", "falcon-emulated", "--fault", "access-denied")
         assert told.exit_code == 3
         assert f"\necho '{UDEV_RULE}' | sudo tee /etc/udev/rules.d/60-falcon.rules && " in told.output
+
+    def test_a_firmware_that_is_none_is_told_by_its_refusal_alone(self, tmp_path):
+        (tmp_path / "page.bin").write_text("<!DOCTYPE html><html>")
+        told = liquid_study("doctor", "--device", "falcon-emulated", "--firmware", str(tmp_path / "page.bin"))
+        assert told.exit_code == 3
+        assert "FOUND          there is no firmware for it" in told.output
+        assert "it is a web page" in told.output
+        assert "cause:" not in told.output
+        assert "give --firmware" not in told.output
 
     def test_two_faults_at_once_are_both_found(self):
         told = liquid_study("doctor", "--device", "falcon-emulated", "--fault", "drop=0.02", "--fault", "corrupt=0.02")

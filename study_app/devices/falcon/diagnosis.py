@@ -23,7 +23,7 @@ UDEV_RULE: Final = (
 ALL_HOMED: Final = 0b111
 MOST_BROKEN: Final = 0.005
 LEAST_HZ: Final = 800.0
-LONGEST_ROUND_TRIP_S: Final = 0.004
+LONGEST_ROUND_TRIP_S: Final = 0.002
 LARGEST_STEP_N: Final = 0.5
 
 _ANY = ""
@@ -170,7 +170,7 @@ def _shaking(facts: Facts) -> bool | None:
 
 
 def _late(facts: Facts) -> bool | None:
-    return None if facts.round_trip_s is None else facts.round_trip_s > LONGEST_ROUND_TRIP_S
+    return None if facts.round_trip_s is None else facts.round_trip_s >= LONGEST_ROUND_TRIP_S
 
 
 MODES: Final = (
@@ -288,7 +288,7 @@ MODES: Final = (
     Mode(
         "slow",
         "it feels coarse, as at 60 or 300 Hz",
-        f"a reply takes longer than {1000 * LONGEST_ROUND_TRIP_S:.0f} ms: the bridge's timer holds it back",
+        f"a reply takes {1000 * LONGEST_ROUND_TRIP_S:.0f} ms or longer: the bridge's timer holds it back",
         {
             _ANY: f"close programs that use other serial adapters of FTDI, then {_PORT[_ANY]}",
             "win32": "set the latency timer of its port to 1 ms in the Device Manager, under Advanced",
@@ -333,8 +333,8 @@ MODES: Final = (
         "it was lost in use",
         "it is no longer there",
         {
-            _ANY: "check the cable, plug it in again, home it and resume: the trial is marked and what was recorded is "
-            "kept"
+            _ANY: "switch it off if it pushes; check the cable, plug it in again, home it and resume: the trial is "
+            "marked and what was recorded is kept"
         },
         "libusb's error -4",
         _usb("no-device"),

@@ -87,6 +87,7 @@ class TestModes:
             ({"rate_hz": 799.0}, ["shaking"]),
             ({"rate_hz": 1000.0, "step_n": 0.6}, ["shaking"]),
             ({"round_trip_s": 0.016}, ["slow"]),
+            ({"round_trip_s": 0.002}, ["slow"]),
             ({"round_trip_s": 0.001}, []),
         ],
     )
