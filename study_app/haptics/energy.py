@@ -16,7 +16,7 @@ A filter that lags, a loop that is late, a force held for too long all show as E
 acts at once and for one that acts as late as the loop is believed to be; the lower counts. The liquid may owe 1 mJ;
 with D = -1 mJ - E, its debt beyond that:
 
-- `weaken`: a debt of 0.25 mJ halves the force, one of 0.75 mJ halves it again, and it comes back at 50 % a second: a
+- `weaken`: a debt of 0.125 mJ halves the force, one of 0.375 mJ halves it again, and it comes back at 50 % a second: a
   loop that swings has its gain lowered until it does not, instead of being caught at every swing;
 - `settle`: what pushes the hand along its way may not spend in 10 ms more than is left; in debt it is let go, and
   damping added until the next step would pay the debt, up to half the damping that the loop bears, weakened likewise.
@@ -49,7 +49,7 @@ from study_app.haptics.vector import clear, copy, distance, norm, square
 
 ALLOWANCE_J = 1e-3
 SPENDING_S = 10e-3
-HALVING_J = 0.25e-3
+HALVING_J = 0.125e-3
 FORGIVEN_W = 1e-3
 HISTORY_PERIOD_S = 1.0
 SMOOTHING_S = 2e-3

@@ -141,7 +141,7 @@ def test_a_debt_is_paid_by_damping_past_the_slew_limit_within_what_the_loop_bear
     owed_j = -1e-3 - min(account(hand).balance_j, account(hand).late_balance_j)
     v = account(hand).velocity_mps[0]
     assert v == pytest.approx(0.06, rel=1e-3)
-    assert account(hand).gain == pytest.approx(0.25e-3 / (0.25e-3 + owed_j))
+    assert account(hand).gain == pytest.approx(0.125e-3 / (0.125e-3 + owed_j))
     brake_n = min(owed_j / (1e-3 * v), 0.5 * account(hand).gain * 53 * v)
     slewed_n = hand.safety[0].slewed_n[0]
     assert slewed_n > 0
@@ -177,13 +177,13 @@ def test_what_is_left_is_not_spent_within_10_ms():
 def test_a_swinging_loop_keeps_a_low_gain_for_seconds():
     hand = Hand(HONEY)
     whole_n = hand.sweep(0.05, 100)[-1].device_force_n[0]
-    account(hand).balance_j = -1e-3 - 0.75e-3
+    account(hand).balance_j = -1e-3 - 0.375e-3
     account(hand).strongest_n, account(hand).longest_m = 8.0, 0.01
     hand.turn((0.005 + 5e-5, 0.0, 0.0))
     account(hand).balance_j = account(hand).late_balance_j = 0.0
     shares = [hand.turn((0.005 + 5e-5 * k, 0.0, 0.0)).device_force_n[0] / whole_n for k in range(2, 2502)]
-    assert shares[10] == pytest.approx(0.25, rel=0.03)
-    assert shares[1400] == pytest.approx(0.5, rel=0.03)
+    assert shares[10] == pytest.approx(0.25, rel=0.05)
+    assert shares[1400] == pytest.approx(0.5, rel=0.05)
     assert all(before <= after + 1e-9 for before, after in itertools.pairwise(shares[20:]))
 
 
