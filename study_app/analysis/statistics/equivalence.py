@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final, Literal, TypeAlias
 
 import numpy as np
@@ -23,8 +24,11 @@ Verdict: TypeAlias = Literal["equivalent", "different", "inconclusive"]
 ALL_SIGNS_UP_TO: Final = 14
 """Up to so many participants all signs are gone through; beyond that they are drawn."""
 
-POWER_FACTOR: Final = 8.6
-"""(z(0.95) + z(0.90))²: participants for 80 % power where the true difference is 0, times (spread / bound)²."""
+POWER: Final = 0.80
+"""``n_needed`` participants show equivalence with this probability, were the true difference 0."""
+
+MANY: Final = 10**9
+"""With so many participants t is normal."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,7 +39,7 @@ class Equivalence(Outcome):
     else "inconclusive". ``p_permutation`` (signs of the shifted differences) and ``p_ranks`` (signed ranks, which bound
     the pseudo-median) are the same question without normality; ``checks_agree`` tells whether both give the same
     answer as p, and ``smallest_check_p`` is the smallest that these two can be. ``n_needed`` is how many participants
-    would give 80 % power, at this spread, were the true difference 0.
+    would give 80 % power, at this spread, were the true difference 0; never so few that these two could not agree.
     """
 
     bound: float
@@ -120,7 +124,7 @@ def tost(
         if permuted is None or ranked is None
         else all((q <= alpha) == (p <= alpha) for q in (permuted, ranked)),
         sd=sd,
-        n_needed=math.ceil(POWER_FACTOR * (sd / bound) ** 2),
+        n_needed=_needed(sd / bound, alpha),
     )
 
 
@@ -165,6 +169,24 @@ def _without_spread(kept: Array, dropped: int, bound: float, alpha: float) -> Eq
         sd=0.0 if n > 1 else None,
         n_needed=None,
     )
+
+
+def _needed(spread: float, alpha: float) -> int:
+    """Return how many participants show equivalence with 80 % power at a ``spread`` in bounds, the difference being 0.
+
+    n ≥ ((t(1 − alpha) + t(1 − (1 − power) / 2)) · spread)² with n − 1 degrees of freedom (Chow, Shao & Wang 2008,
+    Sample Size Calculations in Clinical Research, 3.1.3), and no fewer than the signs of n differences can show.
+    """
+    n = max(2, math.ceil(-math.log2(alpha)), math.ceil((_distance(MANY, alpha) * spread) ** 2))
+    while math.sqrt(n) < _distance(n, alpha) * spread:
+        n += 1
+    return n
+
+
+@lru_cache(maxsize=4096)
+def _distance(n: int, alpha: float) -> float:
+    """Return how many standard errors away the bound must be for n participants to show equivalence."""
+    return float(t_distribution.ppf([1 - alpha, (1 + POWER) / 2], n - 1).sum())
 
 
 def _smallest(n: int) -> float:
