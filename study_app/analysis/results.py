@@ -14,6 +14,7 @@ from study_app.analysis.decided import Decided
 from study_app.analysis.performance import Performance
 from study_app.analysis.questions import Item, Kind, Setting
 from study_app.analysis.statistics.equivalence import Equivalence
+from study_app.analysis.statistics.equivalence import Verdict as Nearness
 from study_app.analysis.statistics.outcome import Outcome
 from study_app.analysis.statistics.recognition import Recognition
 from study_app.analysis.statistics.threshold import Threshold
@@ -76,6 +77,12 @@ class Against:
     delay_ms: float
     control_ms: float
     found: Equivalence
+
+    @property
+    def verdict(self) -> Nearness:
+        """What may be said: "equivalent" only where the tests without normality agree."""
+        doubted = self.found.verdict == "equivalent" and self.found.checks_agree is False
+        return "inconclusive" if doubted else self.found.verdict
 
 
 @dataclass(frozen=True, slots=True)

@@ -97,7 +97,7 @@ def _tests(found: BlockFound) -> Iterator[dict[str, Any]]:
     for against in found.against:
         row = _row(found, "a delay is equivalent", against.found) | {"item": against.item}
         compared = f"{against.delay_ms:g} ms − {against.control_ms:g} ms"
-        yield row | {"comparison": compared, "verdict": against.found.verdict}
+        yield row | {"comparison": compared, "verdict": against.verdict}
     if found.threshold is not None:
         yield _row(found, "a delay is noticed", found.threshold)
 

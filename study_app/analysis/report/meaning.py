@@ -7,6 +7,7 @@ from typing import Final
 
 from study_app.analysis.report.words import counted, interval, listed, ms, number, short
 from study_app.analysis.results import Against, BlockFound, Delivered, Results
+from study_app.analysis.statistics.equivalence import Equivalence
 
 VERDICTS: Final = ("equivalent", "different", "inconclusive")
 
@@ -18,7 +19,7 @@ def tempting_ms(found: BlockFound) -> float | None:
     """
     if len(found.delays_ms) < 2:
         return None
-    different = {one.delay_ms for one in found.against if one.found.verdict == "different"}
+    different = {one.delay_ms for one in found.against if one.verdict == "different"}
     calm = [delay for delay in found.delays_ms[1:] if delay not in different]
     return max(calm) if calm and found.against else found.delays_ms[1]
 
@@ -37,8 +38,7 @@ def by_delay(found: BlockFound) -> list[list[str]]:
     for delay_ms in dict.fromkeys(one.delay_ms for one in found.against):
         here = [one for one in found.against if one.delay_ms == delay_ms]
         told = [
-            ", ".join(short(found, one.item) for one in here if one.found.verdict == verdict) or "–"
-            for verdict in VERDICTS
+            ", ".join(short(found, one.item) for one in here if one.verdict == verdict) or "–" for verdict in VERDICTS
         ]
         rows.append([ms(delay_ms), *told])
     return rows
@@ -90,25 +90,28 @@ def _as_claim(found: BlockFound, delay_ms: float) -> Iterator[str]:
     verdicts = _by_verdict(found, here)
     yield (
         f"As a claim. A comparison that is not significant is no evidence that {ms(delay_ms)} goes unnoticed. What "
-        f"would be is equivalence to {ms(first.control_ms)} within {bound}: {verdicts}{_needed(here)} {_said(here)}"
+        f"would be is equivalence to {ms(first.control_ms)} within {bound}: {verdicts}{_needed(here)} "
+        f"{_said(found, here)}"
     )
 
 
 def _by_verdict(found: BlockFound, here: list[Against]) -> str:
     parts = []
     for verdict in VERDICTS:
-        told = [
-            f"“{short(found, one.item)}” ({number(one.found.effect)}, 90 % interval {interval(one.found.interval)})"
-            for one in here
-            if one.found.verdict == verdict
-        ]
+        told = [f"“{short(found, one.item)}” ({_difference(one.found)})" for one in here if one.verdict == verdict]
         if told:
             parts.append(f"{verdict} for {listed(told)}")
     return "; ".join(parts) + "."
 
 
+def _difference(found: Equivalence) -> str:
+    if found.interval is None:
+        return f"{number(found.effect)}, no interval: {found.no_interval}"
+    return f"{number(found.effect)}, {100 * found.interval.level:.0f} % interval {interval(found.interval)}"
+
+
 def _needed(here: list[Against]) -> str:
-    needed = [one.found.n_needed for one in here if one.found.verdict != "equivalent" and one.found.n_needed]
+    needed = [one.found.n_needed for one in here if one.verdict != "equivalent" and one.found.n_needed]
     if not needed:
         return ""
     span = f"{min(needed)}" if min(needed) == max(needed) else f"{min(needed)} to {max(needed)}"
@@ -118,16 +121,22 @@ def _needed(here: list[Against]) -> str:
     )
 
 
-def _said(here: list[Against]) -> str:
+def _said(found: BlockFound, here: list[Against]) -> str:
     delay = ms(here[0].delay_ms)
-    if all(one.found.verdict == "equivalent" for one in here):
+    if all(one.verdict == "equivalent" for one in here):
         return (
-            f"What can be said: at {delay} the mean answers to these statements stay within the bound. Not that no "
-            "single person notices it, and not for other tasks or statements."
+            f"What can be said: at {delay} the mean answers to these statements stay within the bound. Not that "
+            "nothing changes within it, not that no single person notices it, and not for other tasks or statements."
         )
-    if any(one.found.verdict == "different" for one in here):
+    if _speaks_against(found, here[0].delay_ms):
         return f"These data speak against the sentence “delays up to {delay} do not matter”."
     return (
         f"So these data do not support the sentence “delays up to {delay} do not matter”, and do not refute it: they "
         "are too few or too scattered to tell."
     )
+
+
+def _speaks_against(found: BlockFound, delay_ms: float) -> bool:
+    """Return whether a delay up to this one differs from the shortest, or a trend shows already up to it."""
+    differs = any(one.verdict == "different" and one.delay_ms <= delay_ms for one in found.against)
+    return differs or any(one.steps.lowest_ms is not None and one.steps.lowest_ms <= delay_ms for one in found.lowest)

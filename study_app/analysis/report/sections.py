@@ -225,7 +225,7 @@ def _against(found: BlockFound) -> Iterator[str]:
                 p_value(one.found.p),
                 p_value(one.found.p_permutation),
                 "–" if one.found.n_needed is None else str(one.found.n_needed),
-                one.found.verdict + (" *" if one.found.checks_agree is False else ""),
+                one.verdict + (" *" if one.found.checks_agree is False else ""),
             ]
             for one in found.against
         ],
@@ -239,11 +239,12 @@ def _against(found: BlockFound) -> Iterator[str]:
     yield paragraph(
         f"Two one-sided t tests with a bound of ±{first.bound:g}, intervals of {100 * level:.0f} %. Equivalent: the "
         "interval lies within the bound. Different: a two-sided t test shows a difference; each comparison stands for "
-        "itself, so that a single “different” among many is weak. Inconclusive: neither. n for 80 %: participants who "
+        "itself, corrected for no other, so that a single “different” or “equivalent” among many is weak. "
+        "Inconclusive: neither. n for 80 %: participants who "
         "would show equivalence with 80 % power at this spread, if there were no difference."
         + (f" Without normality the smallest p is {p_value(least)}." if least is not None else "")
         + (
-            f" *: without normality it is decided otherwise ({disagree}); such an “equivalent” counts for nothing."
+            f" *: p with and without normality decide differently ({disagree}); equivalent is only what both show."
             if disagree
             else ""
         ),
@@ -305,7 +306,7 @@ def _again(found: BlockFound) -> Iterator[str]:
     )
     per = "per 100 ms of delay" if found.delays_ms else f"against {found.names[0]}"
     yield paragraph(
-        f"Effects of the mixed model: log odds of a higher answer {per}, Wald intervals; p by likelihood ratio. "
+        f"Effects of the mixed model: log odds of a higher answer {per}, 95 % Wald intervals; p by likelihood ratio. "
         + ("These p are not corrected and decide nothing." if again[0].correction == ALONE else ""),
         "soft",
     )

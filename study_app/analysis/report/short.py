@@ -92,7 +92,7 @@ def _mixed_up(found: BlockFound, results: Results) -> Iterator[str]:
 
 
 def _of_equivalence(found: BlockFound) -> Iterator[str]:
-    undecided = [one for one in found.against if one.found.verdict == "inconclusive"]
+    undecided = [one for one in found.against if one.verdict == "inconclusive"]
     if undecided:
         yield (
             f"{lead(found)}: {len(undecided)} of {len(found.against)} comparisons with {ms(undecided[0].control_ms)} "

@@ -1,0 +1,87 @@
+"""What is said of a delay: never more than every delay up to it allows, and equivalent only where all checks agree."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import pytest
+
+from study_app.analysis.decided import NOTHING
+from study_app.analysis.questions import Item, Setting
+from study_app.analysis.report.meaning import by_delay, meaning
+from study_app.analysis.report.short import limits
+from study_app.analysis.results import Against, BlockFound, Lowest
+from study_app.analysis.results import Results as Found
+from study_app.analysis.statistics.equivalence import tost
+from study_app.analysis.statistics.trend import step_down
+from study_app.analysis.tables import load_study
+from tests.analysis.conftest import Results
+
+CALM = [1, 1, 0, 0, -1] * 6
+AWAY = [3, 4, 3, 4, 3] * 6
+SCATTERED = [3, -3, 2, -2, 0]
+DOUBTED = [-1, 0, 0, 0, 0]
+"""By t equivalent (p = .008) within a point; by signs not (p = .062)."""
+
+
+def delays(differences: Mapping[float, list[int]], lowest: tuple[Lowest, ...] = ()) -> BlockFound:
+    """Return a block of delays in which answers to one statement differ so from those at 0 ms."""
+    at = (0.0, *differences)
+    return BlockFound(
+        id="delays",
+        title="Delays",
+        kind="delays",
+        revealed=True,
+        n=len(next(iter(differences.values()))),
+        settings=tuple(Setting(f"D{place}", f"delay_{ms:g}", "water", ms) for place, ms in enumerate(at)),
+        names=tuple(f"{ms:g} ms" for ms in at),
+        items=(Item("different", "It was different.", "Different"),),
+        labels=tuple("1234567"),
+        measures=(),
+        against=tuple(Against("different", ms, 0.0, tost(values, 1.0)) for ms, values in differences.items()),
+        lowest=lowest,
+    )
+
+
+def found(block: BlockFound) -> Found:
+    return Found(NOTHING, (), (block,), (), {}, None, 1)
+
+
+def claim(block: BlockFound) -> str:
+    return meaning(block, found(block))[-1]
+
+
+def test_a_difference_at_a_shorter_delay_speaks_against_the_longer_one() -> None:
+    assert "do not support" in claim(delays({50: SCATTERED, 100: SCATTERED}))
+    told = claim(delays({50: AWAY, 100: SCATTERED}))
+    assert "inconclusive for “Different”" in told
+    assert "speak against the sentence “delays up to 100 ms do not matter”" in told
+
+
+def test_a_trend_up_to_a_shorter_delay_speaks_against_the_longer_one() -> None:
+    steps = step_down([[1, 3, 5]] * 9, [0, 50, 100])
+    assert steps.lowest_ms == 50
+    told = claim(delays({50: SCATTERED, 100: SCATTERED}, (Lowest("different", steps),)))
+    assert "speak against the sentence" in told
+
+
+def test_what_only_t_calls_equivalent_is_told_as_inconclusive(rek: Results) -> None:
+    block = delays({50: DOUBTED})
+    assert block.against[0].found.verdict == "equivalent"
+    assert block.against[0].found.checks_agree is False
+    assert by_delay(block) == [["50 ms", "–", "–", "Different"]]
+    assert "inconclusive for “Different”" in claim(block)
+    assert "stay within the bound" not in claim(block)
+    rek.add("P001", lambda *_: 4)
+    assert any("1 of 1 comparisons" in line for line in limits(load_study(rek.folder), found(block)))
+
+
+def test_what_every_check_calls_equivalent_is_told_as_such() -> None:
+    told = claim(delays({50: CALM}))
+    assert "equivalent for “Different”" in told
+    assert "at 50 ms the mean answers to these statements stay within the bound" in told
+
+
+@pytest.mark.parametrize("level", [0, 2])
+def test_differences_without_spread_have_no_interval_and_say_why(level: int) -> None:
+    assert "no interval: all 5 differences are equal" in claim(delays({50: [level] * 5}))
