@@ -277,6 +277,16 @@ def test_a_missing_effect_shows_in_residuals_that_follow_one_another():
     assert widths[0] > 20 * widths[1]
 
 
+def test_a_sharp_turn_that_velocities_from_places_blur_is_doubted():
+    """The force is wrong for 25 ms at a turn: residuals follow one another little, but more than noise would."""
+    places = measured.centred(Motion(REVERSE.t_s, REVERSE.position_m))
+    force_n = noisy(TANK, REVERSE, 0.06)
+    blurred = fit(TANK, "tank", ["drag_coefficient"], places, force_n)
+    assert blurred.following < 0.5
+    assert any("blur sharp turns" in warning for warning in blurred.warnings)
+    assert fit(TANK, "tank", ["drag_coefficient"], REVERSE, force_n).warnings == ()
+
+
 # --- What may be fitted ----------------------------------------------------------------------------------------------
 
 

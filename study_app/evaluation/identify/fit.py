@@ -27,7 +27,9 @@ from study_app.haptics.scene import Scene
 CONFIDENCE: Final = 0.95
 ALIKE: Final = 0.95
 """Correlation of two estimates from which their parameters count as not told apart."""
-FOLLOWING: Final = 0.5
+FOLLOWING: Final = 0.1
+CHANCE: Final = 5.0
+"""Residuals count as following one another from this correlation on, and this many deviations from what noise has."""
 VAGUE: Final = 2.0
 _NO_EFFECT: Final = 1e-9
 _SINGULAR: Final = 1e-9
@@ -229,12 +231,12 @@ def _edge(problem: Problem, k: int, z: Floats) -> str:
 def _of_the_residuals(residual_n: Floats, force_n: Floats) -> Iterator[str]:
     """Yield what the residuals say against the model: noise does not remember."""
     rho = _following(residual_n)
-    if rho > FOLLOWING:
+    if rho > max(FOLLOWING, CHANCE / math.sqrt(residual_n.size)):
         share = _rms(residual_n) / _rms(force_n)
         yield (
             f"residuals, {100 * share:.1f} % of the force, follow one another (correlation {rho:.3f} from row to row): "
-            "the model misses something, or the sensor filters; intervals are widened for it, and hold only if the "
-            "model does"
+            "the model misses something, the sensor filters, or velocities from places blur sharp turns; intervals are "
+            "widened for it, and hold only if the model does"
         )
 
 
