@@ -38,6 +38,7 @@ def _measured(block: Block, code: str | None, delay_ms: float | None, rows: pd.D
         delay_ms=delay_ms,
         trials=len(rows),
         measured=len(errors),
+        judged=int(rows["valid"].notna().sum()),
         valid=int(rows["valid"].fillna(value=False).sum()),
         error_mean_ms=mean,
         error_worst_ms=float(errors.iloc[errors.abs().argmax()]) if len(errors) else None,

@@ -66,14 +66,15 @@ class Reached:
 class Performance:
     """All measures. ``trials`` of reaching count, of which ``recorded`` have a recording that was read.
 
-    ``unread`` says of the others why, a line each kind; ``invalid`` trials exceeded the protocol's limits of timing and
-    are in the measures all the same.
+    ``unread`` says of the others why, a line each kind. Of ``judged`` trials it is known whether they kept to the
+    protocol's limits of timing; ``invalid`` ones did not, and are in the measures all the same.
     """
 
     moved: tuple[Moved, ...]
     reached: tuple[Reached, ...]
     trials: int
     recorded: int
+    judged: int
     invalid: int
     unread: tuple[str, ...]
 
@@ -113,7 +114,7 @@ def performance(study: Study, each: Callable[[int, int], object] = lambda _done,
         else:
             found.append(one)
     moved = [*_of_trials(study, rows)]
-    whole = Performance((), tuple(found), 0, 0, 0, ())
+    whole = Performance((), tuple(found), 0, 0, 0, 0, ())
     for block in study.blocks:
         if tasks[block.id] is not None and found:
             for measure in OF_REACHES:
@@ -123,6 +124,7 @@ def performance(study: Study, each: Callable[[int, int], object] = lambda _done,
         reached=tuple(found),
         trials=len(reaching),
         recorded=len(found),
+        judged=int(rows["valid"].notna().sum()),
         invalid=int((~rows["valid"].fillna(value=True)).sum()),
         unread=tuple(f"{count} × {reason}" for reason, count in unread.items()),
     )

@@ -63,7 +63,7 @@ def _delivered(study: Study, results: Results) -> Iterator[str]:
                 _ms(one.error_mean_ms),
                 _ms(one.error_worst_ms),
                 _trials(one),
-                f"{one.valid} of {one.trials}",
+                f"{one.valid} of {one.judged}" if one.judged else "not measured",
             ]
             for one in results.delivered
         ],
@@ -184,6 +184,8 @@ def _recordings(measured: Performance) -> str:
     told = f"Reaches: from the recordings of {measured.recorded} of {measured.trials} trials of reaching"
     if measured.unread:
         told += f"; of the others: {'; '.join(measured.unread)}"
+    if not measured.judged:
+        return f"{told}. Whether trials kept to the protocol's limits of timing was not measured."
     invalid = (
         f" {counted(measured.invalid, 'trial').capitalize()} exceeded the protocol's limits of timing and "
         f"{'is' if measured.invalid == 1 else 'are'} in these numbers."
