@@ -18,7 +18,7 @@ from study_app.analysis.statistics.friedman import friedman
 from study_app.analysis.statistics.global_permutation import global_permutation
 from study_app.analysis.statistics.missing import skillings_mack
 from study_app.analysis.statistics.ordinal import ordinal
-from study_app.analysis.statistics.outcome import DRAWS, FEW, Outcome
+from study_app.analysis.statistics.outcome import DRAWS, FEW, Outcome, told
 from study_app.analysis.statistics.paired import paired
 from study_app.analysis.tables import Study
 
@@ -156,7 +156,7 @@ def _no_model(of: Asked) -> str:
     if of.k < 2:
         return "there is one setting"
     if of.n < FEW:
-        return f"with {of.n} participants, below {FEW}, its estimates and errors would not hold"
+        return f"with {told(of.n)}, below {FEW}, its estimates and errors would not hold"
     if of.n > MANY:
         return f"it is left out above {MANY} participants, where it takes minutes"
     return ""

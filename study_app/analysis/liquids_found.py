@@ -11,7 +11,7 @@ from study_app.analysis.answered import Asked, asked_again, compared, head, over
 from study_app.analysis.judging import HOLM, in_family, verdict
 from study_app.analysis.results import BlockFound, Named, Pair, Tested, Waiting
 from study_app.analysis.statistics.families import holm
-from study_app.analysis.statistics.outcome import Outcome
+from study_app.analysis.statistics.outcome import Outcome, told
 from study_app.analysis.statistics.paired import paired
 from study_app.analysis.statistics.recognition import MOST, named, recognition
 from study_app.analysis.tables import Study
@@ -44,7 +44,7 @@ def _pairs(of: Asked, omnibus: tuple[Tested, ...]) -> tuple[tuple[Pair, ...], tu
     if count * smallest > of.decided.alpha:
         corrected = min(1.0, count * smallest)
         why = (
-            f"{of.n} participants cannot show it: the smallest p that {of.n} pairs can give is {smallest:.4g}, after "
+            f"{told(of.n)} cannot show it: the smallest p that {told(of.n, 'pair')} can give is {smallest:.4g}, after "
             f"Holm's correction over {count} pairs {corrected:.4g}, which is above {of.decided.alpha:g}"
         )
         return (), (Waiting("comparison of two settings", why),)

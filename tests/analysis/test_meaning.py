@@ -73,7 +73,7 @@ def test_what_only_t_calls_equivalent_is_told_as_inconclusive(rek: Results) -> N
     assert "inconclusive for “Different”" in claim(block)
     assert "stay within the bound" not in claim(block)
     rek.add("P001", lambda *_: 4)
-    assert any("1 of 1 comparisons" in line for line in limits(load_study(rek.folder), found(block)))
+    assert any("inconclusive: 1 of 1 comparisons" in line for line in limits(load_study(rek.folder), found(block)))
 
 
 def test_what_every_check_calls_equivalent_is_told_as_such() -> None:

@@ -19,7 +19,7 @@ from study_app.analysis.report.writing import report
 from study_app.analysis.tables import load_study
 from study_app.cli import commands
 from study_app.errors import AnalysisError, StudyError
-from study_app.protocol.load import load
+from study_app.protocol.load import load, parse, source_bytes
 from tests.analysis.conftest import CANNOT_JUDGE, HIDDEN, Answer, Results, make_results, twelve
 
 FORBIDDEN = re.compile(
@@ -179,7 +179,10 @@ def test_one_participant_all_equal_and_missing_answers_give_a_report_that_says_s
     rek.add("P001", lambda _condition, _item: 4)
     rek.open()
     report(rek.folder, tmp_path / "one")
-    assert "1 participant" in read(tmp_path / "one")
+    alone = read(tmp_path / "one")
+    assert "about this person alone" in alone
+    assert "1 participants" not in alone
+    assert "1 pairs" not in alone
 
     def gaps(condition: str, item: str) -> Answer:
         return None if (condition, item) in (("honey", "immersive"), ("delay_50", "harder")) else 4
@@ -190,7 +193,40 @@ def test_one_participant_all_equal_and_missing_answers_give_a_report_that_says_s
     told = read(tmp_path / "equal")
     assert "not tested (no variation: every participant answered alike under all settings)" in told
     assert "Skillings-Mack" in told
+    assert "Effects of the mixed model" not in told
     numbers(tmp_path / "equal")
+
+
+def test_primary_and_exploratory_statements_are_told_apart_in_the_methods(tmp_path: Path) -> None:
+    text = (
+        source_bytes("rek2024").decode().replace("\n[analysis]\n", '\n[analysis]\nprimary = ["immersive", "harder"]\n')
+    )
+    results = twelve(make_results(tmp_path / "some", parse(text.encode(), "rek2024.toml")), people=5)
+    results.open()
+    report(results.folder, tmp_path / "report")
+    told = (tmp_path / "report" / "methods.txt").read_text(encoding="utf-8")
+    both = "p adjusted over 1 statement by Holm (primary) and over {} statements by Benjamini-Hochberg (exploratory)"
+    assert both.format("eight") in told
+    assert both.format("four") in told
+
+
+@pytest.mark.parametrize(
+    ("valid", "within", "told"),
+    [
+        (None, "not measured", "Whether trials kept to the protocol's limits of timing was not measured."),
+        (True, "1 of 1", "No trial that counts exceeded the protocol's limits of timing."),
+        (False, "0 of 1", "Ten trials exceeded the protocol's limits of timing and are in these numbers."),
+    ],
+)
+def test_what_was_not_measured_is_neither_within_limits_nor_beyond(
+    rek: Results, tmp_path: Path, valid: bool | None, within: str, told: str
+) -> None:
+    rek.add("P001", lambda *_: 4, changes={"valid": valid})
+    rek.open()
+    report(rek.folder, tmp_path / "report")
+    page = read(tmp_path / "report")
+    assert told in page
+    assert f" {within} " in page
 
 
 def test_answers_off_the_scale_are_missing_and_never_neutral(small: Results, tmp_path: Path) -> None:

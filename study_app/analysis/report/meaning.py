@@ -7,7 +7,6 @@ from typing import Final
 
 from study_app.analysis.report.words import counted, interval, listed, ms, number, short
 from study_app.analysis.results import Against, BlockFound, Delivered, Results
-from study_app.analysis.statistics.equivalence import Equivalence
 
 VERDICTS: Final = ("equivalent", "different", "inconclusive")
 
@@ -98,16 +97,18 @@ def _as_claim(found: BlockFound, delay_ms: float) -> Iterator[str]:
 def _by_verdict(found: BlockFound, here: list[Against]) -> str:
     parts = []
     for verdict in VERDICTS:
-        told = [f"“{short(found, one.item)}” ({_difference(one.found)})" for one in here if one.verdict == verdict]
+        told = [f"“{short(found, one.item)}” ({_difference(one)})" for one in here if one.verdict == verdict]
         if told:
             parts.append(f"{verdict} for {listed(told)}")
     return "; ".join(parts) + "."
 
 
-def _difference(found: Equivalence) -> str:
+def _difference(one: Against) -> str:
+    found = one.found
+    doubted = ", but not without normality" if one.verdict != found.verdict else ""
     if found.interval is None:
         return f"{number(found.effect)}, no interval: {found.no_interval}"
-    return f"{number(found.effect)}, {100 * found.interval.level:.0f} % interval {interval(found.interval)}"
+    return f"{number(found.effect)}, {100 * found.interval.level:.0f} % interval {interval(found.interval)}{doubted}"
 
 
 def _needed(here: list[Against]) -> str:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from study_app import __version__
 from study_app.analysis.measures import QUARTILES
 from study_app.analysis.report.words import counted, listed, number, settings_noun, test_name
-from study_app.analysis.results import BlockFound, Results
+from study_app.analysis.results import BlockFound, Results, Tested
 from study_app.analysis.tables import Study
 
 
@@ -76,8 +76,7 @@ def _liquids(found: BlockFound) -> Iterator[str]:
         one = found.omnibus[0]
         yield (
             f"Each statement was tested by {test_name(one.outcome)} ({one.outcome.method}), with "
-            f"{one.outcome.effect_name} as the effect, p adjusted over {counted(one.members, 'statement')} by "
-            f"{one.correction}."
+            f"{one.outcome.effect_name} as the effect, {_families(found.omnibus)}."
         )
     if found.pairs:
         yield (
@@ -92,6 +91,17 @@ def _liquids(found: BlockFound) -> Iterator[str]:
         )
 
 
+def _families(tests: Sequence[Tested]) -> str:
+    """Return what is corrected together: primary statements, and apart from them the exploratory ones."""
+    families = sorted({(not one.primary, one.members, one.correction) for one in tests})
+    told = [
+        f"over {counted(members, 'statement')} by {correction}"
+        + ("" if len(families) == 1 else " (exploratory)" if exploratory else " (primary)")
+        for exploratory, members, correction in families
+    ]
+    return f"p adjusted {listed(told)}"
+
+
 def _delays(found: BlockFound, results: Results) -> Iterator[str]:
     if not found.delays_ms:
         yield from _liquids(found)
@@ -100,7 +110,7 @@ def _delays(found: BlockFound, results: Results) -> Iterator[str]:
         one = found.trends[0]
         yield (
             f"Trends over the delay were tested by Page's L ({one.outcome.method.split(',')[0]}), one-sided in the "
-            f"direction stated beforehand, p adjusted over {counted(one.members, 'statement')} by {one.correction}; "
+            f"direction stated beforehand, {_families(found.trends)}; "
             "where a trend showed, the longest delay was dropped and the test repeated until it no longer did, which "
             "gives an upper bound of the lowest delay that is noticed (the error rate holds for each statement)."
         )
@@ -135,7 +145,10 @@ def _common(results: Results, blocks: list[BlockFound]) -> Iterator[str]:
             "(adaptive quadrature, likelihood ratio)."
         )
     again = " and Skillings and Mack's test uses those who missed some" if any(f.incomplete for f in blocks) else ""
-    yield (f"Missing answers were never replaced; tests use participants who answered under all settings{again}.")
+    yield (
+        "Missing answers were never replaced; tests over several settings use participants who answered under all of "
+        f"them, comparisons of two those who answered under both{again}."
+    )
     measured = results.performance
     if measured is not None and measured.recorded:
         yield (

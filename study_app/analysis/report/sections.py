@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from study_app.analysis.judging import ALONE
 from study_app.analysis.report.meaning import by_delay, meaning, tempting_ms
 from study_app.analysis.report.page import box, bullets, heading, paragraph, picture, table
 from study_app.analysis.report.pictures import Picture
@@ -23,8 +22,9 @@ from study_app.analysis.report.words import (
     statistic,
     test_name,
 )
-from study_app.analysis.results import BlockFound, Results, Tested
+from study_app.analysis.results import BlockFound, Pair, Results, Tested
 from study_app.analysis.statistics.ordinal import Ordinal
+from study_app.analysis.statistics.paired import Paired
 
 AGAINST = (
     *("Statement", "Delay", "n", "difference", "interval", "p equivalent", "p without normality", "n for 80 %"),
@@ -126,7 +126,7 @@ def _pairs(found: BlockFound) -> Iterator[str]:
             [
                 short(found, one.tested.item),
                 f"{name(found, one.first)} – {name(found, one.second)}",
-                str(one.tested.outcome.n),
+                _pairs_used(one),
                 number(one.tested.outcome.statistic, 1),
                 p_value(one.tested.outcome.p),
                 p_value(one.tested.p_adjusted),
@@ -146,6 +146,13 @@ def _pairs(found: BlockFound) -> Iterator[str]:
         "Intervals: 95 %, Fisher z, which cover about 90 % up to two dozen pairs.",
         "soft",
     )
+
+
+def _pairs_used(pair: Pair) -> str:
+    """Return how many pairs there are and how many of them differ, which alone are tested."""
+    outcome = pair.tested.outcome
+    equal = outcome.zeros if isinstance(outcome, Paired) else 0
+    return f"{outcome.n} ({outcome.n - equal} differ)"
 
 
 def _recognition(found: BlockFound, pictures: Mapping[str, Picture]) -> Iterator[str]:
@@ -304,12 +311,14 @@ def _again(found: BlockFound) -> Iterator[str]:
         words=2,
         last=1,
     )
-    per = "per 100 ms of delay" if found.delays_ms else f"against {found.names[0]}"
-    yield paragraph(
-        f"Effects of the mixed model: log odds of a higher answer {per}, 95 % Wald intervals; p by likelihood ratio. "
-        + ("These p are not corrected and decide nothing." if again[0].correction == ALONE else ""),
-        "soft",
-    )
+    effects = ""
+    if found.mixed:
+        per = "per 100 ms of delay" if found.delays_ms else f"against {found.names[0]}"
+        effects = (
+            f"Effects of the mixed model: log odds of a higher answer {per}, 95 % Wald intervals; p by likelihood "
+            "ratio. "
+        )
+    yield paragraph(f"{effects}These p are not corrected and decide nothing.", "soft")
 
 
 def _effects(found: BlockFound, one: Tested) -> tuple[str, str]:

@@ -69,6 +69,8 @@ def _in_general(study: Study, results: Results) -> Iterator[str]:
             "Not all sessions were run under the same decisions about the analysis: everything found is exploratory; "
             "the first session's decisions are used."
         )
+    if study.n == 1:
+        yield "One participant: whatever is shown is about this person alone, and says nothing about anybody else."
     if study.n < FEW:
         people = counted(study.n, "participant")
         yield (
@@ -95,8 +97,8 @@ def _of_equivalence(found: BlockFound) -> Iterator[str]:
     undecided = [one for one in found.against if one.verdict == "inconclusive"]
     if undecided:
         yield (
-            f"{lead(found)}: {len(undecided)} of {len(found.against)} comparisons with {ms(undecided[0].control_ms)} "
-            "are inconclusive: they show neither a difference nor that it stays within the bound."
+            f"{lead(found)}: inconclusive: {len(undecided)} of {len(found.against)} comparisons with "
+            f"{ms(undecided[0].control_ms)}, which show neither a difference nor that it stays within the bound."
         )
 
 
@@ -129,7 +131,7 @@ def _shown(found: BlockFound, tests: tuple[Tested, ...]) -> str:
 
 
 def _with_p(found: BlockFound, one: Tested) -> str:
-    p = p_equals(one.p_adjusted) if one.p_adjusted is not None else ""
+    p = f"adjusted {p_equals(one.p_adjusted)}" if one.p_adjusted is not None else ""
     return f"“{short(found, one.item)}” ({p})"
 
 
@@ -166,7 +168,7 @@ def _delays(found: BlockFound) -> Iterator[str]:
     ]
     if lowest:
         yield (
-            f"{lead(found)}: the lowest delay at which {found.n} participants suffice to show a trend: "
+            f"{lead(found)}: the lowest delay at which {_used(found)} suffice to show a trend: "
             f"{listed(lowest)}. Each is an upper bound: shorter delays may be noticed too."
         )
     threshold = found.threshold
@@ -177,6 +179,12 @@ def _delays(found: BlockFound) -> Iterator[str]:
             f"{threshold.no_interval or threshold.note}."
         )
     yield from _equivalent(found)
+
+
+def _used(found: BlockFound) -> str:
+    """Return of how many participants, all whose answers are complete, the lowest delays are."""
+    used = {one.steps.steps[0].page.n for one in found.lowest}
+    return counted(max(used), "participant") if len(used) == 1 else f"{min(used)} to {max(used)} participants"
 
 
 def _equivalent(found: BlockFound) -> Iterator[str]:
@@ -190,6 +198,6 @@ def _equivalent(found: BlockFound) -> Iterator[str]:
         if delay is not None
     ]
     if up_to:
-        yield f"{lead(found)}: answers as at {control}, {within}, are shown for {listed(up_to)}."
+        yield f"{lead(found)}: mean answers as at {control}, {within}, are shown for {listed(up_to)}."
     else:
-        yield f"{lead(found)}: in no statement are answers as at {control}, {within}, shown at even the next delay."
+        yield f"{lead(found)}: in no statement are mean answers as at {control}, {within}, shown even at the next."

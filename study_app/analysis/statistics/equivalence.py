@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import t as t_distribution
 
-from study_app.analysis.statistics.outcome import DRAWS, Array, Interval, Outcome, checked
+from study_app.analysis.statistics.outcome import DRAWS, Array, Interval, Outcome, checked, told
 from study_app.analysis.statistics.paired import signed, signed_p
 from study_app.errors import AnalysisError
 
@@ -139,7 +139,7 @@ def _note(p: float, p_different: float, alpha: float) -> str:
 def _without_spread(kept: Array, dropped: int, bound: float, alpha: float) -> Equivalence:
     """Return what can be said of fewer than two participants or of equal differences: no spread, no test."""
     n = len(kept)
-    reason = f"all {n} differences are equal: no spread to judge by" if n > 1 else f"{n} participants: no spread"
+    reason = f"all {n} differences are equal: no spread to judge by" if n > 1 else f"{told(n)}: no spread"
     return Equivalence(
         test="equivalence, two one-sided t tests",
         n=n,

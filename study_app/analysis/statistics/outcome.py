@@ -109,6 +109,11 @@ def complete(values: ArrayLike, *, at_least: int, why: str) -> tuple[Array, int]
     return array[whole], int((~whole).sum())
 
 
+def told(count: int, noun: str = "participant") -> str:
+    """Return "1 participant", "5 participants"."""
+    return f"{count} {noun}" + ("" if count == 1 else "s")
+
+
 def resamples(n: int, seed: int) -> Iterator[Whole]:
     """Yield ``SAMPLES`` draws of n of n participants with replacement, in tables (draws, n) of bounded size."""
     rng = np.random.default_rng(seed)

@@ -30,6 +30,7 @@ from study_app.analysis.statistics.outcome import (
     complete,
     percentiles,
     resamples,
+    told,
 )
 from study_app.errors import AnalysisError
 
@@ -180,11 +181,11 @@ def step_down(
 def _note(first: Step, lowest: float | None) -> str:
     if lowest is None:
         return (
-            f"no trend was shown up to {first.longest_ms:g} ms with {first.page.n} participants; "
+            f"no trend was shown up to {first.longest_ms:g} ms with {told(first.page.n)}; "
             "that is not evidence that there is none"
         )
     return (
-        f"{lowest:g} ms is an upper bound: the lowest delay at which {first.page.n} participants suffice to show a "
+        f"{lowest:g} ms is an upper bound: the lowest delay at which {told(first.page.n)} suffice to show a "
         "trend; shorter delays may be noticed too"
     )
 
