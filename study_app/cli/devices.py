@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from study_app.devices.falcon.calibration import Calibration
     from study_app.devices.falcon.device import FalconDevice
     from study_app.devices.falcon.doctor import Examined
-    from study_app.devices.falcon.emulator import Emulator
+    from study_app.devices.falcon.emulator.face import Emulator
     from study_app.devices.falcon.weighing import Ask, Notes
 
 _WIDTH = 100
@@ -146,7 +146,7 @@ def _falcon(name: str, firmware: Path | None, grams: float | None) -> tuple[Falc
     from study_app.devices import kind_of
     from study_app.devices.falcon.device import FalconDevice
     from study_app.devices.falcon.emulated import EmulatedFalcon
-    from study_app.devices.falcon.emulator import Emulator
+    from study_app.devices.falcon.emulator.face import Emulator
     from study_app.errors import DeviceError
 
     kind = kind_of(name)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import click
 
 if TYPE_CHECKING:
-    from study_app.devices.falcon.emulator import Emulator
+    from study_app.devices.falcon.emulator.face import Emulator
 
 
 @click.command("emulate-falcon")
@@ -33,8 +33,8 @@ def emulate_falcon(
     study_app/devices/falcon/framing.py describes; --device falcon-socket:PATH puts our own driver there.
     Lights, homing and torques are printed as they change, on a terminal only.
     """
-    from study_app.devices.falcon.emulator import Emulator
-    from study_app.devices.falcon.emulator_server import EmulatorServer
+    from study_app.devices.falcon.emulator.face import Emulator
+    from study_app.devices.falcon.emulator.server import EmulatorServer
     from study_app.devices.falcon.geometry import DEFAULT_GEOMETRY
 
     random = Random(seed)  # noqa: S311 - tremor and faults keep no secrets

@@ -17,7 +17,7 @@ def hid(*models):
 
 
 def bus(*emulators):
-    from study_app.devices.falcon.emulator_backend import EmulatedBackend
+    from study_app.devices.falcon.emulator.backend import EmulatedBackend
 
     return EmulatedBackend(*emulators)
 
@@ -43,7 +43,7 @@ def test_without_hardware_each_says_what_is_missing():
 
 
 def test_what_is_connected_is_named():
-    from study_app.devices.falcon.emulator import Emulator
+    from study_app.devices.falcon.emulator.face import Emulator
 
     listed = by_name(usb=bus(Emulator(serial="FT1"), Emulator(serial="FT2")), hid=hid(MODELS[1], MODELS[1]))
     assert listed["falcon", "libusb"].state == "connected: FT1, FT2"
@@ -55,7 +55,7 @@ def test_what_is_connected_is_named():
     ("platform", "words"), [("linux", "this account"), ("win32", "driver"), ("darwin", "driver of FTDI")]
 )
 def test_one_that_does_not_tell_its_number_says_why_that_may_be(platform, words):
-    from study_app.devices.falcon.emulator import Emulator
+    from study_app.devices.falcon.emulator.face import Emulator
 
     emulator = Emulator()
     emulator.faults.on("access_denied")

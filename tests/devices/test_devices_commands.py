@@ -19,7 +19,7 @@ from study_app.devices import list_devices
 from study_app.devices.falcon.calibration import calibration_file, load
 from study_app.devices.falcon.diagnosis import MODES, UDEV_RULE
 from study_app.devices.falcon.doctor import examine
-from study_app.devices.falcon.emulator import Emulator
+from study_app.devices.falcon.emulator.face import Emulator
 
 
 def liquid_study(*words, **options):
@@ -89,7 +89,7 @@ class TestDoctor:
 @pytest.mark.skipif(os.name == "nt", reason="no Unix sockets")
 class TestDoctorOverASocket:
     def serving(self, tmp_path, *faults):
-        from study_app.devices.falcon.emulator_server import EmulatorServer
+        from study_app.devices.falcon.emulator.server import EmulatorServer
 
         emulator = Emulator(running=True)
         for fault in faults:
@@ -157,7 +157,7 @@ class TestCalibrate:
 
     @pytest.mark.skipif(os.name == "nt", reason="no Unix sockets")
     def test_an_operator_who_goes_away_ends_it_without_torque(self, tmp_path):
-        from study_app.devices.falcon.emulator_server import EmulatorServer
+        from study_app.devices.falcon.emulator.server import EmulatorServer
 
         emulator = Emulator(running=True)
         with EmulatorServer(emulator, tmp_path / "falcon"):

@@ -19,7 +19,7 @@ from study_app.devices import kind_of
 from study_app.devices.falcon.device import FalconDevice
 from study_app.devices.falcon.diagnosis import ALL_HOMED, OPEN, Facts
 from study_app.devices.falcon.emulated import EmulatedFalcon, new_emulator
-from study_app.devices.falcon.emulator import Emulator
+from study_app.devices.falcon.emulator.face import Emulator
 from study_app.devices.falcon.failures import FalconFailure, UsbFailure
 from study_app.devices.falcon.geometry import WORKSPACE_M
 from study_app.devices.falcon.transport import find_falcons

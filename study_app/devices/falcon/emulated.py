@@ -12,8 +12,8 @@ from random import Random
 from typing import Any
 
 from study_app.devices.falcon.device import FORCE_LIMIT_N, FalconDevice
-from study_app.devices.falcon.emulator import Emulator
-from study_app.devices.falcon.emulator_backend import EmulatedBackend
+from study_app.devices.falcon.emulator.backend import EmulatedBackend
+from study_app.devices.falcon.emulator.face import Emulator
 from study_app.devices.falcon.geometry import WORKSPACE_M
 from study_app.devices.falcon.transport import PyUsbTransport, Transport
 

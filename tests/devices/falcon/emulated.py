@@ -1,7 +1,7 @@
 """How tests talk to an emulated Falcon without any of the driver's code."""
 
 from study_app.devices.falcon import wire
-from study_app.devices.falcon.emulator import Emulator
+from study_app.devices.falcon.emulator.face import Emulator
 
 MS = 1_000_000
 HOMING = wire.FLAG_HOMING

@@ -11,7 +11,7 @@ if numba.config.DISABLE_JIT:
     pytest.skip("emulators are C functions", allow_module_level=True)
 
 from study_app.devices.falcon import wire
-from study_app.devices.falcon.emulator_backend import EmulatedBackend
+from study_app.devices.falcon.emulator.backend import EmulatedBackend
 from tests.devices.falcon.emulated import packet, still, stripped
 
 

@@ -18,8 +18,8 @@ from study_app.devices.falcon.boot import (
     measure_round_trip,
     set_event_character,
 )
-from study_app.devices.falcon.emulator import ALL_HOMED, Emulator
-from study_app.devices.falcon.emulator_backend import EmulatedBackend
+from study_app.devices.falcon.emulator.backend import EmulatedBackend
+from study_app.devices.falcon.emulator.face import ALL_HOMED, Emulator
 from study_app.devices.falcon.failures import FalconLost, FalconNotFound, UsbFailure, usb_failure
 from study_app.devices.falcon.transport import PyUsbTransport
 from study_app.errors import DeviceError

@@ -15,7 +15,7 @@ from study_app.devices.falcon import calibration, firmware, wire
 from study_app.devices.falcon import device as driver
 from study_app.devices.falcon.calibration import Calibration
 from study_app.devices.falcon.emulated import EmulatedFalcon
-from study_app.devices.falcon.emulator import Emulator
+from study_app.devices.falcon.emulator.face import Emulator
 from study_app.devices.falcon.failures import FalconLost, UsbFailure
 from study_app.devices.falcon.geometry import GEOMETRIES, SAFE_BOX_M
 from study_app.devices.falcon.homing import PULL_OUT, READY, STROKES, NotHomed

@@ -11,8 +11,8 @@ if numba.config.DISABLE_JIT:
 from study_app.devices.falcon.diagnosis import BY_ID, MODES, OPEN, UDEV_RULE, Facts, diagnose, sentence
 from study_app.devices.falcon.doctor import examine, ftdi_sees
 from study_app.devices.falcon.emulated import EmulatedFalcon
-from study_app.devices.falcon.emulator import Emulator
-from study_app.devices.falcon.emulator_faults import CHANCES, SWITCHES
+from study_app.devices.falcon.emulator.face import Emulator
+from study_app.devices.falcon.emulator.faults import CHANCES, SWITCHES
 from study_app.devices.falcon.failures import FalconFailure, UsbFailure
 from study_app.devices.falcon.homing import PULL_OUT, NotHomed
 from study_app.errors import DeviceError, DeviceLost, ServoFault

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from study_app.devices.falcon.emulator_arm import ARMS, bend, count, set_arms, strain
+from study_app.devices.falcon.emulator.arm import ARMS, bend, count, set_arms, strain
 from study_app.devices.falcon.geometry import GEOMETRIES
 from study_app.devices.falcon.kinematics import REACHED, inverse, jacobian, motor_units, new_mechanism, torques
 from study_app.haptics.layout import records

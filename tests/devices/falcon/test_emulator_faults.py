@@ -6,7 +6,7 @@ import pytest
 if numba.config.DISABLE_JIT:
     pytest.skip("emulators are C functions", allow_module_level=True)
 
-from study_app.devices.falcon.emulator_faults import CHANCES, SWITCHES
+from study_app.devices.falcon.emulator.faults import CHANCES, SWITCHES
 from study_app.errors import DeviceError
 from tests.devices.falcon.emulated import HOMING, at_work, counts_in, exchanged, home, packet, still, stripped
 

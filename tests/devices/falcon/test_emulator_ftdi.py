@@ -8,7 +8,7 @@ if numba.config.DISABLE_JIT:
     pytest.skip("emulators are C functions", allow_module_level=True)
 
 from study_app.devices.falcon import wire
-from study_app.devices.falcon.emulator_ftdi import byte_ns
+from study_app.devices.falcon.emulator.ftdi import byte_ns
 from tests.devices.falcon.emulated import MS, at_work, exchanged, packet, still, stripped
 
 STATUS = b"\x01\x60"

@@ -9,7 +9,7 @@ import pytest
 if numba.config.DISABLE_JIT:
     pytest.skip("emulators are C functions", allow_module_level=True)
 
-from study_app.devices.falcon.emulator import STOPS_M
+from study_app.devices.falcon.emulator.face import STOPS_M
 from study_app.devices.falcon.geometry import GEOMETRIES, WORKSPACE_M
 from tests.devices.falcon.emulated import at_work, exchanged, home
 from tests.devices.falcon.test_emulator_arm import closed_form

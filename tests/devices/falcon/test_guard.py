@@ -248,8 +248,8 @@ def test_a_guard_loads_nothing_from_the_folder_it_is_started_in(tmp_path, monkey
 @compiled
 def test_an_emulated_falcon_pushes_on_when_its_program_is_killed_and_not_when_it_was_guarded(tmp_path):
     from study_app.devices.falcon.boot import configure
-    from study_app.devices.falcon.emulator import Emulator
-    from study_app.devices.falcon.emulator_server import EmulatorServer
+    from study_app.devices.falcon.emulator.face import Emulator
+    from study_app.devices.falcon.emulator.server import EmulatorServer
 
     emulator = warm(Emulator(tremor_m=0.0, running=True))
     with EmulatorServer(emulator, tmp_path / "falcon") as server:

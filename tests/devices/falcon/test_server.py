@@ -20,7 +20,7 @@ if not hasattr(socket, "AF_UNIX"):
 
 from study_app.cli.falcon import state_of
 from study_app.devices.falcon import wire
-from study_app.devices.falcon.emulator_server import EmulatorServer
+from study_app.devices.falcon.emulator.server import EmulatorServer
 from study_app.errors import DeviceError
 from tests.devices.falcon.emulated import HOMING, packet, still
 

@@ -12,8 +12,8 @@ if numba.config.DISABLE_JIT:
     pytest.skip("devices are C functions", allow_module_level=True)
 
 from study_app.devices import open_device
-from study_app.devices.falcon.emulator import Emulator
-from study_app.devices.falcon.emulator_server import EmulatorServer
+from study_app.devices.falcon.emulator.face import Emulator
+from study_app.devices.falcon.emulator.server import EmulatorServer
 from study_app.devices.falcon.homing import PULL_OUT, READY, STROKES
 from study_app.haptics.clock import VirtualClock
 from study_app.haptics.servo import Servo

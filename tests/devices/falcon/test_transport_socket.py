@@ -225,8 +225,8 @@ def test_a_read_of_other_than_whole_packets_is_refused(server, path):
 @compiled
 def test_an_emulated_falcon_is_booted_and_answers_through_its_socket(path):
     from study_app.devices.falcon.boot import boot, configure, is_running, measure_round_trip, set_event_character
-    from study_app.devices.falcon.emulator import Emulator
-    from study_app.devices.falcon.emulator_server import EmulatorServer
+    from study_app.devices.falcon.emulator.face import Emulator
+    from study_app.devices.falcon.emulator.server import EmulatorServer
     from tests.devices.falcon.test_firmware import stream
 
     emulator = warm(Emulator(tremor_m=0.0, serial="S17"))

@@ -10,7 +10,7 @@ if numba.config.DISABLE_JIT:
 
 from study_app.devices.falcon.calibration import fit, left_over
 from study_app.devices.falcon.emulated import EmulatedFalcon
-from study_app.devices.falcon.emulator import Emulator
+from study_app.devices.falcon.emulator.face import Emulator
 from study_app.devices.falcon.geometry import GEOMETRIES
 from study_app.devices.falcon.weighing import GRAVITY_MPS2, PLACES_M, Grip, hang, pull
 from study_app.errors import DeviceError, DeviceLost

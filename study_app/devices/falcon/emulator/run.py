@@ -12,8 +12,8 @@ from typing import Any, Final
 import numpy as np
 
 from study_app.devices.falcon import wire
-from study_app.devices.falcon.emulator_arm import count, stop, strain
-from study_app.devices.falcon.emulator_faults import (
+from study_app.devices.falcon.emulator.arm import count, stop, strain
+from study_app.devices.falcon.emulator.faults import (
     CORRUPT,
     DELAY,
     DROP,
@@ -23,7 +23,7 @@ from study_app.devices.falcon.emulator_faults import (
     draw,
     strikes,
 )
-from study_app.devices.falcon.emulator_ftdi import answer
+from study_app.devices.falcon.emulator.ftdi import answer
 from study_app.devices.hand import REACH, move_hand
 from study_app.haptics.compiled import kernel
 from study_app.haptics.plant import move, push

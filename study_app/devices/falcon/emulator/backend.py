@@ -17,7 +17,7 @@ import usb.core  # type: ignore[import-untyped]
 
 from study_app.devices.falcon import wire
 from study_app.devices.falcon.bulk import BulkCalls
-from study_app.devices.falcon.emulator import Emulator
+from study_app.devices.falcon.emulator.face import Emulator
 
 _STRINGS: Final = {1: "Novint", 2: wire.PRODUCT}
 _SERIAL_STRING: Final = 3

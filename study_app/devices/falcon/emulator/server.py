@@ -20,7 +20,7 @@ from typing import Final, Self
 import numpy as np
 
 from study_app.devices.falcon import wire
-from study_app.devices.falcon.emulator import Emulator
+from study_app.devices.falcon.emulator.face import Emulator
 from study_app.devices.falcon.framing import ANSWER, BULK_IN, BULK_OUT, CONTROL, DESCRIPTOR, IDENTITY, REQUEST
 from study_app.errors import DeviceError
 

@@ -1,7 +1,7 @@
 """An emulated Falcon: the USB bridge, the boot loader, the program it runs, its arms, and the hand that holds the grip.
 
 In front of it is one C function of the signature of ``libusb_bulk_transfer`` (``bulk``), whose handle is the address of
-the emulator's memory, and the bridge's control requests. Everything happens in emulated time (``emulator_ftdi``) and
+the emulator's memory, and the bridge's control requests. Everything happens in emulated time (``ftdi``) and
 depends on nothing but what it is told and the ``random`` it was made with.
 """
 
@@ -14,11 +14,11 @@ import numpy as np
 
 from study_app.devices.falcon import wire
 from study_app.devices.falcon.bulk import BulkCalls
-from study_app.devices.falcon.emulator_arm import set_arms
-from study_app.devices.falcon.emulator_boot import RUNNING
-from study_app.devices.falcon.emulator_faults import POWER_OFF, Faults, spelt
-from study_app.devices.falcon.emulator_ftdi import power_up
-from study_app.devices.falcon.emulator_host import (
+from study_app.devices.falcon.emulator.arm import set_arms
+from study_app.devices.falcon.emulator.boot import RUNNING
+from study_app.devices.falcon.emulator.faults import POWER_OFF, Faults, spelt
+from study_app.devices.falcon.emulator.ftdi import power_up
+from study_app.devices.falcon.emulator.host import (
     EMULATOR,
     bulk,
     control,

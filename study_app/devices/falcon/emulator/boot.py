@@ -12,8 +12,8 @@ from typing import Any, Final
 import numpy as np
 
 from study_app.devices.falcon import wire
-from study_app.devices.falcon.emulator_faults import ECHO, strikes
-from study_app.devices.falcon.emulator_ftdi import answer
+from study_app.devices.falcon.emulator.faults import ECHO, strikes
+from study_app.devices.falcon.emulator.ftdi import answer
 from study_app.haptics.compiled import kernel
 
 WAITING, RESET, PINGED, LOADING, STUCK, RUNNING = range(6)

@@ -10,14 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from study_app.devices.falcon import emulator_ftdi as ftdi
 from study_app.devices.falcon import wire
 from study_app.devices.falcon.bulk import BULK
-from study_app.devices.falcon.emulator_arm import ARMS, bend, count, strain
-from study_app.devices.falcon.emulator_boot import LOADER, RUNNING, WAITING, load, reset
-from study_app.devices.falcon.emulator_faults import FAULTS, draw
-from study_app.devices.falcon.emulator_ftdi import BRIDGE, OUT_RING, byte_at
-from study_app.devices.falcon.emulator_run import LONGEST_NS, RUN, live, work
+from study_app.devices.falcon.emulator import ftdi
+from study_app.devices.falcon.emulator.arm import ARMS, bend, count, strain
+from study_app.devices.falcon.emulator.boot import LOADER, RUNNING, WAITING, load, reset
+from study_app.devices.falcon.emulator.faults import FAULTS, draw
+from study_app.devices.falcon.emulator.ftdi import BRIDGE, OUT_RING, byte_at
+from study_app.devices.falcon.emulator.run import LONGEST_NS, RUN, live, work
 from study_app.devices.hand import HAND
 from study_app.haptics.cfunctions import c_function, record_at
 from study_app.haptics.compiled import kernel
