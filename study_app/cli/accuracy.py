@@ -33,7 +33,7 @@ def accuracy(scene: str | None, liquid: str | None, path: str, to: Path | None) 
     from study_app.evaluation.accuracy.files import markdown
     from study_app.evaluation.accuracy.files import write as write_all
     from study_app.evaluation.accuracy.race import accuracy as measure
-    from study_app.evaluation.soaked import make_folder
+    from study_app.evaluation.output import make_folder
 
     numerical, physical, notes = _subjects(scene, liquid)
     one = numerical or physical

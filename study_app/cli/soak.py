@@ -24,8 +24,8 @@ def soak(context: click.Context, hours: float, protocol: str, seed: int, to: Pat
 
     Ctrl+C ends it with the report so far.
     """
-    from study_app.evaluation.soak import soak as soak_servo
-    from study_app.evaluation.soaked import make_folder
+    from study_app.evaluation.output import make_folder
+    from study_app.evaluation.soak.run import soak as soak_servo
     from study_app.protocol.load import load_scenes
 
     scenes = load_scenes(protocol)

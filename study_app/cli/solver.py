@@ -26,7 +26,7 @@ def cfd(to: Path | None, *, solve: bool) -> None:
     from study_app.evaluation.cfd.fitted import fit_all
     from study_app.evaluation.cfd.solve import solve as solve_all
     from study_app.evaluation.cfd.tables import steady, stored
-    from study_app.evaluation.soaked import make_folder
+    from study_app.evaluation.output import make_folder
 
     if solve and to is None:
         raise click.UsageError("--solve needs --to: the folder for the solver's tables")

@@ -12,7 +12,7 @@ import click
 from study_app.cli.words import EXIT_FOUND
 
 if TYPE_CHECKING:
-    from study_app.evaluation.stability_verdict import Verdict
+    from study_app.evaluation.stability.verdict import Verdict
 
 
 @click.command()
@@ -31,10 +31,10 @@ def stability(to: Path | None, line: str | None, table: Path | None, seed: str, 
     Each has a liquid, a scale, a rate, a delay, an estimator, a device and a hand. Ends with 3 if one is unstable with
     safety on.
     """
-    from study_app.evaluation import stability as found
-    from study_app.evaluation.stability_cases import parse, some, sweep
-    from study_app.evaluation.stability_fidelity import fidelities
-    from study_app.evaluation.stability_verdict import judge
+    from study_app.evaluation.stability import sweep as found
+    from study_app.evaluation.stability.cases import parse, some, sweep
+    from study_app.evaluation.stability.fidelity import fidelities
+    from study_app.evaluation.stability.verdict import judge
 
     if line is not None:
         case = parse(line)

@@ -1,1 +1,1 @@
-"""The force model under test: references, cost, stability."""
+"""The force model under test: what accuracy costs in time, where it stays stable, and what a liquid is."""

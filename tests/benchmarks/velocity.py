@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from study_app.evaluation.cost import measure
-from study_app.evaluation.stability_boundary import boundary_nspm
+from study_app.evaluation.stability.boundary import boundary_nspm
 from study_app.haptics.motion import Motion
 from study_app.haptics.offline import simulate
 from study_app.haptics.scene import Ewma, Foaw, Knee, Line, Raw, Scene

@@ -10,9 +10,9 @@ import pytest
 if numba.config.DISABLE_JIT:
     pytest.skip("the servo exists compiled only", allow_module_level=True)
 
-from study_app.evaluation import faults as faulty
-from study_app.evaluation.faults import KINDS, FaultyDevice
-from study_app.evaluation.restless import REACH_M, RestlessHand
+from study_app.evaluation.soak import faults as faulty
+from study_app.evaluation.soak.faults import KINDS, FaultyDevice
+from study_app.evaluation.soak.restless import REACH_M, RestlessHand
 from study_app.haptics.clock import SystemClock, VirtualClock
 from study_app.haptics.layout import LIMITER_GLITCH, LIMITER_STOP, STATUS_DEVICE_LOST
 from study_app.haptics.scene import Liquid, Scene

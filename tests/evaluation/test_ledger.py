@@ -9,9 +9,9 @@ import pytest
 if numba.config.DISABLE_JIT:
     pytest.skip("the servo exists compiled only", allow_module_level=True)
 
-from study_app.evaluation.drift import Drift
-from study_app.evaluation.ledger import Ledger, wake_of
 from study_app.evaluation.references import wakes
+from study_app.evaluation.soak.drift import Drift
+from study_app.evaluation.soak.ledger import Ledger, wake_of
 from study_app.haptics.layout import LIMITER_GLITCH, SAMPLE, records
 from study_app.haptics.scene import Box, Liquid, Scene, Uniform, Wake
 

@@ -18,8 +18,8 @@ if numba.config.DISABLE_JIT:
 
 from study_app.cli import main
 from study_app.errors import ServoFault, StudyError
-from study_app.evaluation.drift import Drift
-from study_app.evaluation.soak import Soak, soak
+from study_app.evaluation.soak.drift import Drift
+from study_app.evaluation.soak.run import Soak, soak
 from study_app.protocol.load import load_scenes
 
 SHORT_H = 2 / 60
@@ -169,7 +169,7 @@ def test_a_force_of_the_liquids_that_is_no_number_is_found(scenes):
 
 def test_a_servo_that_takes_no_turn_is_not_waited_for(scenes, monkeypatch):
     now_s = iter(range(0, 1000, 6))
-    monkeypatch.setattr("study_app.evaluation.soak.time.monotonic", lambda: next(now_s))
+    monkeypatch.setattr("study_app.evaluation.soak.run.time.monotonic", lambda: next(now_s))
     with Soak(scenes, SHORT_H, virtual=True) as run:
         run.step()
         run.servo.advance = lambda _turns: 0

@@ -11,11 +11,11 @@ from click.testing import CliRunner
 from study_app import cli
 from study_app.cli.words import EXIT_FOUND
 from study_app.errors import StoreError, StudyError
-from study_app.evaluation import stability
-from study_app.evaluation.stability_cases import GRIPS, Case, liquids, parse, scene_of, some, sweep
-from study_app.evaluation.stability_fidelity import LIMITED, STUDY_LOOPS, fidelities
-from study_app.evaluation.stability_measures import fast_part, smooth
-from study_app.evaluation.stability_verdict import judge, trace_of
+from study_app.evaluation.stability import sweep as stability
+from study_app.evaluation.stability.cases import GRIPS, Case, liquids, parse, scene_of, some, sweep
+from study_app.evaluation.stability.fidelity import LIMITED, STUDY_LOOPS, fidelities
+from study_app.evaluation.stability.measures import fast_part, smooth
+from study_app.evaluation.stability.verdict import judge, trace_of
 from study_app.haptics.layout import LIMITER_NAMES
 from study_app.protocol.load import load, shipped
 from tests.haptics.scenes import COMPILED
@@ -232,7 +232,7 @@ def test_it_ends_with_3_where_safety_does_not_hold(monkeypatch):
     judged = stability.judge(parse(UNSTABLE), safe=False)
     monkeypatch.setattr(stability, "judge", lambda case, safe: dataclasses.replace(judged, case=case, safe=safe))
     few = fidelities(["honey"], STUDY_LOOPS)
-    monkeypatch.setattr("study_app.evaluation.stability_fidelity.fidelities", lambda: few)
+    monkeypatch.setattr("study_app.evaluation.stability.fidelity.fidelities", lambda: few)
     ran = command("--cases", "2")
     assert ran.return_value == EXIT_FOUND
     assert len([line for line in ran.stderr.splitlines() if line.startswith("liquid=")]) == 2

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from study_app.evaluation.stability_boundary import boundary_nspm, measure_limits, passive_nspm
+from study_app.evaluation.stability.boundary import boundary_nspm, measure_limits, passive_nspm
 from study_app.haptics.limits import bearable, table
 from study_app.haptics.scene import Ewma, Line
 from tests.haptics.scenes import COMPILED

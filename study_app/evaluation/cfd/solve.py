@@ -19,7 +19,7 @@ from study_app.evaluation.accuracy.race import machine
 from study_app.evaluation.cfd.case import END, RAMP, STOP, Case, cases, linear_drags, moments, speed
 from study_app.evaluation.cfd.flow import ORDER, Flow, Grid, library
 from study_app.evaluation.cfd.tables import MOTION, STEADY, STEADY_FILE, notes_of, text
-from study_app.evaluation.soaked import make_folder
+from study_app.evaluation.output import make_folder
 from study_app.haptics.motion import Floats
 from study_app.store.atomic import write_file
 

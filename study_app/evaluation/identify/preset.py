@@ -15,7 +15,7 @@ from study_app.evaluation import style
 from study_app.evaluation.identify import figure
 from study_app.evaluation.identify.fit import CONFIDENCE, Fit
 from study_app.evaluation.identify.parameters import Parameter
-from study_app.evaluation.soaked import make_folder
+from study_app.evaluation.output import make_folder
 from study_app.haptics import motion
 from study_app.haptics.offline import Table
 from study_app.haptics.scene import Given, Liquid, Scene

@@ -27,9 +27,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from study_app.evaluation.stability_cases import GRIPS, LETS_GO, MOTIONS, THROWN, Case, scene_of
-from study_app.evaluation.stability_loop import LOOP, TRACE, begin, play, run
-from study_app.evaluation.stability_measures import fast_part, lowest_balance, smooth
+from study_app.evaluation.stability.cases import GRIPS, LETS_GO, MOTIONS, THROWN, Case, scene_of
+from study_app.evaluation.stability.loop import LOOP, TRACE, begin, play, run
+from study_app.evaluation.stability.measures import fast_part, lowest_balance, smooth
 from study_app.haptics.layout import LIMITER_NAMES, SAMPLE, records
 from study_app.haptics.limits import Bearable
 from study_app.haptics.pace import new_pace

@@ -23,14 +23,23 @@ from typing import Final, Literal, NamedTuple, Self, TypeAlias
 import numpy as np
 
 from study_app.errors import DeviceLost, ServoFault, StudyError
-from study_app.evaluation import audit, ledger
-from study_app.evaluation.audit import Audit
-from study_app.evaluation.drift import Drift
-from study_app.evaluation.faults import BUTTON, GLITCH, JUMP, LOST, LOST_AT_WRITE, NON_FINITE, SILENCE, FaultyDevice
-from study_app.evaluation.ledger import wake_of
-from study_app.evaluation.memory import resident_bytes
-from study_app.evaluation.restless import RestlessHand
-from study_app.evaluation.soaked import FELT_N, Rests, Soaked
+from study_app.evaluation.soak import audit, ledger
+from study_app.evaluation.soak.audit import Audit
+from study_app.evaluation.soak.drift import Drift
+from study_app.evaluation.soak.faults import (
+    BUTTON,
+    GLITCH,
+    JUMP,
+    LOST,
+    LOST_AT_WRITE,
+    NON_FINITE,
+    SILENCE,
+    FaultyDevice,
+)
+from study_app.evaluation.soak.ledger import wake_of
+from study_app.evaluation.soak.memory import resident_bytes
+from study_app.evaluation.soak.outcome import FELT_N, Rests, Soaked
+from study_app.evaluation.soak.restless import RestlessHand
 from study_app.haptics.clock import SystemClock, VirtualClock
 from study_app.haptics.gate import resolve
 from study_app.haptics.layout import SAMPLE, records

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from study_app.errors import StoreError
-from study_app.evaluation.audit import TOLERANCE_N
-from study_app.evaluation.drift import Drift
-from study_app.evaluation.faults import BUTTON, GLITCH, JUMP, KINDS, LOST, LOST_AT_WRITE, NON_FINITE, SILENCE
+from study_app.evaluation.soak.audit import TOLERANCE_N
+from study_app.evaluation.soak.drift import Drift
+from study_app.evaluation.soak.faults import BUTTON, GLITCH, JUMP, KINDS, LOST, LOST_AT_WRITE, NON_FINITE, SILENCE
 from study_app.haptics.layout import LIMITER_NAMES
 from study_app.store.atomic import write_file
 
@@ -245,22 +244,6 @@ class Soaked:
         for path, content in files.items():
             write_file(path, content.encode())
         return tuple(files)
-
-
-def make_folder(to: Path) -> None:
-    """Make the folder for the reports before a soak begins, not days after.
-
-    Raises
-    ------
-    StoreError
-        It cannot be made.
-    """
-    try:
-        to.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise StoreError(
-            f"cannot make the folder {to} ({error.strerror or error}): choose another with --to"
-        ) from error
 
 
 def _mib(held_bytes: float) -> float:

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, NullLocator, StrMethodFormatter
 
 from study_app.evaluation import style
-from study_app.evaluation.stability_boundary import (
+from study_app.evaluation.stability.boundary import (
     DELAYS,
     FREE_HANDLE_KG,
     NOMINAL_S,
@@ -21,7 +21,7 @@ from study_app.evaluation.stability_boundary import (
     boundary_nspm,
     passive_nspm,
 )
-from study_app.evaluation.stability_verdict import Verdict
+from study_app.evaluation.stability.verdict import Verdict
 from study_app.haptics.limits import slope_limit
 from study_app.haptics.scene import Ewma
 

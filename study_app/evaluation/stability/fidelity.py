@@ -14,8 +14,8 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from study_app.evaluation.stability_cases import MOTIONS, Case, liquids
-from study_app.evaluation.stability_verdict import FORCE_LIMIT_N, trace_of
+from study_app.evaluation.stability.cases import MOTIONS, Case, liquids
+from study_app.evaluation.stability.verdict import FORCE_LIMIT_N, trace_of
 
 LOOPS: Final = ((1000.0, 0), (1000.0, 1), (1000.0, 2), (1000.0, 4), (2000.0, 1), (500.0, 1), (250.0, 1))
 """Ticks a second and ticks of delay; the first two are those of a study."""

@@ -1,7 +1,7 @@
 """The stability of hard cases: the whole sweep, each case with the safety layer off and on, told as text and files.
 
-What a case is made of is said in `stability_cases`, when it counts as unstable in `stability_verdict`, what safety
-takes away where it is not needed in `stability_fidelity`, how much damping a loop bears in `stability_boundary`.
+What a case is made of is said in `cases`, when it counts as unstable in `verdict`, what safety
+takes away where it is not needed in `fidelity`, how much damping a loop bears in `boundary`.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from pathlib import Path
 from typing import Any, Final
 
 from study_app.errors import StoreError
-from study_app.evaluation.stability_boundary import measure_limits
-from study_app.evaluation.stability_cases import Case
-from study_app.evaluation.stability_fidelity import LOOPS, Fidelity, by_liquid
-from study_app.evaluation.stability_map import draw_map
-from study_app.evaluation.stability_verdict import REASONS, Verdict, judge
+from study_app.evaluation.stability.boundary import measure_limits
+from study_app.evaluation.stability.cases import Case
+from study_app.evaluation.stability.fidelity import LOOPS, Fidelity, by_liquid
+from study_app.evaluation.stability.map import draw_map
+from study_app.evaluation.stability.verdict import REASONS, Verdict, judge
 from study_app.haptics.layout import LIMITER_NAMES
 from study_app.store.atomic import write_file
 

@@ -12,7 +12,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from study_app.evaluation.faults import GLITCH_M
+from study_app.evaluation.soak.faults import GLITCH_M
 from study_app.haptics.compiled import kernel
 from study_app.haptics.layout import (
     BUTTON_STOP,

@@ -8,8 +8,8 @@ from typing import Final
 
 import numpy as np
 
-from study_app.evaluation.stability_cases import ESTIMATORS
-from study_app.evaluation.stability_loop import LOOP, STROKE, TRACE, begin, run
+from study_app.evaluation.stability.cases import ESTIMATORS
+from study_app.evaluation.stability.loop import LOOP, STROKE, TRACE, begin, run
 from study_app.haptics.layout import SAMPLE, records
 from study_app.haptics.limits import INERTIA_SHARE, Bearable, Entry
 from study_app.haptics.pace import new_pace
