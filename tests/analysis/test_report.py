@@ -103,7 +103,7 @@ def test_a_study_of_twelve_tells_what_was_found(of_twelve: Path) -> None:
         *("Was shown what was asked for?", "Orders as run", "Methods, to paste", "To repeat it"),
     ):
         assert heading in told
-    assert "What was drawn was" in told
+    assert re.search(r"What was drawn was [\d.]+ ms old .*, and [\d.]+ ms at the shortest delay, with which", told)
     assert "upper bound" in told
     found = numbers(of_twelve)
     assert found["study"]["participants"] == 12
@@ -122,6 +122,7 @@ def test_every_test_is_a_row_with_what_a_reader_needs(of_twelve: Path) -> None:
         assert row["n"] != "n/a"
         assert "n/a" not in (row["p"], row["effect"]) or {row["note"], row["interval"]} != {"n/a"}
         assert row["interval"] != "n/a"
+        assert (row["family"] == "n/a") == (row["question"] == "a delay is noticed")
     found = numbers(of_twelve)
     omnibus = found["results"]["blocks"][0]["omnibus"]
     listed_ps = [row["p_adjusted"] for row in tests if row["family"] == "liquids: settings differ"]

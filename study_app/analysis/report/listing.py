@@ -10,6 +10,7 @@ from platform import python_version
 from typing import Any, Final
 
 from study_app import __version__
+from study_app.analysis.judging import ALONE
 from study_app.analysis.report.words import name
 from study_app.analysis.results import BlockFound, Results, Tested, plain
 from study_app.analysis.statistics.outcome import Outcome
@@ -76,7 +77,7 @@ def motion_csv(results: Results) -> bytes:
 
 def _tests(found: BlockFound) -> Iterator[dict[str, Any]]:
     if found.overall is not None:
-        yield _row(found, "settings differ, all statements", found.overall)
+        yield _row(found, "settings differ, all statements", found.overall) | _alone(found, "all statements at once")
     for question, tests in (
         ("settings differ", found.omnibus),
         ("answers follow the delay", found.trends),
@@ -89,17 +90,26 @@ def _tests(found: BlockFound) -> Iterator[dict[str, Any]]:
         compared = f"{name(found, pair.first)} − {name(found, pair.second)}"
         yield _judged(found, "two settings differ", pair.tested) | {"comparison": compared}
     if found.named is not None:
-        yield _row(found, "liquids are recognised", found.named.found) | {"verdict": found.named.verdict}
+        row = _row(found, "liquids are recognised", found.named.found) | _alone(found, "recognition")
+        yield row | {"verdict": found.named.verdict}
     for lowest in found.lowest:
         for step in lowest.steps.steps:
             row = _row(found, "answers follow the delay, stepping down", step.page)
+            row |= _alone(found, f"stepping down within {lowest.item}") | {"members": len(lowest.steps.steps)}
+            row |= {"correction": "none: fixed order, ends at the first that fails"}
             yield row | {"item": lowest.item, "comparison": f"up to {step.longest_ms:g} ms"}
     for against in found.against:
         row = _row(found, "a delay is equivalent", against.found) | {"item": against.item}
         compared = f"{against.delay_ms:g} ms − {against.control_ms:g} ms"
+        row |= _alone(found, f"{against.item} at {against.delay_ms:g} ms")
         yield row | {"comparison": compared, "verdict": against.verdict}
     if found.threshold is not None:
         yield _row(found, "a delay is noticed", found.threshold)
+
+
+def _alone(found: BlockFound, what: str) -> dict[str, Any]:
+    """Return the family of a test that is corrected for no other."""
+    return {"family": f"{found.id}: {what}", "members": 1, "correction": ALONE}
 
 
 def _judged(found: BlockFound, question: str, one: Tested) -> dict[str, Any]:

@@ -44,19 +44,23 @@ def by_delay(found: BlockFound) -> list[list[str]]:
 
 
 def _as_number(found: BlockFound, results: Results, delay_ms: float) -> str:
-    at = next((one for one in results.delivered if (one.block, one.delay_ms) == (found.id, delay_ms)), None)
+    by_delay_ms = {one.delay_ms: one for one in results.delivered if one.block == found.id}
+    at, control = by_delay_ms.get(delay_ms), by_delay_ms.get(found.delays_ms[0])
     presented = listed([f"{delay:g}" for delay in found.delays_ms])
     return (
-        f"As a number. {ms(delay_ms)} is what was asked for. {_achieved(at)} The display's own latency comes on top of "
-        "it and is not in these numbers; only a photodiode at the corner of the screen tells it. Only "
+        f"As a number. {ms(delay_ms)} is what was asked for. {_achieved(at, control)} The display's own latency "
+        "comes on top of it and is not in these numbers; only a photodiode at the corner of the screen tells it. Only "
         f"{presented} ms were presented: nothing was asked about delays between them."
     )
 
 
-def _achieved(at: Delivered | None) -> str:
+def _achieved(at: Delivered | None, control: Delivered | None) -> str:
     if at is None or at.achieved_ms is None:
         return "What was achieved was not measured."
-    return f"What was drawn was {number(at.achieved_ms, 1)} ms old on average, on the program's own clock."
+    told = f"What was drawn was {number(at.achieved_ms, 1)} ms old on average, on the program's own clock"
+    if control is None or control.achieved_ms is None:
+        return f"{told}."
+    return f"{told}, and {number(control.achieved_ms, 1)} ms at the shortest delay, with which it is compared."
 
 
 def _as_lowest(found: BlockFound, delay_ms: float) -> Iterator[str]:

@@ -186,7 +186,7 @@ def _recognition(found: BlockFound, pictures: Mapping[str, Picture]) -> Iterator
         f"Hits {number(outcome.statistic, 0)}, {number(outcome.expected, 1)} expected by chance, "
         f"{p_equals(outcome.p)} (smallest attainable {p_value(outcome.smallest_p)}), {named.verdict}. Kappa of decided "
         f"answers {number(outcome.effect)}, 95 % interval {interval(outcome.interval)}{why}. Chance: "
-        f"{outcome.method}.{note}"
+        f"{outcome.method}.{note} One test, corrected for no other."
     )
     yield paragraph("Intervals of the shares: Clopper-Pearson, which takes participants one by one.", "soft")
 
@@ -274,8 +274,8 @@ def _threshold(found: BlockFound) -> Iterator[str]:
     yield paragraph(
         f"Detection threshold {number(threshold.effect, 0)} ms, 95 % interval {interval(threshold.interval, 0)} ms"
         f"{f' ({threshold.no_interval})' if threshold.no_interval else ''}; guesses {number(threshold.guess)}, lapses "
-        f"{number(threshold.lapse)}; {threshold.method}. Noticed: {counts}. {threshold.note[:1].upper()}"
-        f"{threshold.note[1:]}. Agreement is no yes or no: who agrees somewhat with “different” may mean little."
+        f"{number(threshold.lapse)}; {threshold.method}; n = {threshold.n}. Noticed: {counts}. "
+        f"{threshold.note[:1].upper()}{threshold.note[1:]}. Agreement is no yes or no: who agrees somewhat with “different” may mean little."
     )
 
 

@@ -175,7 +175,7 @@ def _delays(found: BlockFound) -> Iterator[str]:
     if threshold is not None and threshold.effect is not None:
         yield (
             f"{lead(found)}: the detection threshold is {threshold.effect:.0f} ms (95 % interval "
-            f"{interval(threshold.interval, 0)} ms), if agreeing counts as noticing; "
+            f"{interval(threshold.interval, 0)} ms, n = {threshold.n}), if agreeing counts as noticing; "
             f"{threshold.no_interval or threshold.note}."
         )
     yield from _equivalent(found)
