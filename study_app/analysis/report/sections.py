@@ -275,7 +275,8 @@ def _threshold(found: BlockFound) -> Iterator[str]:
         f"Detection threshold {number(threshold.effect, 0)} ms, 95 % interval {interval(threshold.interval, 0)} ms"
         f"{f' ({threshold.no_interval})' if threshold.no_interval else ''}; guesses {number(threshold.guess)}, lapses "
         f"{number(threshold.lapse)}; {threshold.method}; n = {threshold.n}. Noticed: {counts}. "
-        f"{threshold.note[:1].upper()}{threshold.note[1:]}. Agreement is no yes or no: who agrees somewhat with “different” may mean little."
+        f"{threshold.note[:1].upper()}{threshold.note[1:]}. Agreement is no yes or no: "
+        "who agrees somewhat with “different” may mean little."
     )
 
 
