@@ -69,7 +69,9 @@ def test_what_only_t_calls_equivalent_is_told_as_inconclusive(rek: Results) -> N
     block = delays({50: DOUBTED})
     assert block.against[0].found.verdict == "equivalent"
     assert block.against[0].found.checks_agree is False
-    assert by_delay(block) == [["50 ms", "–", "–", "Different"]]
+    ((*told, said),) = by_delay(block)
+    assert told == ["50 ms", "–", "–", "Different"]
+    assert said.startswith("So these data do not support the sentence “delays up to 50 ms do not matter”")
     assert "inconclusive for “Different”" in claim(block)
     assert "stay within the bound" not in claim(block)
     rek.add("P001", lambda *_: 4)
@@ -85,3 +87,10 @@ def test_what_every_check_calls_equivalent_is_told_as_such() -> None:
 @pytest.mark.parametrize("level", [0, 2])
 def test_differences_without_spread_have_no_interval_and_say_why(level: int) -> None:
     assert "no interval: all 5 differences are equal" in claim(delays({50: [level] * 5}))
+
+
+def test_every_delay_has_its_own_sentence() -> None:
+    rows = by_delay(delays({50: CALM, 125: SCATTERED, 300: AWAY}))
+    assert rows[0][-1].startswith("What can be said: at 50 ms the mean answers")
+    assert "do not support the sentence “delays up to 125 ms do not matter”, and do not refute it" in rows[1][-1]
+    assert rows[2][-1] == "These data speak against the sentence “delays up to 300 ms do not matter”."

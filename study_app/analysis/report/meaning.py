@@ -32,14 +32,14 @@ def meaning(found: BlockFound, results: Results) -> tuple[str, ...]:
 
 
 def by_delay(found: BlockFound) -> list[list[str]]:
-    """Return a row a delay: in which statements it is different, equivalent, inconclusive."""
+    """Return a row a delay: in which statements it is equivalent, different, inconclusive, and what that lets say."""
     rows = []
     for delay_ms in dict.fromkeys(one.delay_ms for one in found.against):
         here = [one for one in found.against if one.delay_ms == delay_ms]
         told = [
             ", ".join(short(found, one.item) for one in here if one.verdict == verdict) or "–" for verdict in VERDICTS
         ]
-        rows.append([ms(delay_ms), *told])
+        rows.append([ms(delay_ms), *told, _said(found, here)])
     return rows
 
 

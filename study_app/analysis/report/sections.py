@@ -287,7 +287,8 @@ def _meaning(found: BlockFound, results: Results) -> Iterator[str]:
     yield heading(3, f"What “{ms(delay_ms)}” can and cannot mean")
     yield box([paragraph(line) for line in meaning(found, results)], "care")
     if found.against:
-        yield table(("Delay", "equivalent in", "different in", "inconclusive in"), by_delay(found), words=4)
+        head = ("Delay", "equivalent in", "different in", "inconclusive in", "what can be said")
+        yield table(head, by_delay(found), words=len(head))
 
 
 def _again(found: BlockFound) -> Iterator[str]:
