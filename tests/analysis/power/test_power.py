@@ -264,10 +264,11 @@ def test_an_interrupt_ends_the_workers_too() -> None:
     """Ctrl-C reaches every process of the terminal: what is done is kept, nothing hangs, no traceback of a worker."""
     program = textwrap.dedent(
         """
-        import sys
+        import signal
         from study_app.analysis.power.sweep import sweep
         from tests.analysis.power.test_power import planned
         if __name__ == "__main__":
+            signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job starts deaf to it
             try:
                 for done, counts in sweep(planned(), (5,), 1_000_000, 1, jobs=2):
                     print(done, flush=True)
