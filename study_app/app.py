@@ -47,6 +47,7 @@ if TYPE_CHECKING:
 
 CANCELLED = 130
 BUG = 1
+OPENING_PATIENCE_S = 20.0
 
 
 def home(results: Path | None = None) -> int:
@@ -181,6 +182,7 @@ def _hold(chosen: NewSession, tell: Callable[[str], object] | None) -> int:
     with collecting_here(), ended_from_outside(live.end_by_signal):
         QTimer.singleShot(0, live.open)
         loop.exec()
+        live.wait()
     if live.error is not None:
         raise live.error
     return live.code
@@ -209,6 +211,7 @@ class LiveSession(QObject):
         self._store: SessionStore | None = None
         self._closed = False
         self._working = False
+        self._opening: threading.Thread | None = None
         self._ready.connect(self._begin, Qt.ConnectionType.QueuedConnection)
         self._said.connect(self._say, Qt.ConnectionType.QueuedConnection)
 
@@ -221,7 +224,14 @@ class LiveSession(QObject):
         place(self.note, self.note.screen(), corner=False)
         self.note.show()
         self._working = True
-        threading.Thread(target=self._make_ready, name="opening", daemon=True).start()
+        self._opening = threading.Thread(target=self._make_ready, name="opening", daemon=True)
+        self._opening.start()
+
+    def wait(self) -> None:
+        """Wait for what is being made ready: it must be let go of here, not in the thread that makes it."""
+        if self._opening is not None:
+            self._opening.join(OPENING_PATIENCE_S)
+            QApplication.processEvents()
 
     def end_by_signal(self, number: int) -> None:
         """End because the program is being ended from outside."""
