@@ -20,19 +20,24 @@ def codebook_bytes(study: Study, files: Mapping[str, Iterable[Column]]) -> bytes
     return f"{json.dumps(_codebook(study, described), indent=2, ensure_ascii=False)}\n".encode()
 
 
+def head(study: Study) -> dict[str, Any]:
+    """Return what study it is, and how many took part."""
+    return {
+        "name": study.name,
+        "title": study.title,
+        "version": study.version,
+        "participants": study.n,
+        "sessions": len(study.participants),
+        "sessions_left_out": study.left_out,
+        "sessions_excluded": len(study.excluded_sessions),
+        "simulated": study.simulated,
+        "pilot": study.pilot,
+    }
+
+
 def _codebook(study: Study, files: Mapping[str, Any]) -> dict[str, Any]:
     return {
-        "study": {
-            "name": study.name,
-            "title": study.title,
-            "version": study.version,
-            "participants": study.n,
-            "sessions": len(study.participants),
-            "sessions_left_out": study.left_out,
-            "sessions_excluded": len(study.excluded_sessions),
-            "simulated": study.simulated,
-            "pilot": study.pilot,
-        },
+        "study": head(study),
         "program": f"liquid-study {__version__}",
         "format": "CSV: UTF-8, comma, decimal point, RFC 4180 quoting",
         "missing": MISSING,

@@ -10,6 +10,7 @@ from platform import python_version
 from typing import Any, Final
 
 from study_app import __version__
+from study_app.analysis.codebook import head
 from study_app.analysis.judging import ALONE
 from study_app.analysis.report.words import name
 from study_app.analysis.results import BlockFound, Results, Tested, plain
@@ -152,15 +153,7 @@ def document(study: Study, results: Results, texts: Mapping[str, Any]) -> bytes:
         "program": f"liquid-study {__version__}",
         "versions": versions(),
         "study": {
-            "name": study.name,
-            "title": study.title,
-            "version": study.version,
-            "participants": study.n,
-            "sessions": len(study.participants),
-            "sessions_left_out": study.left_out,
-            "sessions_excluded": len(study.excluded_sessions),
-            "simulated": study.simulated,
-            "pilot": study.pilot,
+            **head(study),
             "blinded": not study.revealed,
             "key_opened": list(blinding.reveals(study.folder)),
         },
