@@ -12,8 +12,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from study_app.errors import StoreError
 from study_app.evaluation import style
+from study_app.evaluation.output import make_folder
 from study_app.evaluation.thesis import FIGURES, Run, ThesisFigure
 from study_app.store.atomic import write_file
 
@@ -40,12 +40,7 @@ def figures(to: Path) -> tuple[Path, ...]:
     StoreError
         The folder or a file cannot be written.
     """
-    try:
-        to.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise StoreError(
-            f"cannot make the folder {to} ({error.strerror or error}): choose another with --to"
-        ) from error
+    make_folder(to)
     written = []
     for make in FIGURES:
         shown = make()

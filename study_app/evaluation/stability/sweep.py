@@ -17,7 +17,7 @@ from dataclasses import astuple, dataclass, fields
 from pathlib import Path
 from typing import Any, Final
 
-from study_app.errors import StoreError
+from study_app.evaluation.output import make_folder
 from study_app.evaluation.stability.boundary import measure_limits
 from study_app.evaluation.stability.cases import Case
 from study_app.evaluation.stability.fidelity import LOOPS, Fidelity, by_liquid
@@ -120,12 +120,7 @@ def write(to: Path, swept: Swept, fidelities: Sequence[Fidelity]) -> tuple[Path,
     StoreError
         The folder or a file cannot be written.
     """
-    try:
-        to.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise StoreError(
-            f"cannot make the folder {to} ({error.strerror or error}): choose another with --to"
-        ) from error
+    make_folder(to)
     files = {"cases.csv": _cases_csv(swept).encode(), "stability.md": _markdown(swept, fidelities).encode()}
     for name, verdicts in (("unstable-safety-off.txt", swept.off), ("unstable-safety-on.txt", swept.on)):
         files[name] = "".join(f"{verdict.case}\n" for verdict in verdicts if not verdict.stable).encode()
