@@ -21,7 +21,6 @@ FULL_SPEED_MPS: Final = 0.25
 USAGE: Final = (1, 8)
 """Page and usage of the collection that reports motion: generic desktop, multi-axis controller."""
 
-BUTTON_GO_ON: Final = 1 << 0
 _PAIR: Final = 0b11
 _KNOWN_BUTTONS: Final = 0b11
 

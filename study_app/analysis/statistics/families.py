@@ -46,14 +46,6 @@ def false_discovery(ps: Sequence[float | None]) -> tuple[float | None, ...]:
     return tuple(float(adjusted[member]) if member in known else None for member in range(len(ps)))
 
 
-def reachable(smallest_ps: Sequence[float | None], alpha: float = 0.05) -> bool:
-    """Return whether any test of a family could come below ``alpha`` after Holm, however people answer.
-
-    ``smallest_ps`` are the tests' smallest attainable p; None where p is continuous and has none.
-    """
-    return any(smallest is None or smallest * len(smallest_ps) <= alpha for smallest in smallest_ps)
-
-
 def _known(ps: Sequence[float | None]) -> dict[int, float]:
     known = {member: p for member, p in enumerate(ps) if p is not None}
     for p in known.values():

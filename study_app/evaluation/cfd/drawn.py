@@ -23,7 +23,6 @@ LOOKS: Final[dict[str, tuple[str, dict[str, Any]]]] = {
     "... history, added mass": ("drag, history, added mass", {"color": "#0b65a3", "linestyle": "-"}),
 }
 SOLVER: Final[dict[str, Any]] = {"color": "#13202c", "linewidth": 3.2, "alpha": 0.35}
-BEFORE: Final = 1.0
 AFTER: Final = 8.0
 
 
