@@ -14,19 +14,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from study_app.errors import SessionError, StudyError
-from study_app.gui.display import check_display, missing_library
+from study_app.gui.display import missing_library
 
 try:
     from PySide6.QtCore import QEventLoop, QObject, Qt, QTimer, Signal
-    from PySide6.QtGui import QGuiApplication
     from PySide6.QtWidgets import QApplication
 
+    from study_app.gui.application import application_here
     from study_app.gui.beginning import Ready, check, measured, open_store
     from study_app.gui.choices import NewSession, draw_seed, resumed, study_results
     from study_app.gui.collector import collecting_here
     from study_app.gui.ending import ended_from_outside
     from study_app.gui.home import HomeWindow
-    from study_app.gui.icons import logo
     from study_app.gui.machine import Machine, open_machine
     from study_app.gui.opening import OpeningWindow
     from study_app.gui.screens import choose_screens, describe_screen, place
@@ -58,7 +57,7 @@ def home(results: Path | None = None) -> int:
     DisplayError
         A window cannot be opened here.
     """
-    application = _application()
+    application = application_here()
     visit = _Visit(HomeWindow(results if results is not None else Path("results")))
     with collecting_here(), ended_from_outside(visit.end_by_signal):
         visit.window.show()
@@ -175,7 +174,7 @@ def resume(
 
 def _hold(chosen: NewSession, tell: Callable[[str], object] | None) -> int:
     """Open a session's windows and return when they are closed."""
-    _application()
+    application_here()
     live = LiveSession(chosen, LIGHT, tell)
     loop = QEventLoop()
     live.over.connect(loop.quit)
@@ -391,19 +390,3 @@ class _Visit(QObject):
     def _leave(self) -> None:
         if self.live is None:
             self.loop.quit()
-
-
-def _application() -> QApplication:
-    """Return the application, made on first use."""
-    there = QApplication.instance()
-    if isinstance(there, QApplication):
-        there.setQuitOnLastWindowClosed(False)
-        return there
-    check_display()
-    QGuiApplication.setHighDpiScaleFactorRoundingPolicy(Qt.HighDpiScaleFactorRoundingPolicy.PassThrough)
-    application = QApplication(["liquid-study"])
-    application.setApplicationName("liquid-study")
-    application.setStyle("Fusion")
-    application.setWindowIcon(logo(32, LIGHT.accent, LIGHT.on_accent))
-    application.setQuitOnLastWindowClosed(False)
-    return application

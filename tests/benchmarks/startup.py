@@ -38,13 +38,13 @@ class Probe(QObject):
         return False
 
 from study_app import app
-made = app._application
+made = app.application_here
 def with_probe():
     application = made()
     application.probe = Probe(sys.argv[2].split(","))
     application.installEventFilter(application.probe)
     return application
-app._application = with_probe
+app.application_here = with_probe
 if sys.argv[1] == "home":
     app.home()
 else:

@@ -1,0 +1,27 @@
+"""The one Qt application of this program, made when the first window is asked for."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QGuiApplication
+from PySide6.QtWidgets import QApplication
+
+from study_app.gui.display import check_display
+from study_app.gui.icons import logo
+from study_app.gui.theme import LIGHT
+
+
+def application_here() -> QApplication:
+    """Return the application, made on first use."""
+    there = QApplication.instance()
+    if isinstance(there, QApplication):
+        there.setQuitOnLastWindowClosed(False)
+        return there
+    check_display()
+    QGuiApplication.setHighDpiScaleFactorRoundingPolicy(Qt.HighDpiScaleFactorRoundingPolicy.PassThrough)
+    application = QApplication(["liquid-study"])
+    application.setApplicationName("liquid-study")
+    application.setStyle("Fusion")
+    application.setWindowIcon(logo(32, LIGHT.accent, LIGHT.on_accent))
+    application.setQuitOnLastWindowClosed(False)
+    return application
