@@ -1,88 +1,23 @@
 """Liquids from measured motion and force: found again, as sure as said, and doubted where numbers mean little."""
 
-import csv
 import math
 from itertools import pairwise
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from scipy.stats import t as student
 
-from study_app.cli import commands
 from study_app.errors import StudyError
-from study_app.evaluation.identify import figure, measured, parameters, preset, search
+from study_app.evaluation.identify import measured, parameters, search
 from study_app.evaluation.identify.fit import fit
 from study_app.haptics import paths
 from study_app.haptics.motion import Motion
-from study_app.haptics.offline import simulate
 from study_app.haptics.override import override_all
-from study_app.haptics.scene import Body, Box, Drag, Liquid, LocalWake, Scene, Uniform, Wake
-from study_app.protocol.load import load_scene
+from study_app.haptics.scene import Box, Liquid, LocalWake, Scene
+from tests.evaluation.measurements import BALL, OIL, REACH, REVERSE, SEED, TANK, force_of, noisy, slowed, write_csv
 from tests.haptics.scenes import COMPILED
 
 pytestmark = pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")
-
-TANK = Scene(
-    liquids=(Liquid(id="tank", density_kg_m3=1000, effects=("drag", "wake"), wake=Wake(length=300, scaling=400)),),
-    body=Body(drag_coefficient=0.42),
-)
-OIL = Scene(
-    liquids=(
-        Liquid(
-            id="oil",
-            density_kg_m3=1261,
-            viscosity_pa_s=1.41,
-            effects=("drag", "added_mass", "history"),
-            drag=Drag(law="haider-levenspiel"),
-        ),
-    )
-)
-BALL = Scene(liquids=(Liquid(id="tank", density_kg_m3=1000),))
-REVERSE = paths.path("reverse", revolutions=0.8, against_s=0.7, rest_s=0.8)
-REACH = paths.path("reach", reaches=2, reach_s=0.6, dwell_s=0.3)
-SEED = 20240607
-
-
-def force_of(scene, motion):
-    """Return the force (n, 3) along a motion."""
-    table = simulate(scene, motion)
-    return np.column_stack([table.fx_n, table.fy_n, table.fz_n])
-
-
-def noisy(scene, motion, deviation_n, *, following=0.0, seed=SEED):
-    """Return the force (n, 3) and the noise of a sensor in the horizontal plane, of that correlation row to row."""
-    rng = np.random.default_rng(seed)
-    noise = rng.standard_normal((len(motion.t_s), 3))
-    for k in range(1, len(noise) if following else 0):
-        noise[k] = following * noise[k - 1] + math.sqrt(1 - following**2) * noise[k]
-    return force_of(scene, motion) + deviation_n * noise * [1, 0, 1]
-
-
-def slowed(motion, force_n, rows):
-    """Return some rows of a measurement."""
-    return Motion(motion.t_s[rows], motion.position_m[rows], motion.velocity_mps[rows]), force_n[rows]
-
-
-def write_csv(path, motion, force_n, *, velocities=True, comment=""):
-    columns = {
-        "fx_n": force_n[:, 0],
-        "fy_n": force_n[:, 1],
-        "fz_n": force_n[:, 2],
-        "t_s": motion.t_s,
-        **dict(zip(("x_m", "y_m", "z_m"), motion.position_m.T, strict=True)),
-        **(dict(zip(("vx_mps", "vy_mps", "vz_mps"), motion.velocity_mps.T, strict=True)) if velocities else {}),
-        "sensor": ["a"] * len(motion.t_s),
-    }
-    with path.open("w", newline="", encoding="utf-8") as file:
-        file.write(comment)
-        writer = csv.writer(file)
-        writer.writerow(columns)
-        writer.writerows(zip(*columns.values(), strict=True))
-    return path
-
-
-# --- What is found ---------------------------------------------------------------------------------------------------
 
 
 def test_known_parameters_of_a_wake_are_found_again_in_noise():
@@ -364,156 +299,6 @@ def test_effects_left_to_choice_are_chosen_once_and_named():
     found = fit(auto, "oil", ["density_kg_m3"], REACH, force_of(auto, REACH))
     assert found.scene.liquids[0].effects != "auto"
     assert found.values["density_kg_m3"] == pytest.approx(900)
-
-
-# --- What it leaves behind -------------------------------------------------------------------------------------------
-
-
-@pytest.fixture(scope="module")
-def fitted(tmp_path_factory):
-    """Return a fit and the file it was measured in."""
-    force_n = noisy(TANK, REVERSE, 0.02)
-    path = write_csv(tmp_path_factory.mktemp("measured") / "tank.csv", REVERSE, force_n)
-    start = override_all(TANK, {"drag_coefficient": 0.5})
-    return fit(start, "tank", ["drag_coefficient", "scaling"], REVERSE, force_n), path
-
-
-@pytest.mark.parametrize(
-    "scene",
-    [
-        TANK,
-        OIL,
-        Scene(
-            scale=3,
-            origin_m=(0.1, -0.2, 1e-5),
-            liquids=(
-                Liquid(
-                    id="river",
-                    density_kg_m3=1000,
-                    region=Box(size_m=(1, 2, 3)),
-                    effects=("drag", "current"),
-                    current=Uniform(velocity_mps=(0.1, 0, 0)),
-                ),
-            ),
-        ),
-    ],
-)
-def test_the_preset_is_the_fitted_scene(scene, tmp_path):
-    (liquid,) = scene.liquids
-    (tmp_path / "measured.csv").write_text("t_s\n")
-    found = fit(scene, liquid.id, ["density_kg_m3"], REACH, noisy(scene, REACH, 0.02))
-    file = tmp_path / "preset.toml"
-    file.write_text(preset.preset(found, tmp_path / "measured.csv"), encoding="utf-8")
-    assert load_scene(file, liquid.id) == found.scene
-    assert found.scene != scene
-    for command in ("check", "scene"):
-        told = CliRunner().invoke(commands, [command, str(file)], catch_exceptions=False)
-        assert (told.exit_code, f"{liquid.id}: effects named" in told.output) == (0, True)
-
-
-def test_the_preset_says_how_sure_its_numbers_are(fitted):
-    found, path = fitted
-    lines = preset.preset(found, path).splitlines()
-    lower, upper = found.intervals["drag_coefficient"]
-    value = found.values["drag_coefficient"]
-    assert f"drag_coefficient = {value!r}  # 95 %: {lower:.5g} … {upper:.5g}" in lines
-    assert lines[0].startswith("# Fitted to tank.csv (SHA-256 ")
-
-
-def test_the_residuals_in_the_table_are_measured_less_fitted(fitted, tmp_path):
-    found, path = fitted
-    written = preset.write(found, tmp_path / "new", path)
-    assert sorted(it.name for it in written) == sorted(it.name for it in (tmp_path / "new").iterdir())
-    rows = np.genfromtxt(tmp_path / "new" / "tank-fit.csv", delimiter=",", names=True)
-    force_n = force_of(found.scene, REVERSE)
-    for k, axis in enumerate("xyz"):
-        assert rows[f"fitted_{axis}_n"] == pytest.approx(force_n[:, k], abs=1e-12)
-        assert rows[f"residual_{axis}_n"] == pytest.approx(found.measured_n[:, k] - force_n[:, k], abs=1e-12)
-
-
-def test_the_figure_is_whole_and_shows_the_residual(fitted):
-    found, _ = fitted
-    drawn = figure.draw(found)
-    drawn.draw_without_rendering()
-    frame = drawn.bbox
-    boxes = [axes.get_tightbbox() for axes in drawn.axes] + [it.get_window_extent() for it in drawn.texts]
-    for box in boxes:
-        assert frame.x0 <= box.x0 < box.x1 <= frame.x1
-        assert frame.y0 <= box.y0 < box.y1 <= frame.y1
-    shown = {line.get_label(): line.get_ydata() for line in drawn.axes[1].lines}
-    assert np.array_equal(shown["x"], found.residual_n[:, 0])
-    assert np.array_equal(shown["z"], found.residual_n[:, 2])
-
-
-# --- The command -----------------------------------------------------------------------------------------------------
-
-
-def identify(*words):
-    return CliRunner().invoke(commands, ["identify", *map(str, words)], catch_exceptions=False)
-
-
-def test_from_a_file_to_a_preset(tmp_path):
-    true = override_all(load_scene("rek2024", "honey"), {"drag_coefficient": 0.61})
-    path = write_csv(tmp_path / "honey.csv", REACH, noisy(true, REACH, 0.02), comment="# by hand\n")
-    told = identify(
-        "--measured",
-        path,
-        "--scene",
-        "rek2024",
-        "--liquid",
-        "honey",
-        "--fit",
-        "drag_coefficient",
-        "--to",
-        tmp_path / "out",
-    )
-    assert told.exit_code == 0
-    assert f"honey: {len(REACH.t_s)} rows over 1.8 s; residual 0.0283 N RMS" in told.output
-    written = load_scene(tmp_path / "out" / "honey.toml", "honey")
-    assert written.body.drag_coefficient == pytest.approx(0.61, rel=0.01)
-    assert written.model_copy(update={"body": true.body}) == true
-
-
-def test_a_motion_along_one_line_is_read_from_its_velocities(tmp_path):
-    motion = paths.path("stop", moving_s=0.4, rest_s=0.4)
-    force_n = force_of(TANK, motion)
-    path = tmp_path / "line.csv"
-    rows = np.column_stack([motion.t_s, motion.velocity_mps[:, 0], force_n[:, 0]])
-    np.savetxt(path, rows, delimiter=",", header="# solved\nt_s,velocity_mps,force_n", comments="", fmt="%.17g")
-    read = measured.read(path)
-    assert read.motion.position_m == pytest.approx(motion.position_m, abs=1e-3)
-    assert np.array_equal(read.force_n, force_n * [1, 0, 0])
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("", "has no column t_s, x_m"),
-        ("t_s,x_m,y_m,z_m\n0,0,0,0\n", "has no column fx_n, fy_n, fz_n"),
-        ("t_s,velocity_mps,force_n\n", "a header and no rows"),
-        ("t_s,velocity_mps,force_n\n0,1,2\n0.001,nan,2\n", "line 3: 'nan' is not a finite number"),
-        ("t_s,velocity_mps,force_n\n0,1\n", "line 2: has 2 fields"),
-        ("t_s,velocity_mps,force_n\n0,1,2\n0,1,2\n", "time must increase"),
-        ("t_s,velocity_mps,force_n\n0,1,2\n9,1,2\n", "row 2 comes 9 s after"),
-        (b"\xff\xfe", "no UTF-8 text"),
-        (None, "cannot read"),
-    ],
-)
-def test_a_file_that_cannot_be_used_is_one_line(tmp_path, monkeypatch, capsys, text, said):
-    from study_app.cli import main
-
-    path = tmp_path / "measured.csv"
-    if text is not None:
-        path.write_bytes(text if isinstance(text, bytes) else text.encode())
-    words = ["--measured", str(path), "--scene", "rek2024", "--liquid", "honey", "--fit", "drag_coefficient"]
-    monkeypatch.setattr("sys.argv", ["liquid-study", "identify", *words])
-    with pytest.raises(SystemExit) as ended:
-        main()
-    assert ended.value.code == 2
-    printed = capsys.readouterr()
-    assert printed.out == ""
-    (line,) = printed.err.splitlines()
-    assert said in line
 
 
 def test_what_has_no_greatest_value_is_searched_within_finite_numbers():
