@@ -143,7 +143,7 @@ def test_no_stiffness_damping_or_friction_makes_energy(mass, stiffness, damping,
     for _ in range(20):
         move(handle, STILL, STILL, 1e-3)
         after = energy()
-        assert after <= before * (1 + 1e-12)
+        assert after <= before * (1 + 1e-12) + np.finfo(float).tiny  # below it, numbers lose their digits
         before = after
 
 
