@@ -1,0 +1,1 @@
+"""The liquid lab's place in the operator's window."""
