@@ -1,4 +1,4 @@
-"""Where device, servo, store, session and windows meet: the ways to open the program.
+"""One session, from the operator's choices to the closed journal.
 
 However a session's windows go away (its end, Ctrl+C, a signal, a failure in here), the servo is stopped with zero force
 and the journal is closed with a status. Nothing is created on the disk before device and servo are ready.
@@ -13,32 +13,23 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from PySide6.QtCore import QEventLoop, QObject, Qt, QTimer, Signal
+from PySide6.QtWidgets import QApplication
+
 from study_app.errors import SessionError, StudyError
-from study_app.gui.display import missing_library
-
-try:
-    from PySide6.QtCore import QEventLoop, QObject, Qt, QTimer, Signal
-    from PySide6.QtWidgets import QApplication
-
-    from study_app.gui.application import application_here
-    from study_app.gui.beginning import Ready, check, measured, open_store
-    from study_app.gui.choices import NewSession, draw_seed, resumed, study_results
-    from study_app.gui.collector import collecting_here
-    from study_app.gui.ending import ended_from_outside
-    from study_app.gui.home import HomeWindow
-    from study_app.gui.machine import Machine, open_machine
-    from study_app.gui.opening import OpeningWindow
-    from study_app.gui.screens import choose_screens, describe_screen, place
-    from study_app.gui.theme import LIGHT, Theme
-except ImportError as missing:
-    raise missing_library(missing) from missing
-
+from study_app.gui.application import application_here
+from study_app.gui.beginning import Ready, measured, open_store
+from study_app.gui.choices import NewSession
+from study_app.gui.collector import collecting_here
+from study_app.gui.ending import ended_from_outside
+from study_app.gui.machine import Machine, open_machine
+from study_app.gui.opening import OpeningWindow
+from study_app.gui.screens import choose_screens, describe_screen, place
+from study_app.gui.theme import LIGHT, Theme
 from study_app.protocol.load import load, parse, source_bytes
 from study_app.protocol.schedule import build_schedule
 from study_app.session.preflight import Check, checks, refused
-from study_app.session.resume import FIRST, is_rehearsal, resume_at
-from study_app.store import receipt
-from study_app.store.layout import locate, refuse_never_begun
+from study_app.session.resume import FIRST, resume_at
 
 if TYPE_CHECKING:
     from study_app.gui.bridge import SessionBridge
@@ -49,130 +40,7 @@ BUG = 1
 OPENING_PATIENCE_S = 20.0
 
 
-def home(results: Path | None = None) -> int:
-    """Open the home window on the results folder (default ``results``); return the exit code when it is closed.
-
-    Raises
-    ------
-    DisplayError
-        A window cannot be opened here.
-    """
-    application = application_here()
-    visit = _Visit(HomeWindow(results if results is not None else Path("results")))
-    with collecting_here(), ended_from_outside(visit.end_by_signal):
-        visit.window.show()
-        visit.loop.exec()
-    application.processEvents()
-    return visit.code
-
-
-def run(
-    protocol: str,
-    *,
-    participant: str,
-    session: int = 1,
-    seed: int | None = None,
-    device: str = "mouse",
-    firmware: Path | None = None,
-    language: str | None = None,
-    operator: str = "",
-    windowed: bool = False,
-    screen: int | None = None,
-    results: Path | None = None,
-    pilot: bool = False,
-    recordings: bool = True,
-    tell: Callable[[str], object] | None = None,
-) -> int:
-    """Run a session without dialogs; return the exit code when its windows are closed.
-
-    Parameters
-    ----------
-    protocol : file or name of a protocol
-    participant, session, operator : who, for the how-manieth time, and who runs it
-    seed : default: drawn, shown and recorded
-    device, language : default: the mouse, the protocol's first language
-    firmware : file of a Falcon's program, where it needs one
-    windowed, screen : where the participant's window opens; screens count from 1
-    results : the study's folder; default ``results/<study>``, of a pilot ``results/<study>-pilot``
-    pilot : to try it out: in a window with a frame, apart from the data and marked
-    recordings : whether every turn of the servo and every frame of a trial is kept
-    tell : is given the lines of the pre-flight, before the first page
-
-    Raises
-    ------
-    StudyError
-        The session could not begin, and then nothing was created; or device or servo failed while it ran.
-    """
-    study = load(protocol)
-    chosen = NewSession(
-        source=protocol,
-        participant=participant,
-        session=session,
-        seed=draw_seed() if seed is None else seed,
-        operator=operator,
-        language=study.study.languages[0] if language is None else language,
-        device=device,
-        windowed=windowed or pilot,
-        screen=screen,
-        results=(
-            study_results(Path("results"), study.study.name, device, pilot=pilot) if results is None else Path(results)
-        ),
-        pilot=pilot,
-        recordings=recordings,
-        firmware=firmware,
-    )
-    check(chosen, study)
-    return _hold(chosen, tell)
-
-
-def resume(
-    session_folder: Path,
-    *,
-    protocol: str | None = None,
-    device: str | None = None,
-    firmware: Path | None = None,
-    operator: str = "",
-    windowed: bool = False,
-    screen: int | None = None,
-    tell: Callable[[str], object] | None = None,
-) -> int:
-    """Go on with a session whose program was ended; return the exit code when its windows are closed.
-
-    A rehearsed session goes on as one, without windows.
-
-    Parameters
-    ----------
-    protocol : file or name of its protocol; default: looked for among those at hand
-    device : default: the one it began with
-    firmware, operator, windowed, screen, tell : as for ``run``
-
-    Raises
-    ------
-    StudyError
-        It cannot go on (finished, of a changed protocol, open elsewhere); or device or servo failed while it ran.
-    """
-    folder = Path(session_folder)
-    session = locate(folder)[1]
-    refuse_never_begun(session)
-    if is_rehearsal(receipt.read(session.receipt)):
-        from study_app.session import rehearsal  # noqa: PLC0415 - the compiler: only once it is needed
-
-        rehearsal.resume(folder, protocol=protocol)
-        return 0
-    chosen = resumed(
-        folder,
-        protocol=protocol,
-        operator=operator,
-        device=device,
-        windowed=windowed,
-        screen=screen,
-        firmware=firmware,
-    )
-    check(chosen, load(chosen.source))
-    return _hold(chosen, tell)
-
-
-def _hold(chosen: NewSession, tell: Callable[[str], object] | None) -> int:
+def hold(chosen: NewSession, tell: Callable[[str], object] | None) -> int:
     """Open a session's windows and return when they are closed."""
     application_here()
     live = LiveSession(chosen, LIGHT, tell)
@@ -348,45 +216,3 @@ class LiveSession(QObject):
         finally:
             if store is not None:
                 store.close()
-
-
-class _Visit(QObject):
-    """The home window's stay: one session at a time, and home again after it."""
-
-    def __init__(self, window: HomeWindow) -> None:
-        super().__init__()
-        self.window = window
-        self.loop = QEventLoop()
-        self.code = 0
-        self.live: LiveSession | None = None
-        window.session_asked.connect(self._start)
-        window.closed.connect(self._leave)
-
-    def end_by_signal(self, number: int) -> None:
-        """End because the program is being ended from outside."""
-        self.code = 128 + number
-        if self.live is not None:
-            self.live.end_by_signal(number)
-        self.window.close()
-        self.loop.quit()
-
-    def _start(self, chosen: NewSession) -> None:
-        self.live = LiveSession(chosen, self.window.theme)
-        self.live.over.connect(self._return)
-        self.window.hide()
-        self.live.open()
-
-    def _return(self) -> None:
-        live, self.live = self.live, None
-        if self.code or live is None:
-            return
-        self.window.show()
-        self.window.show_sessions()
-        if live.error is not None:
-            self.window.tell("The session did not go to its end", f"{live.error}.")
-        elif live.code == BUG:
-            self.window.tell("The session was stopped by a mistake in the program", "The terminal shows where.")
-
-    def _leave(self) -> None:
-        if self.live is None:
-            self.loop.quit()

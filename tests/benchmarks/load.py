@@ -18,6 +18,8 @@ from pathlib import Path
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
+from PySide6.QtWidgets import QApplication
+
 from study_app import app
 from study_app.gui.operator import OperatorWindow
 from study_app.gui.participant import ParticipantWindow
@@ -60,7 +62,7 @@ def main(name: str = "rek2024", seconds: float = 600.0) -> None:
 
     with tempfile.TemporaryDirectory() as scratch:
         results = Path(scratch) / "results"
-        application = app.QApplication.instance() or app.QApplication(["load"])
+        application = QApplication.instance() or QApplication(["load"])
         sessions = 0
         while time.monotonic() - began < seconds - GAP_S:
             sessions += 1

@@ -38,13 +38,14 @@ class Probe(QObject):
         return False
 
 from study_app import app
-made = app.application_here
+from study_app.app import live_session, visit
+made = visit.application_here
 def with_probe():
     application = made()
     application.probe = Probe(sys.argv[2].split(","))
     application.installEventFilter(application.probe)
     return application
-app.application_here = with_probe
+live_session.application_here = visit.application_here = with_probe
 if sys.argv[1] == "home":
     app.home()
 else:

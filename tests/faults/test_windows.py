@@ -12,6 +12,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 
 from study_app import app
+from study_app.app import live_session
 from study_app.errors import StudyError
 from study_app.gui import beginning
 from study_app.gui.machine import Machine
@@ -33,8 +34,10 @@ def machines(monkeypatch: pytest.MonkeyPatch) -> list[Machine]:
     """Return the machines that are opened; the pre-flight takes a tenth of a second."""
     monkeypatch.setattr(beginning, "MEASURED_S", 0.1)
     opened: list[Machine] = []
-    open_machine = app.open_machine
-    monkeypatch.setattr(app, "open_machine", lambda *a, **k: opened.append(open_machine(*a, **k)) or opened[-1])
+    open_machine = live_session.open_machine
+    monkeypatch.setattr(
+        live_session, "open_machine", lambda *a, **k: opened.append(open_machine(*a, **k)) or opened[-1]
+    )
     return opened
 
 

@@ -17,7 +17,8 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
 from study_app import app
-from study_app.errors import DeviceNotFound, DisplayError, SessionError, StoreError
+from study_app.app import live_session
+from study_app.errors import DeviceNotFound, DisplayError, SessionError, StoreError, StudyError
 from study_app.gui import beginning, ending
 from study_app.gui.home import HomeWindow
 from study_app.gui.opening import OpeningWindow
@@ -170,8 +171,10 @@ def test_a_signal_ends_with_a_status_and_its_exit_code(short_demo, results, numb
 
 def test_a_lost_device_ends_the_session_with_one_line(short_demo, results, monkeypatch):
     machines = []
-    open_machine = app.open_machine
-    monkeypatch.setattr(app, "open_machine", lambda *a, **k: machines.append(open_machine(*a, **k)) or machines[-1])
+    open_machine = live_session.open_machine
+    monkeypatch.setattr(
+        live_session, "open_machine", lambda *a, **k: machines.append(open_machine(*a, **k)) or machines[-1]
+    )
 
     def unplug(participant):
         QTest.keyClick(participant.widget, Qt.Key.Key_Return)
@@ -179,7 +182,7 @@ def test_a_lost_device_ends_the_session_with_one_line(short_demo, results, monke
         QTimer.singleShot(300, lambda: window(OperatorWindow).end_asked.emit("aborted", "cable"))
 
     person = Person(once=unplug)
-    with pytest.raises(app.StudyError, match="stopped answering"):
+    with pytest.raises(StudyError, match="stopped answering"):
         app.run(short_demo, participant="P001", windowed=True, results=results)
     person.deleteLater()
     assert events(results)[-1]["status"] == "broken"
@@ -224,7 +227,7 @@ def test_a_mistake_in_the_program_is_an_exit_code_and_a_trace(short_demo, result
     def fails(*_chosen, **_asked):
         raise RuntimeError("not thought of")
 
-    monkeypatch.setattr(app, "open_machine", fails)
+    monkeypatch.setattr(live_session, "open_machine", fails)
     assert app.run(short_demo, participant="P001", windowed=True, results=results) == app.BUG
     assert "not thought of" in capsys.readouterr().err
     assert not results.exists()

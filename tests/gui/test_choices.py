@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from study_app import app
+from study_app.app import entry
 from study_app.errors import StoreError
 from study_app.gui.choices import NewSession, resumed
 from study_app.protocol.load import load, source_bytes
@@ -34,7 +35,7 @@ def begun(tmp_path: Path) -> SessionStore:
 def windows(monkeypatch: pytest.MonkeyPatch) -> list[NewSession]:
     """Open no window; return the sessions for which they would have been."""
     asked: list[NewSession] = []
-    monkeypatch.setattr(app, "_hold", lambda chosen, _tell: asked.append(chosen) or 0)
+    monkeypatch.setattr(entry, "hold", lambda chosen, _tell: asked.append(chosen) or 0)
     return asked
 
 

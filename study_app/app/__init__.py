@@ -1,0 +1,16 @@
+"""Where device, servo, store, session, analysis and windows meet: the ways to open the program.
+
+`visit` holds the main window, `live_session` one session from its choices to the closed journal, `entry` begins or goes
+on with one by command.
+"""
+
+from study_app.gui.display import missing_library
+
+try:
+    from study_app.app.entry import resume, run
+    from study_app.app.live_session import BUG, CANCELLED, LiveSession
+    from study_app.app.visit import home
+except ImportError as missing:
+    raise missing_library(missing) from missing
+
+__all__ = ["BUG", "CANCELLED", "LiveSession", "home", "resume", "run"]

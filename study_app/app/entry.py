@@ -1,0 +1,120 @@
+"""Sessions asked for by command: begun or gone on with, without a dialog."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from study_app.app.live_session import hold
+from study_app.gui.beginning import check
+from study_app.gui.choices import NewSession, draw_seed, resumed, study_results
+from study_app.protocol.load import load
+from study_app.session.resume import is_rehearsal
+from study_app.store import receipt
+from study_app.store.layout import locate, refuse_never_begun
+
+
+def run(
+    protocol: str,
+    *,
+    participant: str,
+    session: int = 1,
+    seed: int | None = None,
+    device: str = "mouse",
+    firmware: Path | None = None,
+    language: str | None = None,
+    operator: str = "",
+    windowed: bool = False,
+    screen: int | None = None,
+    results: Path | None = None,
+    pilot: bool = False,
+    recordings: bool = True,
+    tell: Callable[[str], object] | None = None,
+) -> int:
+    """Run a session without dialogs; return the exit code when its windows are closed.
+
+    Parameters
+    ----------
+    protocol : file or name of a protocol
+    participant, session, operator : who, for the how-manieth time, and who runs it
+    seed : default: drawn, shown and recorded
+    device, language : default: the mouse, the protocol's first language
+    firmware : file of a Falcon's program, where it needs one
+    windowed, screen : where the participant's window opens; screens count from 1
+    results : the study's folder; default ``results/<study>``, of a pilot ``results/<study>-pilot``
+    pilot : to try it out: in a window with a frame, apart from the data and marked
+    recordings : whether every turn of the servo and every frame of a trial is kept
+    tell : is given the lines of the pre-flight, before the first page
+
+    Raises
+    ------
+    StudyError
+        The session could not begin, and then nothing was created; or device or servo failed while it ran.
+    """
+    study = load(protocol)
+    chosen = NewSession(
+        source=protocol,
+        participant=participant,
+        session=session,
+        seed=draw_seed() if seed is None else seed,
+        operator=operator,
+        language=study.study.languages[0] if language is None else language,
+        device=device,
+        windowed=windowed or pilot,
+        screen=screen,
+        results=(
+            study_results(Path("results"), study.study.name, device, pilot=pilot) if results is None else Path(results)
+        ),
+        pilot=pilot,
+        recordings=recordings,
+        firmware=firmware,
+    )
+    check(chosen, study)
+    return hold(chosen, tell)
+
+
+def resume(
+    session_folder: Path,
+    *,
+    protocol: str | None = None,
+    device: str | None = None,
+    firmware: Path | None = None,
+    operator: str = "",
+    windowed: bool = False,
+    screen: int | None = None,
+    tell: Callable[[str], object] | None = None,
+) -> int:
+    """Go on with a session whose program was ended; return the exit code when its windows are closed.
+
+    A rehearsed session goes on as one, without windows.
+
+    Parameters
+    ----------
+    protocol : file or name of its protocol; default: looked for among those at hand
+    device : default: the one it began with
+    firmware, operator, windowed, screen, tell : as for ``run``
+
+    Raises
+    ------
+    StudyError
+        It cannot go on (finished, of a changed protocol, open elsewhere); or device or servo failed while it ran.
+    """
+    folder = Path(session_folder)
+    session = locate(folder)[1]
+    refuse_never_begun(session)
+    if is_rehearsal(receipt.read(session.receipt)):
+        from study_app.session import rehearsal  # noqa: PLC0415 - the compiler: only once it is needed
+
+        rehearsal.resume(folder, protocol=protocol)
+        return 0
+    chosen = resumed(
+        folder,
+        protocol=protocol,
+        operator=operator,
+        device=device,
+        windowed=windowed,
+        screen=screen,
+        firmware=firmware,
+    )
+    check(chosen, load(chosen.source))
+    return hold(chosen, tell)
