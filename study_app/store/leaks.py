@@ -2,7 +2,7 @@
 
 A condition is told by its id, its liquid's id, the liquid's parameters and its delay. None of them may stand in a file
 or a name of a study folder, but for the sealed key, for the statements (whose words are shown to the participant
-anyway) and for the recordings, where forces and the ages of frames are measured.
+anyway), for the moments of events and for the recordings, where forces and the ages of frames are measured.
 """
 
 from __future__ import annotations
@@ -23,6 +23,8 @@ from study_app.store.layout import StudyFolder
 Tables: TypeAlias = Mapping[str, Any]
 
 _STATEMENTS = frozenset({"item", "items"})  # in journal, receipt and tables
+_CLOCKS = frozenset({"t_s", "onset_s", "first_choice_s", "last_change_s", "trial_started_s"})
+_PASSED_OVER = _STATEMENTS | _CLOCKS  # a moment may be any number: 1.717 s is no wake of 1717 ticks
 _SETTINGS = frozenset(
     {"id", "effects", "kind", "axes"}
 )  # words of the force model that tell no condition by themselves
@@ -123,7 +125,7 @@ def _cells(content: str) -> Iterator[tuple[str, str]]:
     for number, row in enumerate(csv.reader(io.StringIO(content, newline="")), start=1):
         header = header or row
         for column, cell in zip(header, row, strict=False):
-            if column not in _STATEMENTS:
+            if column not in _PASSED_OVER:
                 yield f", row {number}, {column}", cell
 
 
@@ -134,7 +136,7 @@ def _parsed(text: str, place: str) -> Iterator[tuple[str, str]]:
     except ValueError:
         yield place, text
         return
-    yield from _texts(value, place, _STATEMENTS)
+    yield from _texts(value, place, _PASSED_OVER)
 
 
 def _texts(value: Any, place: str, passed_over: frozenset[str]) -> Iterator[tuple[str, str]]:

@@ -70,6 +70,15 @@ def test_a_leak_is_found_wherever_it_is(tmp_path: Path, protocol: Protocol, star
     ]
 
 
+def test_the_moment_of_an_event_may_be_any_number(
+    tmp_path: Path, protocol: Protocol, start: Callable[..., SessionStore]
+) -> None:
+    store = start()
+    store.append("note", t_s=0.137, kind="mark", text="")
+    store.close()
+    assert found(tmp_path, protocol) == []
+
+
 def test_a_leak_does_not_show_its_word_by_itself(tmp_path: Path, protocol: Protocol) -> None:
     (tmp_path / "notes.txt").write_text("mildew")
     assert "mildew" not in repr(leaks(tmp_path, protocol))
