@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QPoint, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPaintEvent, QPen
+from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPaintEvent, QPen, QWheelEvent
 from PySide6.QtWidgets import (
     QAbstractButton,
     QCheckBox,
@@ -95,7 +95,11 @@ class ActionButton(Themed, QPushButton):
 
 
 class Choice(Themed, QComboBox):
-    """A list to choose one from, with its chevron."""
+    """A list to choose one from, with its chevron; the wheel scrolls the page, never the choice."""
+
+    def wheelEvent(self, event: QWheelEvent) -> None:  # noqa: N802 - Qt's name
+        """Leave the wheel to what scrolls."""
+        event.ignore()
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
         """Paint the field, then the chevron."""
@@ -138,6 +142,36 @@ class Check(Themed, QCheckBox):
         painter.drawRoundedRect(mark, 5, 5)
         if self.isChecked():
             draw_icon(painter, "check", mark.adjusted(2, 2, -2, -2), self.theme.on_accent, 3.0)
+
+
+class Toggle(Check):
+    """A yes or no that takes effect at once, as a switch; hit anywhere on switch or words."""
+
+    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+        """Return the room for switch and words."""
+        return QSize(round(QFontMetricsF(self.font()).horizontalAdvance(self.text())) + 50, 32)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+        """Paint a track with its knob at the right when on, and the words."""
+        t = self.theme
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setPen(QColor(t.text if self.isEnabled() else t.text3))
+        painter.setFont(self.font())
+        words = QRectF(46, 0, self.width() - 46, self.height())
+        painter.drawText(words, Qt.AlignmentFlag.AlignVCenter, self.text())
+        track = QRectF(4, self.height() / 2 - 9, 32, 18)
+        painter.setPen(QPen(QColor(t.accent if self.isChecked() else t.ctl), 1.4))
+        painter.setBrush(QColor(t.accent if self.isChecked() else t.surface))
+        painter.drawRoundedRect(track, 9, 9)
+        knob = QRectF(track.right() - 15 if self.isChecked() else track.left() + 3, track.top() + 3, 12, 12)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QColor(t.on_accent if self.isChecked() else t.ctl))
+        painter.drawEllipse(knob)
+        if self.hasFocus():
+            painter.setPen(QPen(QColor(t.accent), 2))
+            painter.setBrush(Qt.BrushStyle.NoBrush)
+            painter.drawRoundedRect(track.adjusted(-3, -3, 3, 3), 12, 12)
 
 
 class Radio(Themed, QRadioButton):

@@ -116,7 +116,8 @@ def stylesheet(theme: Theme) -> str:
 
     Dynamic properties: a QPushButton is outlined, ``role="primary"`` filled, ``role="danger"`` outlined in bad,
     ``role="plain"`` without an edge, ``role="stop"`` the force stop; a QFrame is a card with ``role="card"``; a QLabel
-    takes ``role`` text2, text3, ok, warn, bad or accent.
+    takes ``role`` text2, text3, ok, warn, bad or accent; a field is low with ``dense="true"``, its edge accent with
+    ``state="changed"`` and bad with ``state="refused"``.
     """
     t = theme
     return "\n".join(
@@ -166,6 +167,10 @@ def _fields(t: Theme) -> str:
 {field} {{ background: {t.surface}; color: {t.text}; border: 1px solid {t.ctl}; border-radius: {RADIUS_CONTROL}px;
   padding: 7px 12px; min-height: 24px; selection-background-color: {t.accent}; selection-color: {t.on_accent}; }}
 {focused} {{ border: 2px solid {t.accent}; padding: 6px 11px; }}
+QLineEdit[dense='true'], QComboBox[dense='true'] {{ padding: 3px 9px; min-height: 22px; }}
+QLineEdit[dense='true']:focus, QComboBox[dense='true']:focus {{ padding: 2px 8px; }}
+QLineEdit[state='changed'], QComboBox[state='changed'] {{ border: 2px solid {t.accent}; padding: 2px 8px; }}
+QLineEdit[state='refused'] {{ border: 2px solid {t.bad}; padding: 2px 8px; }}
 QComboBox::drop-down {{ border: none; width: 28px; }}
 QComboBox QAbstractItemView {{ background: {t.surface}; color: {t.text}; border: 1px solid {t.ctl};
   selection-background-color: {t.selected}; selection-color: {t.text}; outline: none; }}
