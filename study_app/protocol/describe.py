@@ -20,6 +20,12 @@ MOVE_S = 1.5
 statement, move from one target to the next."""
 
 
+BLINDINGS = {
+    "double": "double-blind: the operator sees no force",
+    "single": "single-blind: the operator sees force and wake",
+}
+
+
 def describe(protocol: Protocol) -> str:
     """Return the whole study in words, in its first language."""
     language = protocol.study.languages[0]
@@ -107,6 +113,7 @@ def _head(protocol: Protocol, language: str) -> Iterable[str]:
         ("Languages", ", ".join(study.languages)),
         ("Parts", f"{protocol.parts}"),
         ("Answers", f"{protocol.responses_per_participant()} per participant"),
+        ("Blinding", BLINDINGS[study.blinding]),
         ("Expected duration", f"about {expected_duration_s(protocol) / 60:.0f} min"),
         ("Force limit", f"{device.force_limit_n:g} N"),
         ("Servo", f"{device.rate_hz:g} Hz"),

@@ -57,6 +57,11 @@ class StudyHead(Table):
     resume: Literal["trial", "block"] = Field(
         default="trial", description="Where a session goes on that was interrupted: its trial again, or its block."
     )
+    blinding: Literal["double", "single"] = Field(
+        default="double",
+        description="Who must not know what is felt: participant and operator, or the participant alone; in a "
+        "single-blind study the operator sees force and wake while it runs.",
+    )
 
 
 class DeviceNeeds(Table):

@@ -16,6 +16,7 @@ REK = load("rek2024")
         "Languages          en, nl",
         "Parts              2",
         "Answers            62 per participant",
+        "Blinding           double-blind: the operator sees no force",
         "Expected duration  about 18 min",
         "Force limit        8 N",
         "100 × 60 × 60 mm of the hand, drawn and felt 10 times as large",
