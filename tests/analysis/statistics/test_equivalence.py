@@ -3,10 +3,11 @@ from itertools import product
 
 import numpy as np
 import pytest
+from scipy.stats import mannwhitneyu, wilcoxon
 from scipy.stats import t as t_distribution
-from scipy.stats import wilcoxon
 
 from study_app.analysis.statistics.equivalence import tost
+from study_app.analysis.statistics.paired import cliffs_delta
 from study_app.errors import AnalysisError
 
 # Hours of sleep gained by ten patients with two drugs (Student 1908; R, sleep).
@@ -26,6 +27,22 @@ def test_published_sleep_data() -> None:
     assert (result.interval.low, result.interval.high) == pytest.approx((-2.2930, -0.8670), abs=5e-5)
     assert result.interval.level == pytest.approx(0.9)
     assert result.verdict == "different"
+
+
+@pytest.mark.parametrize(
+    ("shift", "alternative", "w", "p"),
+    [(0.0, "two-sided", 25.5, 0.069328), (0.5, "greater", 34.0, 0.893853), (-0.5, "less", 20.0, 0.012874)],
+)
+def test_published_sleep_data_as_two_independent_groups_by_ranks(
+    shift: float, alternative: str, w: float, p: float
+) -> None:
+    # No study here has independent groups: W follows from our delta of two groups, its approximate p is scipy's.
+    delta = cliffs_delta(FIRST + shift, SECOND)
+    assert delta is not None
+    assert (delta + 1) / 2 * len(FIRST) * len(SECOND) == pytest.approx(w)
+    theirs = mannwhitneyu(FIRST + shift, SECOND, alternative=alternative, method="asymptotic", use_continuity=True)
+    assert (theirs.statistic, theirs.pvalue) == (pytest.approx(w), pytest.approx(p, abs=5e-7))
+    assert cliffs_delta(FIRST, SECOND) == pytest.approx(-0.49)
 
 
 @pytest.mark.parametrize("seed", range(6))

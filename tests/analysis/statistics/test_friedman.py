@@ -4,9 +4,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.stats import f as f_distribution
 from scipy.stats import friedmanchisquare, studentized_range
+from scipy.stats import t as t_distribution
 
 from study_app.analysis.statistics import friedman as module
+from study_app.analysis.statistics.families import holm
 from study_app.analysis.statistics.friedman import friedman
 from study_app.errors import AnalysisError
 
@@ -66,6 +69,7 @@ def test_published_times_to_first_base() -> None:
     assert result.effect == pytest.approx(0.2532468, abs=1e-7)
     assert result.f == pytest.approx(7.1217, abs=1e-4)
     assert result.p_f == pytest.approx(0.002574, abs=1e-6)
+    assert result.p_f == pytest.approx(f_distribution.sf(7.1217, 1.909, 40.091), abs=1e-6)
     assert result.method == "exact permutation"
 
 
@@ -128,6 +132,9 @@ def test_mean_ranks_give_the_published_nemenyi_and_conover_comparisons() -> None
     left = (1 - result.statistic / (n * (k - 1))) * 2 * n * (spread.sum() - n * k * (k + 1) ** 2 / 4)
     conover = [n * abs(x - y) / np.sqrt(left / ((n - 1) * (k - 1))) for x, y in ((a, b), (a, c))]
     assert conover == pytest.approx([4.47, 5.59], abs=0.005)
+    ps = [2 * float(t_distribution.sf(t, (n - 1) * (k - 1))) for t in conover]
+    assert ps == pytest.approx([0.001193, 0.000231], abs=5e-7)
+    assert holm([*ps, 0.289692])[:2] == pytest.approx([0.002387, 0.000692], abs=1e-6)
 
 
 @given(answers)

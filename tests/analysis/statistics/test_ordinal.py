@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from study_app.analysis.statistics.cumulative import Answers, fit, log_likelihood
 from study_app.analysis.statistics.ordinal import ordinal, profile_interval
@@ -39,6 +40,7 @@ def test_published_likelihood_ratio_of_contact() -> None:
     assert both.log_likelihood is not None
     assert cold.log_likelihood is not None
     assert 2 * (both.log_likelihood - cold.log_likelihood) == pytest.approx(11.043, abs=5e-4)
+    assert chi2.sf(2 * (both.log_likelihood - cold.log_likelihood), 1) == pytest.approx(0.00089, abs=5e-6)
     # The test of the function: both columns against none, by the two ratios one after the other.
     assert both.statistic == pytest.approx(11.043 + (cold.statistic or 0.0), abs=5e-4)
     assert both.df == 2
@@ -67,6 +69,8 @@ def test_published_quadrature_with_judges() -> None:
 def test_published_laplace_estimates_are_the_maximum_of_one_node() -> None:
     best, _ = log_likelihood(LAPLACE, WITHIN, nodes=1)
     assert best == pytest.approx(-81.56541, abs=5e-6)
+    assert (-2 * best + 2 * 7, -2 * best + 7 * np.log(72)) == pytest.approx((177, 193), abs=0.5)  # AIC, BIC
+    assert LAPLACE[-1] ** 2 == pytest.approx(1.279461, abs=2e-6)
     for place in range(len(LAPLACE)):
         for step in (-0.01, 0.01):
             moved = LAPLACE + step * (np.arange(len(LAPLACE)) == place)

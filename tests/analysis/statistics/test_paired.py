@@ -4,6 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import PermutationMethod, wilcoxon
 
+from study_app.analysis.statistics import paired as module
 from study_app.analysis.statistics.paired import cliffs_delta, paired
 from study_app.errors import AnalysisError
 
@@ -29,6 +30,13 @@ def test_published_differences_with_ties_and_zeros() -> None:
     assert result.p == pytest.approx(0.046875, rel=1e-12)
     assert (result.n, result.zeros) == (10, 2)
     assert "equal pairs left out" in result.method
+
+
+def test_published_differences_by_the_normal_approximation(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "EXACT_UP_TO", 0)
+    result = paired([0, 1, 1, -1, 2, 2, 3, 0, 1, 1], np.zeros(10))
+    assert result.p == pytest.approx(0.0310325, abs=5e-8)
+    assert "normal approximation, corrected for ties" in result.method
 
 
 @pytest.mark.parametrize(

@@ -34,6 +34,8 @@ READING = {
     "non-fiction": ((20145, 19961, 12768, 8797, 3622), 61.42466, 19.55493, 19.02042),
 }
 PUPILS = 66690
+MEANS = {"magazines": (3.254813, 1.245086), "newspapers": (3.140282, 1.442299)}
+"""Published means and standard deviations: the program gives none, but its counts must hold them."""
 
 
 def row_of(levels: list[float], people: int) -> pd.Series:
@@ -79,3 +81,18 @@ def test_many_pupils_some_of_whom_did_not_answer(item: str) -> None:
     row = row_of(list(np.repeat(np.arange(1, 6), counts)), PUPILS)
     assert (row["n"], row["missing"]) == (sum(counts), PUPILS - sum(counts))
     assert shares(row) == pytest.approx(expected, abs=5e-6)
+
+
+@pytest.mark.parametrize("item", MEANS)
+def test_the_counts_hold_the_published_means(item: str) -> None:
+    row = row_of(list(np.repeat(np.arange(1, 6), READING[item][0])), PUPILS)
+    levels = np.repeat(np.arange(1, 6), [row[f"count_{level + 1}"] for level in range(1, 6)])
+    assert (levels.mean(), levels.std(ddof=1)) == pytest.approx(MEANS[item], abs=5e-7)
+
+
+@pytest.mark.parametrize("item", MATH_ANXIETY)
+def test_every_level_of_the_students_has_its_share(item: str) -> None:
+    digits = MATH_ANXIETY[item][0]
+    row = row_of([float(digit) for digit in digits], 20)
+    for level in range(1, 6):
+        assert row[f"count_{level + 1}"] == digits.count(str(level))

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from scipy.special import ndtri
 from scipy.stats import binom
 
 from study_app.analysis.statistics.psychometric import Counts, Curve, fit, share
@@ -51,6 +52,9 @@ def test_published_beetles() -> None:
     assert -slope * (logit.effect or 0.0) == pytest.approx(-60.7175, abs=1e-4)
     probit = threshold(DOSES, KILLED, BEETLES, shape="normal", guess=0.0, lapse=0.0)
     assert (probit.effect, probit.statistic) == pytest.approx((1.77085, 10.1198), rel=1e-5)
+    assert probit.width is not None
+    slope = 2 * ndtri(0.95) / probit.width
+    assert (-slope * (probit.effect or 0.0), slope) == pytest.approx((-34.9353, 19.7279), abs=5e-4)
     # 20 published digits less: Wald's interval from the published errors of the coefficients is about as wide.
     assert logit.interval is not None
     assert logit.interval.high - logit.interval.low == pytest.approx(0.0152, rel=0.05)

@@ -56,6 +56,17 @@ def test_published_trends(values: np.ndarray, direction: str, statistic: float, 
     assert "exact permutation" in result.method
 
 
+@pytest.mark.parametrize(
+    ("values", "direction", "p"),
+    [(SIEGEL, "increasing", 0.0010825), (DULLER, "decreasing", 5.26e-10)],
+)
+def test_published_trends_by_the_normal_approximation(
+    values: np.ndarray, direction: str, p: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(trend, "EXACT_UP_TO", 0)
+    assert page(values, direction).p_untied == pytest.approx(p, rel=1e-3)  # type: ignore[arg-type]
+
+
 def test_without_ties_both_exact_p_are_one() -> None:
     result = page(CULTEVO)
     assert result.p == result.p_untied
