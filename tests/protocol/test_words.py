@@ -29,6 +29,10 @@ def test_templates_have_the_same_slots_in_every_language(language: str):
             assert slots(getattr(words(language), field.name)) == slots(getattr(words("en"), field.name)), field.name
 
 
+def test_only_languages_written_so_run_from_right_to_left():
+    assert {language for language in LANGUAGES if words(language).right_to_left} == {"ar"}
+
+
 def test_translations_differ():
     same = {f.name for f in dataclasses.fields(Words) if getattr(words("en"), f.name) == getattr(words("nl"), f.name)}
     assert same == {"enter_key", "escape_key"}
@@ -43,6 +47,8 @@ def test_translations_differ():
         ("en", list(range(1, 12)), "11 statements still need an answer: 1, 2, 3, 4, 5, 6, 7, 8, 9, 10 and 11."),
         ("nl", [5], "Eén uitspraak heeft nog een antwoord nodig: 5."),
         ("nl", [5, 8], "Twee uitspraken hebben nog een antwoord nodig: 5 en 8."),
+        ("de", [5, 8], "Zwei Aussagen brauchen noch eine Antwort: 5 und 8."),
+        ("fr", [5], "Une affirmation attend encore une réponse : 5."),
     ],
 )
 def test_the_sentence_about_missing_answers(language: str, numbers: list[int], sentence: str):
@@ -58,5 +64,5 @@ def test_templates_fill():
 
 
 def test_a_language_without_words_is_refused():
-    with pytest.raises(StudyError, match=r'in "fr" \(known: en, nl\)'):
-        words("fr")
+    with pytest.raises(StudyError, match=r'in "sv" \(known: ar, de, en, fr, nl\)'):
+        words("sv")

@@ -1,0 +1,98 @@
+"""The interface's own words on the participant's pages, per language: everything that no protocol writes.
+
+Templates in braces are filled with ``str.format``; where grammar depends on a number there is a method.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+RIGHT_TO_LEFT = frozenset({"ar", "dv", "fa", "he", "ks", "ps", "sd", "ug", "ur", "yi"})
+
+
+@dataclass(frozen=True, slots=True)
+class Words:
+    """One language's words; ``small_numbers`` are the numbers from one as they begin a sentence."""
+
+    language: str
+    name: str  # of the language, in itself
+    choose_language: str
+
+    # progress, at the top of every page of a part
+    part: str  # {part} {parts}
+    setting: str  # {label}, the trial's name with its number, and {of}
+
+    # pages to read
+    continue_: str
+    space_key: str
+    enter_key: str
+    escape_key: str
+
+    # tank
+    targets_reached: str
+    reached: str  # {reached} {of}
+    seconds_left: str  # {seconds}
+    continue_in: str  # {seconds}
+    continue_now: str
+    pause_hint: str
+
+    # questionnaire
+    please_answer: str
+    press_keys: str
+    answered: str  # {done} {of}
+    answers_kept: str
+    key_answer: str
+    key_move: str
+    optional: str
+    chosen: str
+    not_answered: str
+    one_missing: str  # {list}
+    many_missing: str  # {n} {list}
+    and_: str
+    small_numbers: tuple[str, ...]
+
+    # pause and force stop
+    pause_title: str
+    pause_body: str
+    pause_held_body: str
+    resume: str
+    force_off_title: str
+    force_off_body: str
+    force_held_title: str
+    force_held_body: str
+    force_on: str
+
+    # trouble
+    trouble_title: str
+    trouble_body: str
+
+    # ends
+    end_title: str
+    end_body: str
+    ended_early_title: str
+    ended_early_body: str
+
+    # before the first page
+    window_title: str
+    preparing: str
+
+    @property
+    def right_to_left(self) -> bool:
+        """Whether the language is written from right to left."""
+        return self.language in RIGHT_TO_LEFT
+
+    def joined(self, entries: Sequence[str]) -> str:
+        """Return "2", "2 and 5", "2, 5 and 8"."""
+        if len(entries) < 2:
+            return "".join(entries)
+        return f"{', '.join(entries[:-1])} {self.and_} {entries[-1]}"
+
+    def missing(self, numbers: Sequence[int]) -> str:
+        """Return the sentence that names the statements (by number, at least one) still without an answer."""
+        listed = self.joined([str(number) for number in numbers])
+        count = len(numbers)
+        if count == 1:
+            return self.one_missing.format(list=listed)
+        named = self.small_numbers[count - 1] if count <= len(self.small_numbers) else str(count)
+        return self.many_missing.format(n=named, list=listed)
