@@ -10,6 +10,7 @@ The packages, from the inside out; each imports only those named before it (a te
 ``session``     running it: pages, events, the transition table
 ``analysis``    understanding it: tables, figures, export
 ``evaluation``  the force model under test
+``lab``         the liquid lab without its windows: two settings side by side
 ``gui``         drawing it
 ``app``         where device, servo, store, session and windows meet
 ``cli``         the commands

@@ -1,0 +1,119 @@
+"""Which parameters a liquid has: every range can be set, every number stands where its name says."""
+
+from __future__ import annotations
+
+import pytest
+
+from study_app.errors import StudyError
+from study_app.haptics.scene import Channel, Given, Liquid, Scene
+from study_app.lab.changes import changed
+from study_app.lab.parameters import Parameter, parameter, sections, value_of
+from study_app.protocol.load import load_scenes, shipped
+
+SCENES = {f"{file}/{name}": scene for file in shipped() for name, scene in load_scenes(file).items()}
+
+
+def every(scene: Scene) -> list[Parameter]:
+    return [it for section in sections(scene) for it in section.parameters]
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_every_value_of_a_preset_can_be_set_again(name: str) -> None:
+    scene = SCENES[name]
+    for it in every(scene):
+        value = value_of(scene, it.name)
+        if value is None or it.name.startswith("effects") or it.name.startswith("motion."):
+            continue
+        assert value_of(changed(scene, it.name, value), it.name) == value
+        assert changed(scene, it.name, value) == scene, it.name
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_both_ends_of_every_range_are_taken(name: str) -> None:
+    scene = SCENES[name]
+    for it in every(scene):
+        ends = [choice for choice, _ in it.choices] if it.choices else [it.least, it.most]
+        for end in ends:
+            try:
+                out = changed(scene, it.name, end)
+            except StudyError as error:
+                allowed = ("outrun", "viscosity", "needs a region", "missing")
+                assert any(word in str(error) for word in allowed), (it.name, end, error)  # noqa: PT017
+            else:
+                if not isinstance(end, str):
+                    assert value_of(out, it.name) == pytest.approx(end)
+
+
+def test_a_number_out_of_range_is_refused_in_the_units_that_are_shown() -> None:
+    with pytest.raises(StudyError, match=r"Breaking span must be 0 mm to 500 mm, not 700 mm"):
+        changed(SCENES["rek2024/water"], "wake.breaking_span_m", 0.7)
+    with pytest.raises(StudyError, match="Density must be a number, not nan"):
+        changed(SCENES["rek2024/water"], "liquid.density_kg_m3", float("nan"))
+    with pytest.raises(StudyError, match="Density must be a number, not 'thick'"):
+        changed(SCENES["rek2024/water"], "liquid.density_kg_m3", "thick")
+
+
+def test_a_preset_beyond_the_labs_range_widens_it() -> None:
+    scene = changed(SCENES["rek2024/water"], "wake.scaling", 1e5)
+    liquid = scene.liquids[0]
+    assert liquid.wake is not None
+    wide = scene.model_copy(
+        update={
+            "liquids": (liquid.model_copy(update={"wake": liquid.wake.model_copy(update={"scaling": 1e7})}),),
+        }
+    )
+    assert parameter(wide, "wake.scaling").most == 1e7
+
+
+def test_a_liquid_without_viscosity_has_none_and_takes_one() -> None:
+    scene = SCENES["rek2024/water"]
+    assert value_of(scene, "liquid.viscosity_pa_s") is None
+    assert value_of(changed(scene, "liquid.viscosity_pa_s", 1e-3), "liquid.viscosity_pa_s") == 1e-3
+
+
+def test_only_the_tables_of_effects_that_are_called_for_are_shown() -> None:
+    titles = [section.title for section in sections(SCENES["rek2024/honey"])]
+    assert "Wake" not in titles
+    assert "Wake" in [it.title for it in sections(changed(SCENES["rek2024/honey"], "effects.wake", "on"))]
+    assert [it.title for it in sections(SCENES["rek2024/water"])][:4] == ["Liquid", "Wake", "Body", "Filter"]
+
+
+def test_components_are_parameters_of_their_own() -> None:
+    scene = changed(SCENES["rek2024/water"], "effects.current", "on")
+    moved = changed(scene, "current.velocity_mps.z", -1.5)
+    assert moved.liquids[0].current is not None
+    assert moved.liquids[0].current.velocity_mps == (0.5, 0.0, -1.5)  # type: ignore[union-attr]
+    assert value_of(moved, "current.velocity_mps.z") == -1.5
+
+
+def test_another_current_or_region_begins_as_large_as_the_hand_reaches() -> None:
+    scene = changed(changed(SCENES["rek2024/water"], "effects.current", "on"), "current.kind", "channel")
+    assert scene.liquids[0].current == Channel(width_m=1.0, peak_mps=0.5)
+    boxed = changed(SCENES["rek2024/water"], "region.kind", "box")
+    assert value_of(boxed, "region.size_m.y") == pytest.approx(1.0)
+    assert value_of(changed(boxed, "effects.surface", "on"), "effects.surface") == "on"
+
+
+def test_effects_bring_what_they_cannot_do_without() -> None:
+    scene = Scene(liquids=(Liquid(id="thin", density_kg_m3=1000.0, effects=()),))
+    with_wake = changed(scene, "effects.wake", "on")
+    assert with_wake.liquids[0].effects == ("drag", "wake")
+    local = changed(with_wake, "effects.local_wake", "on")
+    assert local.liquids[0].effects == ("drag", "local_wake")
+    assert changed(local, "effects.drag", "off").liquids[0].effects == ()
+
+
+def test_effects_by_hand_begin_as_the_gate_chose_them() -> None:
+    honey = SCENES["physical_liquids/honey"]
+    by_hand = changed(honey, "effects", "on").liquids[0]
+    assert by_hand.effects == ("drag", "buoyancy", "added_mass", "history")
+    assert by_hand.drag.law == "schiller-naumann"
+    assert changed(honey, "effects.history", "off").liquids[0].effects == ("drag", "buoyancy", "added_mass")
+
+
+def test_the_lab_takes_one_liquid_and_no_given_velocity() -> None:
+    water = SCENES["rek2024/water"]
+    with pytest.raises(StudyError, match="one liquid at a time"):
+        sections(Scene())
+    with pytest.raises(StudyError, match="estimator"):
+        sections(water.model_copy(update={"velocity": Given()}))

@@ -1,0 +1,146 @@
+"""Two settings and their edits: undo, drags, blinding."""
+
+from __future__ import annotations
+
+from random import Random
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from study_app.errors import StudyError
+from study_app.lab.workbench import Setting, Side, Workbench, other
+from study_app.protocol.load import load_scenes
+
+SCENES = load_scenes("rek2024")
+
+
+def bench() -> Workbench:
+    water, oil = SCENES["water"], SCENES["light_oil"]
+    return Workbench(Setting("Water", water, water), Setting("Light oil", oil, oil))
+
+
+def test_an_edit_goes_to_the_felt_setting_alone() -> None:
+    edited = bench().switch().change("liquid.density_kg_m3", 900.0)
+    assert edited.b.scene.liquids[0].density_kg_m3 == 900.0
+    assert edited.a == bench().a
+    assert edited.changed_names("B") == ("liquid.density_kg_m3",)
+    assert edited.changed_names("A") == ()
+    assert (edited.a.title, edited.b.title) == ("Water", "Light oil, edited")
+
+
+def test_a_drag_is_one_step() -> None:
+    edited = bench()
+    for value in (1600.0, 1500.0, 1400.0):
+        edited = edited.change("wake.length", value, held=True)
+    edited = edited.change("wake.length", 1300.0)
+    assert edited.a.value("wake.length") == 1300.0
+    assert len(edited.past) == 1
+    assert edited.undo().a == bench().a
+    assert edited.undo().redo().a == edited.a
+
+
+def test_a_drag_let_go_where_it_was_is_one_step_and_the_next_edit_another() -> None:
+    edited = bench().change("wake.length", 1600.0, held=True).change("wake.length", 1600.0)
+    assert len(edited.past) == 1
+    assert len(edited.change("wake.length", 1500.0).past) == 2
+
+
+def test_drags_of_two_parameters_are_two_steps() -> None:
+    edited = bench().change("wake.length", 1600.0, held=True).change("wake.exponent", 1.0, held=True)
+    assert len(edited.past) == 2
+    assert edited.undo().a.value("wake.length") == 1600.0
+
+
+def test_what_changes_nothing_is_no_step() -> None:
+    assert bench().change("wake.length", 1700.0) == bench()
+
+
+def test_a_refused_edit_says_why_and_leaves_everything() -> None:
+    with pytest.raises(StudyError, match="outrun"):
+        bench().change("wake.length", 1701.0)
+
+
+def test_choosing_and_copying_can_be_taken_back() -> None:
+    edited = bench().choose("A", "Honey", SCENES["honey"]).copy_felt_to_other()
+    assert edited.a == edited.b == Setting("Honey", SCENES["honey"], SCENES["honey"])
+    back = edited.undo().undo()
+    assert (back.a, back.b) == (bench().a, bench().b)
+    assert not back.may_undo
+
+
+def test_an_edit_after_undo_forgets_what_could_be_redone() -> None:
+    edited = bench().change("wake.exponent", 1.0).undo().change("wake.exponent", 2.0)
+    assert not edited.may_redo
+    assert edited.redo() == edited
+
+
+edits = st.lists(
+    st.one_of(
+        st.tuples(st.just("density"), st.floats(1.0, 25_000.0)),
+        st.tuples(st.just("held"), st.integers(1, 100)),
+        st.tuples(st.sampled_from(["switch", "copy", "undo", "redo"]), st.none()),
+    ),
+    max_size=25,
+)
+
+
+@settings(max_examples=40)
+@given(edits)
+def test_undo_takes_everything_back_and_redo_makes_it_again(steps: list[tuple[str, float | None]]) -> None:
+    it = bench()
+    for what, value in steps:
+        match what:
+            case "density":
+                it = it.change("liquid.density_kg_m3", value)
+            case "held":
+                it = it.change("wake.length", float(value or 1), held=True)
+            case "switch":
+                it = it.switch()
+            case "copy":
+                it = it.copy_felt_to_other()
+            case "undo":
+                it = it.undo()
+            case _:
+                it = it.redo()
+    last = it
+    while last.may_redo:
+        last = last.redo()
+    begun = it
+    while begun.may_undo:
+        begun = begun.undo()
+    assert (begun.a, begun.b) == (bench().a, bench().b)
+    again = begun
+    while again.may_redo:
+        again = again.redo()
+    assert (again.a, again.b) == (last.a, last.b)
+
+
+def test_blinding_hides_names_and_edits_and_draws_both_sides() -> None:
+    seen: set[tuple[Side, Side]] = set()
+    for seed in range(40):
+        blind = bench().blinded(Random(seed))  # noqa: S311 - a test draws
+        seen.add((blind.first, blind.felt))
+        assert {blind.shown_name("A"), blind.shown_name("B")} == {"Setting 1", "Setting 2"}
+        assert blind.shown_name(blind.first) == "Setting 1"
+        assert (blind.a, blind.b) == (bench().a, bench().b)
+    assert len(seen) == 4
+
+
+def test_while_blind_nothing_can_be_edited_and_switching_goes_on() -> None:
+    edited = bench().change("wake.exponent", 1.0)
+    blind = edited.blinded(Random(1))  # noqa: S311 - a test draws
+    for what in (
+        lambda: blind.change("wake.exponent", 2.0),
+        lambda: blind.choose("A", "Honey", SCENES["honey"]),
+        blind.copy_felt_to_other,
+    ):
+        with pytest.raises(StudyError, match="while the comparison is blind"):
+            what()
+    assert blind.undo() == blind
+    assert blind.changed_names("A") == ()
+    assert blind.switch().felt == other(blind.felt)
+    assert blind.blinded(Random(2)) == blind  # noqa: S311 - a test draws
+    revealed = blind.revealed()
+    assert revealed.shown_name("A") == "Water, edited"
+    assert revealed.may_undo
