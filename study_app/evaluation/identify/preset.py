@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-import json
-import textwrap
-from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -18,11 +15,10 @@ from study_app.evaluation.identify.parameters import Parameter
 from study_app.evaluation.output import make_folder
 from study_app.haptics import motion
 from study_app.haptics.offline import Table
-from study_app.haptics.scene import Given, Liquid, Scene
+from study_app.protocol.scene_text import scene_text
 from study_app.store.atomic import write_file
 
 COLUMNS: Final = tuple(f"{kind}_{axis}_n" for kind in ("measured", "fitted", "residual") for axis in "xyz")
-_COMMENT_LETTERS: Final = 110
 
 
 def text(found: Fit) -> str:
@@ -78,12 +74,8 @@ def preset(found: Fit, source: Path) -> str:
         f"Fitted to {source.name} (SHA-256 {digest[:16]}…), {found.summary()}.",
         *(f"Warning: {warning}." for warning in found.warnings),
     )
-    comments = [f"# {line}" for it in said for line in textwrap.wrap(it, _COMMENT_LETTERS)]
     notes = {_place(it, found): f"{100 * CONFIDENCE:g} %: {found.told(it)[1]}" for it in found.parameters}
-    lines = [*comments, "", "format = 1", *_tables(("scene",), _scene(found.scene), notes)]
-    for liquid in found.scene.liquids:
-        lines += _tables(("liquids", liquid.id), _liquid(liquid), notes)
-    return "\n".join(lines) + "\n"
+    return scene_text(found.scene, said=said, notes=notes)
 
 
 def _place(it: Parameter, found: Fit) -> tuple[str, ...]:
@@ -91,36 +83,3 @@ def _place(it: Parameter, found: Fit) -> tuple[str, ...]:
     if it.table == "body":
         return "scene", "body", it.field
     return "liquids", found.liquid_id, *(() if it.table == "liquid" else (it.table,)), it.field
-
-
-def _scene(scene: Scene) -> Mapping[str, Any]:
-    """Return what a scene file says of all liquids alike; it cannot say that velocities are given."""
-    given = {"velocity"} if isinstance(scene.velocity, Given) else set()
-    return scene.model_dump(exclude_none=True, exclude={"liquids", *given})
-
-
-def _liquid(liquid: Liquid) -> Mapping[str, Any]:
-    """Return what a scene file says of a liquid: without tables that mean nothing and say nothing new."""
-    idle = {name for name in ("added_mass", "history") if name not in liquid.effects}
-    fields = type(liquid).model_fields
-    idle = {name for name in idle if getattr(liquid, name) == fields[name].default}
-    return liquid.model_dump(exclude_none=True, exclude={"id", *idle})
-
-
-def _tables(place: tuple[str, ...], table: Mapping[str, Any], notes: Mapping[tuple[str, ...], str]) -> Iterator[str]:
-    """Yield a table of a TOML file, then those inside it."""
-    yield ""
-    yield f"[{'.'.join(place)}]"
-    for key, value in table.items():
-        if not isinstance(value, Mapping):
-            note = notes.get((*place, key))
-            yield f"{key} = {_written(value)}" + (f"  # {note}" if note else "")
-    for key, value in table.items():
-        if isinstance(value, Mapping) and value:
-            yield from _tables((*place, key), value, notes)
-
-
-def _written(value: object) -> str:
-    if isinstance(value, tuple):
-        return f"[{', '.join(_written(it) for it in value)}]"
-    return json.dumps(value, ensure_ascii=False) if isinstance(value, str | bool) else repr(value)

@@ -1,0 +1,63 @@
+"""A scene written as the file that ``load.load_scene`` reads: the one writer of ``[scene]`` and ``[liquids.*]``."""
+
+from __future__ import annotations
+
+import json
+import textwrap
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, Final, TypeAlias
+
+from study_app.haptics.scene import Given, Liquid, Scene
+
+Place: TypeAlias = tuple[str, ...]
+
+_COMMENT_LETTERS: Final = 110
+
+
+def scene_text(scene: Scene, *, said: Sequence[str] = (), notes: Mapping[Place, str] | None = None) -> str:
+    """Return a scene as a scene file.
+
+    Parameters
+    ----------
+    scene : a given velocity is left out, which a file cannot say
+    said : paragraphs that stand above it as comments
+    notes : comments beside single keys, by their place: ``("liquids", "water", "density_kg_m3")``
+    """
+    comments = [f"# {line}" for it in said for line in textwrap.wrap(it, _COMMENT_LETTERS)]
+    lines = [*comments, *([""] if comments else []), "format = 1", *_tables(("scene",), _scene(scene), notes or {})]
+    for liquid in scene.liquids:
+        lines += _tables(("liquids", liquid.id), _liquid(liquid), notes or {})
+    return "\n".join(lines) + "\n"
+
+
+def _scene(scene: Scene) -> Mapping[str, Any]:
+    """Return what a scene file says of all liquids alike; it cannot say that velocities are given."""
+    given = {"velocity"} if isinstance(scene.velocity, Given) else set()
+    return scene.model_dump(exclude_none=True, exclude={"liquids", *given})
+
+
+def _liquid(liquid: Liquid) -> Mapping[str, Any]:
+    """Return what a scene file says of a liquid: without tables that mean nothing and say nothing new."""
+    idle = {name for name in ("added_mass", "history") if name not in liquid.effects}
+    fields = type(liquid).model_fields
+    idle = {name for name in idle if getattr(liquid, name) == fields[name].default}
+    return liquid.model_dump(exclude_none=True, exclude={"id", *idle})
+
+
+def _tables(place: Place, table: Mapping[str, Any], notes: Mapping[Place, str]) -> Iterator[str]:
+    """Yield a table of a TOML file, then those inside it."""
+    yield ""
+    yield f"[{'.'.join(place)}]"
+    for key, value in table.items():
+        if not isinstance(value, Mapping):
+            note = notes.get((*place, key))
+            yield f"{key} = {_written(value)}" + (f"  # {note}" if note else "")
+    for key, value in table.items():
+        if isinstance(value, Mapping) and value:
+            yield from _tables((*place, key), value, notes)
+
+
+def _written(value: object) -> str:
+    if isinstance(value, tuple):
+        return f"[{', '.join(_written(it) for it in value)}]"
+    return json.dumps(value, ensure_ascii=False) if isinstance(value, str | bool) else repr(value)
