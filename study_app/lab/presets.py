@@ -1,0 +1,79 @@
+"""The liquids at hand, and a setting kept as a preset: a scene file that every command takes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from study_app.errors import ProtocolError
+from study_app.haptics.scene import Scene
+from study_app.lab.workbench import Setting
+from study_app.protocol.load import load_scene, load_scenes, shipped
+from study_app.protocol.scene_text import scene_text
+from study_app.store.atomic import write_file
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """A liquid that a side can be set to: the file or shipped name it is from, its id there, and what it is called."""
+
+    source: str
+    liquid: str
+    title: str
+
+    @property
+    def scene(self) -> Scene:
+        """The scene it is.
+
+        Raises
+        ------
+        ProtocolError
+            The file does not hold it any more.
+        """
+        return load_scene(self.source, self.liquid)
+
+    def setting(self) -> Setting:
+        """Return it as a side of the workbench begins with it."""
+        scene = self.scene
+        return Setting(spoken(self.liquid), scene, scene)
+
+
+def liquids_at_hand(folders: tuple[Path, ...] = (Path("protocols"),)) -> tuple[Choice, ...]:
+    """Return every liquid of the shipped protocols, then of the files in ``folders``; a broken file has none."""
+    sources = [*shipped(), *(str(path) for folder in folders for path in sorted(folder.glob("*.toml")))]
+    found: list[Choice] = []
+    for source in sources:
+        if source.endswith(".toml") and Path(source).stem in shipped():
+            continue
+        try:
+            names = tuple(load_scenes(source))
+        except ProtocolError:
+            continue
+        found += [Choice(source, name, f"{spoken(name)} ({Path(source).stem})") for name in names]
+    return tuple(found)
+
+
+def preset_text(setting: Setting) -> str:
+    """Return a setting as a scene file, with what was changed named above it."""
+    changed = ", ".join(setting.changed_names())
+    said = [f"{setting.name}, as set in the liquid lab."]
+    if changed:
+        said.append(f"Changed from the preset: {changed}.")
+    return scene_text(setting.scene, said=said)
+
+
+def save(path: Path, text: str) -> None:
+    """Write a preset, whole or not at all.
+
+    Raises
+    ------
+    StoreError
+        The file cannot be written.
+    """
+    write_file(path, text.encode())
+
+
+def spoken(liquid_id: str) -> str:
+    """Return the name of a liquid as people say it."""
+    words = liquid_id.replace("_", " ")
+    return words[:1].upper() + words[1:]

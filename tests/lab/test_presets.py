@@ -1,0 +1,76 @@
+"""Liquids at hand, and settings kept as files that read back as they were."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from study_app.cli import commands
+from study_app.errors import StoreError
+from study_app.haptics.scene import Scene
+from study_app.lab.changes import changed
+from study_app.lab.presets import Choice, liquids_at_hand, preset_text, save
+from study_app.lab.workbench import Setting
+from study_app.protocol.load import load_scene, load_scenes, shipped
+
+EDITS = (
+    ("effects.current", "on"),
+    ("current.kind", "channel"),
+    ("region.kind", "cylinder"),
+    ("effects.surface", "on"),
+    ("effects.local_wake", "on"),
+    ("velocity.kind", "foaw"),
+    ("liquid.density_kg_m3", 1234.5678901234567),
+    ("liquid.viscosity_pa_s", 1e-5),
+    ("effects.history", "on"),
+    ("history.window_s", 0.1),
+    ("effects.added_mass", "on"),
+    ("effects", "auto"),
+    ("motion.speed_mps", 1.5),
+    ("knee.law", "none"),
+)
+
+
+def edited(scene: Scene) -> Scene:
+    for name, value in EDITS:
+        scene = changed(scene, name, value)
+    return scene
+
+
+@pytest.mark.parametrize("source", shipped())
+@pytest.mark.parametrize("edit", [False, True])
+def test_a_preset_reads_back_as_it_was_and_check_takes_it(source: str, edit: bool, tmp_path: Path) -> None:
+    for name, origin in load_scenes(source).items():
+        setting = Setting(name, origin, edited(origin) if edit else origin)
+        path = tmp_path / f"{name}.toml"
+        save(path, preset_text(setting))
+        assert load_scene(path, name) == setting.scene
+        result = CliRunner().invoke(commands, ["check", str(path)])
+        assert result.exit_code == 0, result.output
+
+
+def test_a_preset_says_what_was_changed() -> None:
+    origin = load_scene("rek2024", "water")
+    text = preset_text(Setting("Water", origin, changed(origin, "wake.length", 1200.0)))
+    assert text.splitlines()[:2] == ["# Water, as set in the liquid lab.", "# Changed from the preset: wake.length."]
+    assert "Changed" not in preset_text(Setting("Water", origin, origin))
+
+
+def test_a_preset_that_cannot_be_written_says_why(tmp_path: Path) -> None:
+    with pytest.raises(StoreError, match="cannot be written"):
+        save(tmp_path / "nowhere" / "water.toml", "")
+
+
+def test_the_shipped_liquids_are_at_hand_with_those_of_a_folder_and_without_broken_files(tmp_path: Path) -> None:
+    origin = load_scene("rek2024", "honey")
+    save(tmp_path / "mine.toml", preset_text(Setting("Honey", origin, origin)))
+    (tmp_path / "broken.toml").write_text("format = ")
+    at_hand = liquids_at_hand((tmp_path,))
+    assert Choice("rek2024", "light_oil", "Light oil (rek2024)") in at_hand
+    assert Choice(str(tmp_path / "mine.toml"), "honey", "Honey (mine)") in at_hand
+    assert {it.source for it in at_hand} == {*shipped(), str(tmp_path / "mine.toml")}
+    assert len({it.title for it in at_hand}) == len(at_hand)
+    water = next(it for it in at_hand if it.liquid == "water")
+    assert water.setting().origin == water.scene
