@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
@@ -14,7 +15,7 @@ from study_app.analysis.judging import alone, judged
 from study_app.analysis.measures import Array, by_participant
 from study_app.analysis.questions import Block
 from study_app.analysis.results import BlockFound, Tested, Waiting
-from study_app.analysis.statistics.friedman import friedman
+from study_app.analysis.statistics.friedman import DRAWN_UP_TO, friedman
 from study_app.analysis.statistics.global_permutation import global_permutation
 from study_app.analysis.statistics.missing import skillings_mack
 from study_app.analysis.statistics.ordinal import ordinal
@@ -23,10 +24,15 @@ from study_app.analysis.statistics.paired import paired
 from study_app.analysis.tables import Study
 
 SEALED: Final = "after unblinding: the key is sealed, and this needs to know which setting is which"
-MANY: Final = 200
-"""Above so many participants fewer rearrangements are drawn, and no mixed model is fitted."""
+MANY: Final = DRAWN_UP_TO
+"""Above so many participants p of single statements is approximated, and no mixed model is fitted."""
 
-FEWER_DRAWS: Final = 499
+FEWER_DRAWS: Final = 1999
+"""So many rearrangements are drawn for the test over all statements above ``MANY``, which has no approximation."""
+
+MOST_DRAWS: Final = 199_999
+FLOOR: Final = 0.05
+"""The smallest p that draws can give, corrected for its family, is this share of alpha at most."""
 
 
 @dataclass(frozen=True)
@@ -52,8 +58,19 @@ class Asked:
 
     @property
     def draws(self) -> int:
-        """How many rearrangements are drawn where not all can be gone through."""
-        return DRAWS if self.n <= MANY else FEWER_DRAWS
+        """How many rearrangements are drawn for one statement where not all can be gone through.
+
+        So many that their number never decides whether something can be shown.
+        """
+        return self._draws(DRAWS, len(self.block.items))
+
+    @property
+    def draws_over_all(self) -> int:
+        """How many are drawn for the one test over all statements."""
+        return self._draws(DRAWS if self.n <= MANY else FEWER_DRAWS, 1)
+
+    def _draws(self, usual: int, members: int) -> int:
+        return min(MOST_DRAWS, max(usual, math.ceil(members / (FLOOR * self.decided.alpha))))
 
 
 def asked(study: Study, block: Block, seed: int, each: Callable[[str], object]) -> Asked:
@@ -117,7 +134,7 @@ def over_all(of: Asked) -> Outcome | None:
     if of.k < 2:
         return None
     of.each("all statements")
-    return global_permutation(np.array(list(of.values.values())), draws=of.draws, seed=of.seed)
+    return global_permutation(np.array(list(of.values.values())), draws=of.draws_over_all, seed=of.seed)
 
 
 def asked_again(

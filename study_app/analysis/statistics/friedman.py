@@ -23,8 +23,11 @@ from study_app.analysis.statistics.outcome import DRAWS, NO_VARIATION, Array, Ou
 WORK: Final = 1_500_000
 """So many sums may be formed for an exact distribution; beyond that p is drawn."""
 
-DRAWN_UP_TO: Final = 2000
-"""Beyond so many participants the chi-square p is nearer to the exact one than a drawn p."""
+DRAWN_UP_TO: Final = 200
+"""Beyond so many participants the chi-square p is used: nearer to the exact one, far from 0.5, than a drawn p, which
+cannot fall below 1 / (1 + draws)."""
+
+APPROXIMATE: Final = f"chi-square approximation, corrected for ties, as always above {DRAWN_UP_TO} participants"
 
 TABLED: Final = 7
 """Up to so many settings all their orders fit into a table."""
@@ -137,16 +140,16 @@ def _without(n: int, dropped: int, k: int, note: str) -> Friedman:
     )
 
 
-def _p(ranks: Whole, squares: int, draws: int, seed: int) -> tuple[float | None, float, str]:
-    """Return p (None: take the chi-square's), the smallest it could have been, and how it was found."""
+def _p(ranks: Whole, squares: int, draws: int, seed: int) -> tuple[float | None, float | None, str]:
+    """Return p (None: take the chi-square's), the smallest it could have been (None: any), and how it was found."""
     n, k = ranks.shape
     exact = distribution(tuple(sorted(tuple(sorted(row)) for row in ranks.tolist())))
     if exact is not None:
         support, tails = exact
         return float(tails[np.searchsorted(support, squares)]), float(tails[-1]), "exact permutation"
-    least = math.exp((1 - n) * math.lgamma(k + 1))
     if n > DRAWN_UP_TO:
-        return None, least, "chi-square approximation"
+        return None, None, APPROXIMATE
+    least = math.exp((1 - n) * math.lgamma(k + 1))
     drawn = _squares(drawn_sums(ranks, draws, seed), n)
     p = (1 + int((drawn >= squares).sum())) / (1 + draws)
     return p, max(least, 1 / (1 + draws)), f"Monte Carlo permutation, {draws} draws, seed {seed}"

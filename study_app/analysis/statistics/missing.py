@@ -9,18 +9,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy.stats import chi2 as chi_square
 from scipy.stats import rankdata
 
-from study_app.analysis.statistics.friedman import DRAWN_UP_TO, NO_INTERVAL, shuffles
+from study_app.analysis.statistics.friedman import APPROXIMATE, DRAWN_UP_TO, NO_INTERVAL, shuffles
 from study_app.analysis.statistics.outcome import DRAWS, NO_VARIATION, Array, Outcome, checked
 from study_app.errors import AnalysisError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SkillingsMack(Outcome):
-    """Skillings and Mack's T with ``df`` degrees of freedom; ``p_chi2`` is its approximation, which ignores ties.
+    """Skillings and Mack's T with ``df`` degrees of freedom; ``p_chi2`` is its published approximation, without ties.
 
     ``effect`` is T over its largest possible value, which without missing answers is Kendall's W. ``missing`` counts
     the missing answers of the participants that were used. ``adjusted_sums`` has one entry a setting.
@@ -58,7 +58,7 @@ def skillings_mack(values: ArrayLike, *, draws: int = DRAWS, seed: int = 1) -> S
     df = int(np.linalg.matrix_rank(inverse)) if len(rows) else 0
     note = "" if scores.any() else NO_VARIATION if len(rows) else "no participant answered under two settings"
     p_chi2 = None if note else float(chi_square.sf(statistic, df))
-    p, smallest, method = (None, None, "none") if note else _p(scores, rows, inverse, statistic, draws, seed)
+    p, smallest, method = (None, None, "none") if note else _p(scores, rows, inverse, draws, seed)
     ideal = _scores(np.where(np.isnan(rows), np.nan, np.arange(k))).sum(axis=0)
     return SkillingsMack(
         test="Skillings-Mack",
@@ -66,7 +66,7 @@ def skillings_mack(values: ArrayLike, *, draws: int = DRAWS, seed: int = 1) -> S
         dropped=int((~used).sum()),
         statistic_name="T",
         statistic=None if note else statistic,
-        p=p_chi2 if p is None else p,
+        p=p,
         smallest_p=smallest,
         method=method,
         effect_name="T over the T of full agreement",
@@ -99,17 +99,33 @@ def _covariance(there: Array) -> Array:
     return covariance
 
 
-def _p(
-    scores: Array, rows: Array, inverse: Array, found: float, draws: int, seed: int
-) -> tuple[float | None, float | None, str]:
-    """Return p by shuffling each participant's given answers (None: take the chi-square's), its least and method."""
+def _tied_covariance(scores: Array, there: NDArray[np.bool_]) -> Array:
+    """Return the covariance (k, k) of the adjusted sums when each participant's own ``scores`` change places.
+
+    Without ties it is ``_covariance``.
+    """
+    counts = there.sum(axis=1)
+    spread = (scores**2).sum(axis=1) / (counts - 1) / counts
+    weighted: Array = there * np.sqrt(spread)[:, None]
+    covariance: Array = -(weighted.T @ weighted)
+    np.fill_diagonal(covariance, 0.0)
+    np.fill_diagonal(covariance, -covariance.sum(axis=1))
+    return covariance
+
+
+def _p(scores: Array, rows: Array, inverse: Array, draws: int, seed: int) -> tuple[float, float | None, str]:
+    """Return p by shuffling each participant's given answers, the smallest it could have been, and the method."""
+    sums = scores.sum(axis=0)
     if len(rows) > DRAWN_UP_TO:
-        return None, None, "chi-square approximation"
+        covariance = _tied_covariance(scores, ~np.isnan(rows))
+        reached = float(sums @ np.linalg.pinv(covariance) @ sums)
+        return float(chi_square.sf(reached, np.linalg.matrix_rank(covariance))), None, APPROXIMATE
+    found = float(sums @ inverse @ sums)
     rng = np.random.default_rng(seed)
-    sums = np.zeros((draws, rows.shape[1]))
+    drawn = np.zeros((draws, rows.shape[1]))
     for score, values in zip(scores, rows, strict=True):
         there = np.flatnonzero(~np.isnan(values))
-        sums[:, there] += score[there][shuffles(rng, draws, len(there))]
-    reached = np.einsum("dk,kl,dl->d", sums, inverse, sums)
-    p = (1 + int((reached >= found - 1e-9 * abs(found)).sum())) / (1 + draws)
+        drawn[:, there] += score[there][shuffles(rng, draws, len(there))]
+    statistics = np.einsum("dk,kl,dl->d", drawn, inverse, drawn)
+    p = (1 + int((statistics >= found - 1e-9 * abs(found)).sum())) / (1 + draws)
     return p, 1 / (1 + draws), f"Monte Carlo permutation, {draws} draws, seed {seed}"

@@ -223,6 +223,16 @@ def test_seven_settings_are_drawn_and_many_people_approximated() -> None:
     seven = friedman(rng.integers(1, 8, (5, 7)))
     assert seven.method.startswith("Monte Carlo")
     assert seven.smallest_p == 1 / 10000
-    many = friedman(rng.integers(1, 8, (module.DRAWN_UP_TO + 1, 3)))
-    assert many.method == "chi-square approximation"
-    assert many.p == many.p_chi2
+    for k in (3, 7):
+        many = friedman(rng.integers(1, 8, (300, k)), draws=499)
+        assert many.method == "chi-square approximation, corrected for ties, as always above 200 participants"
+        assert (many.p, many.smallest_p) == (many.p_chi2, None)
+
+
+@pytest.mark.parametrize("k", [3, 4, 7])
+def test_the_approximation_is_near_the_drawn_p_where_it_takes_over(k: int) -> None:
+    rng = np.random.default_rng(k)
+    values = rng.integers(1, 8, (module.DRAWN_UP_TO, k)) + (rng.random((module.DRAWN_UP_TO, k)) < 0.06 * np.arange(k))
+    drawn = friedman(values)
+    assert drawn.p_chi2 is not None
+    assert drawn.p == pytest.approx(drawn.p_chi2, abs=3 * np.sqrt(drawn.p_chi2 / 9999) + 0.002)

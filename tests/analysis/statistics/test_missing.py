@@ -3,6 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from study_app.analysis.statistics import missing
 from study_app.analysis.statistics.friedman import friedman
 from study_app.analysis.statistics.missing import skillings_mack
 from study_app.errors import AnalysisError
@@ -74,3 +75,22 @@ def test_nothing_to_compare_is_said_and_never_nan() -> None:
     assert (empty.n, empty.note) == (0, "no participant answered under two settings")
     with pytest.raises(AnalysisError, match="at least 3"):
         skillings_mack(ASSEMBLY[:, :2])
+
+
+def test_many_people_are_approximated_with_their_ties(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(5)
+    values = rng.integers(3, 6, (250, 4)).astype(float)  # three levels: many ties
+    whole, ours = friedman(values), skillings_mack(values)
+    assert "chi-square approximation, corrected for ties" in ours.method
+    assert ours.smallest_p is None
+    assert ours.p == pytest.approx(whole.p_chi2)  # without gaps it is Friedman's, ties and all
+    assert ours.p_chi2 is not None
+    assert whole.p_chi2 is not None
+    assert ours.p_chi2 > whole.p_chi2  # the published one takes no ties into account
+    values[rng.random(values.shape) < 0.1] = NA
+    drawn = skillings_mack(values[:150])
+    monkeypatch.setattr(missing, "DRAWN_UP_TO", 100)
+    near = skillings_mack(values[:150])
+    assert "Monte Carlo" in drawn.method
+    assert "approximation" in near.method
+    assert near.p == pytest.approx(drawn.p, abs=0.02)
