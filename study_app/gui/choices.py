@@ -81,7 +81,7 @@ def resumed(
         session=start["session"],
         seed=start["seed"],
         operator=operator,
-        language=start["language"],
+        language=done.language,
         device=device if device is not None else start["device"],
         windowed=windowed or start["pilot"],
         screen=screen,

@@ -71,8 +71,8 @@ def expected_duration_s(protocol: Protocol) -> float:
 
 
 def _reading_s(protocol: Protocol, page_id: str, language: str) -> float:
-    body = protocol.text(protocol.pages[page_id].body, language)
-    return PAGE_S + len(body.split()) / READING_WORDS_PER_S
+    page = protocol.pages[page_id]
+    return max(PAGE_S + len(protocol.text(page.body, language).split()) / READING_WORDS_PER_S, page.min_s or 0.0)
 
 
 def _block_s(protocol: Protocol, block: Block, language: str) -> float:

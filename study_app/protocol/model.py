@@ -131,6 +131,20 @@ class PageText(Table):
     title: Localised = Field(description="Heading of the page.")
     body: Localised = Field(description="The text; a blank line begins a paragraph.")
     button: Localised | None = Field(default=None, description="Words on the button; left out: Continue.")
+    min_s: float | None = Field(
+        default=None,
+        gt=0,
+        le=3600,
+        description="A break's least time [s], counted down on the page; left out: as long as the participant likes.",
+    )
+
+    @model_validator(mode="after")
+    def _only_breaks_last(self) -> Self:
+        if self.min_s is not None and self.kind != "break":
+            raise PydanticCustomError(
+                "break", "belongs to a page of kind break, not {kind}", {"kind": self.kind, "place": "min_s"}
+            )
+        return self
 
 
 class Limits(Table):

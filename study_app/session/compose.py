@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from study_app.protocol.schedule import PageStep, Trial
 from study_app.protocol.words import Words, words
 from study_app.session.pages import (
     EndPage,
@@ -53,6 +54,10 @@ def _text_page(state: SessionState) -> TextPage:
         title=_text(state, text.title),
         paragraphs=protocol.paragraphs(text.body, language),
         button=_words(state).continue_ if text.button is None else _text(state, text.button),
+        progress=_progress_between(state) if text.kind in {"instructions", "break"} else None,
+        language=language,
+        languages=state.languages,
+        stays_until_s=state.stays_until_s,
     )
 
 
@@ -89,15 +94,24 @@ def _questionnaire_page(state: SessionState) -> QuestionnairePage:
     )
 
 
-def _progress(state: SessionState) -> Progress | None:
-    """Return where the trial is among its part's; None outside the parts, as in a practice."""
-    protocol, trial = state.plan.protocol, state.trial
-    if trial.part is None:
+def _progress(state: SessionState) -> Progress:
+    """Return where the trial is among its block's."""
+    trial = state.trial
+    return _among(state, trial, trial.label(state.plan.protocol, state.plan.language), trial.index)
+
+
+def _progress_between(state: SessionState) -> Progress | None:
+    """Return where a page to read is: before the first trial of its part, or after so many; None outside the parts."""
+    steps = state.plan.schedule.steps
+    trials = [step for step in (*steps[state.index + 1 :], None) if not isinstance(step, PageStep)]
+    coming = trials[0]
+    done = next((step for step in reversed(steps[: state.index]) if isinstance(step, Trial)), None)
+    if done is not None and (coming is None or state.plan.protocol.pages[state.page_id].kind == "break"):
+        return None if done.part is None else _among(state, done, "", done.index + 1)
+    if coming is None or coming.part is None:
         return None
-    return Progress(
-        part=trial.part,
-        parts=protocol.parts,
-        label=trial.label(protocol, state.plan.language),
-        index=trial.index,
-        of=trial.of,
-    )
+    return _among(state, coming, "", coming.index)
+
+
+def _among(state: SessionState, trial: Trial, label: str, index: int) -> Progress:
+    return Progress(part=trial.part, parts=state.plan.protocol.parts, label=label, index=index, of=trial.of)

@@ -24,6 +24,14 @@ class Continue:
 
 
 @dataclass(frozen=True, slots=True)
+class LanguageChosen:
+    """The participant wants to read in another of the study's languages; possible until a consent is given."""
+
+    at_s: float
+    language: str
+
+
+@dataclass(frozen=True, slots=True)
 class TaskDone:
     """The task of the running trial is over; ``summary`` is what its trial row records (see ``store.columns``)."""
 
@@ -117,6 +125,7 @@ class Broke:
 Event: TypeAlias = (
     Begin
     | Continue
+    | LanguageChosen
     | TaskDone
     | ItemShown
     | Chosen

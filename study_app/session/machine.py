@@ -33,6 +33,7 @@ from study_app.session.events import (
     Event,
     ForceStopped,
     ItemShown,
+    LanguageChosen,
     Note,
     PauseAsked,
     RepeatAsked,
@@ -49,6 +50,7 @@ TRANSITIONS: dict[tuple[Phase, type[Event]], Move] = {
     # phase           event           what happens              next phase
     (Phase.OPENING, Begin): moves.begin,  # → reading, task; paused before a trial of a session that goes on
     (Phase.READING, Continue): moves.read_on,  # → reading, task, complete
+    (Phase.READING, LanguageChosen): moves.choose_language,  # stays
     (Phase.TASK, TaskDone): moves.end_task,  # → answering; reading, task, complete without a questionnaire
     (Phase.ANSWERING, ItemShown): moves.show_item,  # stays
     (Phase.ANSWERING, Chosen): moves.choose,  # stays

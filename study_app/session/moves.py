@@ -28,6 +28,7 @@ from study_app.session.events import (
     EndAsked,
     ForceStopped,
     ItemShown,
+    LanguageChosen,
     Note,
     PauseAsked,
     RepeatAsked,
@@ -44,18 +45,31 @@ Commands: TypeAlias = tuple[Command, ...]
 Result: TypeAlias = tuple[SessionState, Commands]
 
 
-def begin(state: SessionState, _event: Begin) -> Result:
+def begin(state: SessionState, event: Begin) -> Result:
     """Go to the first step, or to where an interrupted session goes on; a trial waits there until somebody is ready."""
-    entered, done = _enter(state, state.plan.start.step)
+    entered, done = _enter(state, state.plan.start.step, at_s=event.at_s)
     if state.plan.start == FIRST or entered.phase is not Phase.TASK:
         return entered, done
     waiting = replace(entered, phase=Phase.PAUSED, interrupted=Phase.TASK, attempt=entered.attempt - 1)
     return waiting, (Write("paused", {"by": "program"}), WriteTables(), _show(waiting))
 
 
-def read_on(state: SessionState, _event: Continue) -> Result:
-    """Leave a page that was read."""
-    return _enter(state, state.index + 1, (Write("page_left", {"page": state.page_id}),))
+def read_on(state: SessionState, event: Continue) -> Result:
+    """Leave a page that was read; one that lasts some time stays until then, whoever presses what."""
+    if state.stays_until_s is not None and event.at_s < state.stays_until_s:
+        return state, ()
+    return _enter(state, state.index + 1, (Write("page_left", {"page": state.page_id}),), at_s=event.at_s)
+
+
+def choose_language(state: SessionState, event: LanguageChosen) -> Result:
+    """Show the page in another language, and all that come."""
+    if event.language == state.plan.language:
+        return state, ()
+    if event.language not in state.languages:
+        offered = f"choose {' or '.join(state.languages)}" if state.languages else "it is chosen before the consent"
+        raise SessionError(f"language {event.language!r} cannot be chosen now: {offered}")
+    chosen = replace(state, plan=replace(state.plan, language=event.language))
+    return chosen, (Write("language_chosen", {"language": event.language}), WriteTables(), _show(chosen))
 
 
 def end_task(state: SessionState, event: TaskDone) -> Result:
@@ -63,7 +77,7 @@ def end_task(state: SessionState, event: TaskDone) -> Result:
     ended = Write("trial_ended", {**_which(state), "outcome": event.outcome, **event.summary})
     done: Commands = (StopTrial(), Rest(), ended)
     if not state.asks:
-        return _enter(state, state.index + 1, done)
+        return _enter(state, state.index + 1, done, at_s=event.at_s)
     asking = replace(state, phase=Phase.ANSWERING, answers={})
     return asking, (*done, WriteTables(), _show(asking))
 
@@ -91,12 +105,13 @@ def choose(state: SessionState, event: Chosen) -> Result:
     return _with_answer(state, event.item, answer), (written,)
 
 
-def submit(state: SessionState, _event: Submitted) -> Result:
+def submit(state: SessionState, event: Submitted) -> Result:
     """Keep the responses and go on, if every required statement has its answer."""
     if missing := _missing(state):
         listed = ", ".join(map(str, missing))
         raise SessionError(f"not every required statement is answered: answer {listed} first")
-    return _enter(state, state.index + 1, (Write("responses", {**_which(state), "items": _responses(state)}),))
+    written = Write("responses", {**_which(state), "items": _responses(state)})
+    return _enter(state, state.index + 1, (written,), at_s=event.at_s)
 
 
 def pause(state: SessionState, event: PauseAsked) -> Result:
@@ -178,9 +193,9 @@ def call_operator(state: SessionState, event: Broke) -> Result:
     return trouble, (StopForce(), *_break_off(state), *written, _show(trouble))
 
 
-def _enter(state: SessionState, index: int, done: Commands = ()) -> Result:
-    """Go to the step at ``index``; ``done`` comes first and finishes the step before."""
-    state = replace(state, index=index, attempt=1, answers={})
+def _enter(state: SessionState, index: int, done: Commands = (), *, at_s: float) -> Result:
+    """Go to the step at ``index`` at a moment; ``done`` comes first and finishes the step before."""
+    state = replace(state, index=index, attempt=1, answers={}, since_s=at_s)
     if state.step is None:
         state = replace(state, phase=Phase.COMPLETE)
         return state, (*done, Finish("completed"), _show(state))

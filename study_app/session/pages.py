@@ -13,9 +13,13 @@ from study_app.protocol.model import Explore, Reach
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """Where we are: part ``part`` of ``parts``; within it setting ``index`` of ``of`` under a neutral label."""
+    """Where we are: part ``part`` of ``parts``; within it setting ``index`` of ``of`` under a neutral label.
 
-    part: int
+    ``part`` is None outside the parts, as in a practice; a page to read has no label, and the settings before
+    ``index`` are done, all of them where it is ``of + 1``.
+    """
+
+    part: int | None
     parts: int
     label: str
     index: int
@@ -24,7 +28,12 @@ class Progress:
 
 @dataclass(frozen=True, slots=True)
 class TextPage:
-    """A text to read and a button to go on: consent, instructions, announcements, breaks, the debrief."""
+    """A text to read and a button to go on: consent, instructions, announcements, breaks, the debrief.
+
+    ``language`` is the one all pages are in from here on; ``languages`` are those that may be chosen instead, with it
+    among them, none where there is no choice. ``stays_until_s`` is when the page may be left at the earliest [s,
+    session's clock], None at once.
+    """
 
     id: str
     kind: Literal["consent", "instructions", "break", "debrief"]
@@ -32,6 +41,9 @@ class TextPage:
     paragraphs: tuple[str, ...]
     button: str
     progress: Progress | None = None
+    language: str = "en"
+    languages: tuple[str, ...] = ()
+    stays_until_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

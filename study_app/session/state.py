@@ -33,8 +33,9 @@ FINAL = frozenset({Phase.COMPLETE, Phase.ENDED})
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """What stays the same through a session; ``key`` (block → code → condition) is blinded and never printed.
+    """What stays the same through a session, but for the language, which a participant may choose at its beginning.
 
+    ``key`` (block → code → condition) is blinded and never printed.
     ``start`` is where it begins: not at the first step where it was interrupted before.
     """
 
@@ -77,6 +78,7 @@ class SessionState:
     presentations of the present trial from 1. ``answers`` holds the statements of the present questionnaire that were
     shown or answered. ``interrupted`` is the phase that a pause goes back to. ``force_off`` says that the force was
     stopped and has not been faded in again, ``held`` what the operator stopped, so that the operator alone resumes.
+    ``since_s`` is when the present step was entered [s, session's clock].
     """
 
     plan: Plan = field(repr=False)
@@ -87,6 +89,7 @@ class SessionState:
     interrupted: Phase | None = None
     force_off: bool = False
     held: Hold | None = None
+    since_s: float = 0.0
 
     @property
     def step(self) -> Step | None:
@@ -106,6 +109,20 @@ class SessionState:
         if isinstance(step := self.step, PageStep):
             return step.page_id
         raise SessionError("no page is being read: wait for the next one")
+
+    @property
+    def stays_until_s(self) -> float | None:
+        """When the page that is read may be left at the earliest [s, session's clock]; None: at once."""
+        least_s = self.plan.protocol.pages[self.page_id].min_s
+        return None if least_s is None else self.since_s + least_s
+
+    @property
+    def languages(self) -> tuple[str, ...]:
+        """The languages that the participant may choose from now: the study's, until a consent is given."""
+        offered, pages = self.plan.protocol.study.languages, self.plan.protocol.pages
+        before = self.plan.schedule.steps[: self.index]
+        early = all(isinstance(step, PageStep) and pages[step.page_id].kind != "consent" for step in before)
+        return offered if len(offered) > 1 and early and isinstance(self.step, PageStep) else ()
 
     @property
     def trial(self) -> Trial:

@@ -32,6 +32,7 @@ EVENTS: tuple[Event, ...] = (
     ),
     Event("page_shown", "A page of text was shown.", ("page",)),
     Event("page_left", "The participant went on from it.", ("page",)),
+    Event("language_chosen", "The participant reads in another of the study's languages from here on.", ("language",)),
     Event("trial_started", "A trial was presented.", (*_WHICH, "block", "phase", "part", "index", "of", "code")),
     Event("target_reached", "A target was reached, on the task's clock.", ("trial", "target", "t_task_s")),
     Event("trial_ended", "The trial's task was over, and what was measured of it.", (*_WHICH, "outcome")),

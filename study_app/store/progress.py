@@ -31,7 +31,8 @@ class Progress:
     schedule of the step to continue at: the first that was not left behind. ``page`` or ``trial`` names it where it was
     begun: of a trial, ``attempt`` counts how often it was presented, ``task_done`` says that the last time its task ran
     to the end (so only answers are missing, or, without a questionnaire, nothing), and ``answers`` holds what was
-    chosen since. ``ended`` is the status of a finished session. ``t_s`` is the latest moment on its clock.
+    chosen since. ``ended`` is the status of a finished session. ``t_s`` is the latest moment on its clock, ``language``
+    the participant's.
     """
 
     start: Line
@@ -44,6 +45,7 @@ class Progress:
     ended: str | None = None
     resumed: int = 0
     t_s: float = 0.0
+    language: str = ""
 
 
 def progress(session_folder: Path) -> Progress:
@@ -68,7 +70,7 @@ def progress_of(lines: Sequence[Line]) -> Progress:
     """
     if not lines or lines[0]["event"] != "session_started":
         raise StoreError("the journal does not begin with session_started: nothing was begun that could go on")
-    now = Progress(lines[0])
+    now = Progress(lines[0], language=lines[0].get("language", ""))
     for line in lines[1:]:
         now = replace(_after(now, line), t_s=max(now.t_s, line["t_s"]))
     return now
@@ -91,6 +93,8 @@ def _after(now: Progress, line: Line) -> Progress:
             return _left(now)
         case "session_ended":
             return replace(now, ended=line["status"])
+        case "language_chosen":
+            return replace(now, language=line["language"])
         case "session_resumed":
             return replace(now, resumed=now.resumed + 1)
     return now

@@ -87,11 +87,17 @@ def participant(lines: Sequence[Line]) -> Row:
         "session_ended_at": ends[-1]["at"] if ends else None,
         "resumed": sum(line["event"] == "session_resumed" for line in lines),
         "device": start.get("device"),
-        "language": start["language"],
+        "language": language(lines),
         "trials": len(main),
         "responses": len(answered),
         "validity": None if not verdicts else "valid" if all(verdicts) else "invalid",
     }
+
+
+def language(lines: Sequence[Line]) -> str:
+    """Return the language of the participant's pages: the session's own, or what was chosen instead."""
+    chosen = [line["language"] for line in lines if line["event"] == "language_chosen"]
+    return str(chosen[-1] if chosen else lines[0]["language"])
 
 
 def within_limits(measured: Mapping[str, Any], limits: Mapping[str, float]) -> bool | None:

@@ -32,6 +32,7 @@ from study_app.session.events import (
     Event,
     ForceStopped,
     ItemShown,
+    LanguageChosen,
     Note,
     PauseAsked,
     RepeatAsked,
@@ -40,7 +41,7 @@ from study_app.session.events import (
     TaskDone,
 )
 from study_app.session.machine import TRANSITIONS, advance, open_session
-from study_app.session.pages import EndPage, PausePage, QuestionnairePage, TaskPage, TextPage, TroublePage
+from study_app.session.pages import EndPage, PausePage, Progress, QuestionnairePage, TaskPage, TextPage, TroublePage
 from study_app.session.state import FINAL, Phase, SessionState
 from tests.session import small
 
@@ -77,6 +78,7 @@ def event_of(kind: type[Any]) -> Any:
         TaskDone: ("complete", {"duration_s": 2.0}),
         ItemShown: ("liquid",),
         Chosen: ("liquid", 3),
+        LanguageChosen: ("en",),
         PauseAsked: ("participant",),
         ResumeAsked: ("operator",),
         ForceStopped: ("device",),
@@ -173,7 +175,7 @@ def test_a_trial_starts_its_scene_and_task_before_it_is_shown() -> None:
     assert page.task == start.task == state.plan.protocol.tasks["explore"]
     assert page.workspace_m == (0.1, 0.06, 0.06)
     assert page.body_radius_m == pytest.approx(0.0034)
-    assert page.progress is None  # practice is in no part
+    assert page.progress == Progress(None, 2, "Setting", 1, 1)  # practice is in no part
 
 
 def test_the_scene_of_a_trial_is_the_one_behind_its_code() -> None:

@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from study_app.errors import StoreError
 from study_app.store.columns import RESPONSES, TABLES, TRIALS, Column, header, variable
 from study_app.store.journal import read
+from study_app.store.progress import progress_of
 from study_app.store.session import SessionStore
 from study_app.store.tables import csv_bytes, latest, participant, responses, trials
 
@@ -290,3 +291,12 @@ def test_tables_come_from_the_journal_alone(
         path = store.folder.table("brackish", name)
         assert path.read_bytes() == csv_bytes(TABLES[name], rows)
     assert len(responses(lines)) == 12
+
+
+def test_the_language_is_the_one_that_was_read_in_last() -> None:
+    script = Script()
+    assert participant(script.lines)["language"] == "en"
+    script.add("language_chosen", language="nl")
+    assert participant(script.lines)["language"] == "nl"
+    script.add("language_chosen", language="de")
+    assert (participant(script.lines)["language"], progress_of(script.lines).language) == ("de", "de")
