@@ -6,8 +6,9 @@ import numpy as np
 
 from study_app.analysis.answered import MANY, Asked, asked_again, head, over_all
 from study_app.analysis.judging import judged
-from study_app.analysis.results import Against, BlockFound, Lowest, Tested, Waiting
+from study_app.analysis.results import Against, BlockFound, Lowest, Tested, Waiting, p_of_difference
 from study_app.analysis.statistics.equivalence import tost
+from study_app.analysis.statistics.families import holm
 from study_app.analysis.statistics.threshold import Threshold, noticed
 from study_app.analysis.statistics.trend import page, step_down
 from study_app.analysis.tables import Study
@@ -53,11 +54,12 @@ def _lowest(
     of: Asked, trends: tuple[Tested, ...], delays_ms: list[float]
 ) -> tuple[tuple[Lowest, ...], tuple[Waiting, ...]]:
     """Step down in the statements whose trend is there at all."""
-    showing = [one.item for one in trends if one.verdict in ("shown", "suggested")]
+    showing = [one for one in trends if one.verdict in ("shown", "suggested")]
     found = []
-    for item in showing:
-        direction = of.decided.direction(item) or "increasing"
-        found.append(Lowest(item, step_down(of.values[item], delays_ms, direction, alpha=of.decided.alpha)))
+    for one in showing:
+        direction = of.decided.direction(one.item) or "increasing"
+        steps = step_down(of.values[one.item], delays_ms, direction, alpha=of.decided.alpha)
+        found.append(Lowest(one.item, steps, one.members))
     if trends and not showing:
         why = "no statement shows a trend over all delays; that is not evidence that none is noticed"
         return (), (Waiting("lowest delay that shows", why),)
@@ -77,8 +79,12 @@ def _against(of: Asked, delays_ms: list[float]) -> tuple[tuple[Against, ...], tu
         for place, delay_ms in enumerate(delays_ms[1:], start=1):
             differences = values[:, place] - values[:, 0]
             tested = tost(differences, bound, alpha=of.decided.alpha, seed=of.seed, checks=of.n <= MANY)
-            found.append(Against(item.id, delay_ms, delays_ms[0], tested))
-    return tuple(found), ()
+            found.append((item.id, delay_ms, tested))
+    adjusted = holm([p_of_difference(tested) for _, _, tested in found])
+    return tuple(
+        Against(item, delay_ms, delays_ms[0], tested, p, len(found), of.decided.direction(item))
+        for (item, delay_ms, tested), p in zip(found, adjusted, strict=True)
+    ), ()
 
 
 def _up_to(against: tuple[Against, ...]) -> dict[str, float | None]:

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from typing import Any, Literal, TypeAlias
 
-from study_app.analysis.decided import Decided
+from study_app.analysis.decided import Decided, Direction
 from study_app.analysis.performance import Performance
 from study_app.analysis.questions import Item, Kind, Setting
 from study_app.analysis.statistics.equivalence import Equivalence
@@ -63,26 +63,63 @@ class Named:
 
 @dataclass(frozen=True, slots=True)
 class Lowest:
-    """The lowest delay at which a trend shows in one statement, stepping down."""
+    """The lowest delay at which a trend shows in one statement, stepping down.
+
+    The error rate of ``steps`` holds within the statement; that of ``over_all_ms``, the lowest delay whose steps all
+    have p ≤ alpha / ``members``, over all statements of the family.
+    """
 
     item: str
     steps: StepDown
+    members: int = 1
+
+    @property
+    def over_all_ms(self) -> float | None:
+        """The lowest delay that shows with the error rate held over all statements; None without any."""
+        lowest = None
+        for step in self.steps.steps:
+            if step.page.p is None or step.page.p > self.steps.alpha / self.members:
+                break
+            lowest = step.longest_ms
+        return lowest
 
 
 @dataclass(frozen=True, slots=True)
 class Against:
-    """One delay compared with the shortest in one statement."""
+    """One delay compared with the shortest in one statement.
+
+    ``p_adjusted`` is p of a difference (``p_of_difference``), corrected over the ``members`` comparisons of the block;
+    ``expected`` the direction that was stated before the study, None where none was.
+    """
 
     item: str
     delay_ms: float
     control_ms: float
     found: Equivalence
+    p_adjusted: float | None
+    members: int
+    expected: Direction | None = None
 
     @property
     def verdict(self) -> Nearness:
-        """What may be said: "equivalent" only where the tests without normality agree."""
-        doubted = self.found.verdict == "equivalent" and self.found.checks_agree is False
-        return "inconclusive" if doubted else self.found.verdict
+        """What may be said: "equivalent" where the tests without normality agree, "different" by the corrected p."""
+        if self.found.verdict == "equivalent" and self.found.checks_agree is not False:
+            return "equivalent"
+        shown = self.p_adjusted is not None and self.p_adjusted <= self.found.alpha
+        return "different" if shown else "inconclusive"
+
+    @property
+    def as_expected(self) -> bool:
+        """Whether answers went where they were expected to, or nothing was expected."""
+        away = self.found.effect or 0.0
+        return self.expected is None or (away > 0) == (self.expected == "increasing")
+
+
+def p_of_difference(found: Equivalence) -> float | None:
+    """Return p that a delay differs from the shortest at all: the larger of the t test's and the signed ranks'."""
+    if found.p_different is None or found.p_different_ranks is None:
+        return found.p_different
+    return max(found.p_different, found.p_different_ranks)
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,13 +6,14 @@ from collections.abc import Mapping
 
 import pytest
 
-from study_app.analysis.decided import NOTHING
+from study_app.analysis.decided import NOTHING, Direction
 from study_app.analysis.questions import Item, Setting
-from study_app.analysis.report.meaning import by_delay, meaning
+from study_app.analysis.report.meaning import by_delay, meaning, tempting_ms
 from study_app.analysis.report.short import limits
-from study_app.analysis.results import Against, BlockFound, Lowest
+from study_app.analysis.results import Against, BlockFound, Lowest, p_of_difference
 from study_app.analysis.results import Results as Found
 from study_app.analysis.statistics.equivalence import tost
+from study_app.analysis.statistics.families import holm
 from study_app.analysis.statistics.trend import step_down
 from study_app.analysis.tables import load_study
 from tests.analysis.conftest import Results
@@ -24,7 +25,20 @@ DOUBTED = [-1, 0, 0, 0, 0]
 """By t equivalent (p = .008) within a point; by signs not (p = .062)."""
 
 
-def delays(differences: Mapping[float, list[int]], lowest: tuple[Lowest, ...] = ()) -> BlockFound:
+def against(differences: Mapping[float, list[int]], expected: Direction | None) -> tuple[Against, ...]:
+    each = [tost(values, 1.0) for values in differences.values()]
+    adjusted = holm([p_of_difference(one) for one in each])
+    return tuple(
+        Against("different", ms, 0.0, one, p, len(each), expected)
+        for ms, one, p in zip(differences, each, adjusted, strict=True)
+    )
+
+
+def delays(
+    differences: Mapping[float, list[int]],
+    lowest: tuple[Lowest, ...] = (),
+    expected: Direction | None = "increasing",
+) -> BlockFound:
     """Return a block of delays in which answers to one statement differ so from those at 0 ms."""
     at = (0.0, *differences)
     return BlockFound(
@@ -38,7 +52,7 @@ def delays(differences: Mapping[float, list[int]], lowest: tuple[Lowest, ...] = 
         items=(Item("different", "It was different.", "Different"),),
         labels=tuple("1234567"),
         measures=(),
-        against=tuple(Against("different", ms, 0.0, tost(values, 1.0)) for ms, values in differences.items()),
+        against=against(differences, expected),
         lowest=lowest,
     )
 
@@ -53,9 +67,11 @@ def claim(block: BlockFound) -> str:
 
 def test_a_difference_at_a_shorter_delay_speaks_against_the_longer_one() -> None:
     assert "do not support" in claim(delays({50: SCATTERED, 100: SCATTERED}))
-    told = claim(delays({50: AWAY, 100: SCATTERED}))
-    assert "inconclusive for “Different”" in told
-    assert "speak against the sentence “delays up to 100 ms do not matter”" in told
+    block = delays({50: AWAY, 100: SCATTERED})
+    assert tempting_ms(block) == 50
+    (*verdicts, told) = by_delay(block)[1]
+    assert verdicts == ["100 ms", "–", "–", "Different"]
+    assert "speak against the sentence “delays up to 100 ms do not matter”: “Different” differs at 50 ms (+3.40" in told
 
 
 def test_a_trend_up_to_a_shorter_delay_speaks_against_the_longer_one() -> None:
@@ -63,6 +79,43 @@ def test_a_trend_up_to_a_shorter_delay_speaks_against_the_longer_one() -> None:
     assert steps.lowest_ms == 50
     told = claim(delays({50: SCATTERED, 100: SCATTERED}, (Lowest("different", steps),)))
     assert "speak against the sentence" in told
+    assert "“Different” follows the delay already up to 50 ms" in told
+
+
+def test_a_trend_that_shows_only_within_its_statement_speaks_against_nothing() -> None:
+    steps = step_down([[1, 3, 5], [1, 3, 5], [1, 3, 5], [3, 1, 5], [1, 3, 5]], [0, 50, 100], alpha=0.2)
+    alone, of_five = Lowest("different", steps), Lowest("different", steps, members=5)
+    assert alone.over_all_ms == steps.lowest_ms == 50
+    assert of_five.over_all_ms == 100  # the second step has p = .19, the first .0003
+    assert "speak against" in claim(delays({50: SCATTERED}, (alone,)))
+    assert "speak against" not in claim(delays({50: SCATTERED}, (of_five,)))
+
+
+def test_a_difference_against_the_stated_direction_is_told_and_speaks_against_nothing() -> None:
+    away = [-one for one in AWAY]
+    told = claim(delays({50: away}))
+    assert "do not support the sentence “delays up to 50 ms do not matter”" in told
+    assert "Against the direction stated before the study: “Different” differs at 50 ms (−3.40" in told
+    assert "speak against the sentence" in claim(delays({50: away}, expected=None))
+    assert "speak against the sentence" in claim(delays({50: away}, expected="decreasing"))
+
+
+def test_one_of_many_comparisons_that_differs_by_chance_speaks_against_nothing() -> None:
+    chance = [2, 1, 1, 1, 1, 2, 1, -1, 1, 0]
+    alone = delays({50: chance})
+    assert alone.against[0].verdict == "different"
+    many = delays({50: chance, **{float(ms): SCATTERED * 2 for ms in range(75, 201, 25)}})
+    assert many.against[0].found.verdict == "different"
+    assert many.against[0].verdict == "inconclusive"
+    assert "speak against" not in claim(many)
+
+
+def test_five_people_cannot_make_a_single_comparison_different_by_taking_them_as_normal() -> None:
+    certain = delays({50: [3, 4, 3, 4, 4]})
+    assert certain.against[0].found.p_different is not None
+    assert certain.against[0].found.p_different < 0.001
+    assert certain.against[0].p_adjusted == 0.0625
+    assert certain.against[0].verdict == "inconclusive"
 
 
 def test_what_only_t_calls_equivalent_is_told_as_inconclusive(rek: Results) -> None:
@@ -93,4 +146,4 @@ def test_every_delay_has_its_own_sentence() -> None:
     rows = by_delay(delays({50: CALM, 125: SCATTERED, 300: AWAY}))
     assert rows[0][-1].startswith("What can be said: at 50 ms the mean answers")
     assert "do not support the sentence “delays up to 125 ms do not matter”, and do not refute it" in rows[1][-1]
-    assert rows[2][-1] == "These data speak against the sentence “delays up to 300 ms do not matter”."
+    assert rows[2][-1].startswith("These data speak against the sentence “delays up to 300 ms do not matter”: ")

@@ -11,9 +11,9 @@ from typing import Any, Final
 
 from study_app import __version__
 from study_app.analysis.codebook import head
-from study_app.analysis.judging import ALONE
+from study_app.analysis.judging import ALONE, HOLM
 from study_app.analysis.report.words import name
-from study_app.analysis.results import BlockFound, Results, Tested, plain
+from study_app.analysis.results import Against, BlockFound, Results, Tested, p_of_difference, plain
 from study_app.analysis.statistics.outcome import Outcome
 from study_app.analysis.tables import Study
 from study_app.store import blinding
@@ -104,8 +104,27 @@ def _tests(found: BlockFound) -> Iterator[dict[str, Any]]:
         compared = f"{against.delay_ms:g} ms − {against.control_ms:g} ms"
         row |= _alone(found, f"{against.item} at {against.delay_ms:g} ms")
         yield row | {"comparison": compared, "verdict": against.verdict}
+        yield _differs(found, against) | {"item": against.item, "comparison": compared, "verdict": against.verdict}
     if found.threshold is not None:
         yield _row(found, "a delay is noticed", found.threshold)
+
+
+def _differs(found: BlockFound, against: Against) -> dict[str, Any]:
+    """Return the row of the same comparison asked the other way: whether the delay differs at all."""
+    outcome = against.found
+    by = "the larger p of a t test and of exact signed ranks, two-sided"
+    return _row(found, "a delay differs", outcome) | {
+        "test": "difference, paired",
+        "statistic": outcome.t,
+        "p": p_of_difference(outcome),
+        "method": "t test, two-sided" if outcome.p_different_ranks is None else by,
+        "p_adjusted": against.p_adjusted,
+        "smallest_p": None if outcome.p_different_ranks is None else 0.5 ** (outcome.n - 1),
+        "family": f"{found.id}: each delay against the shortest",
+        "members": against.members,
+        "correction": HOLM,
+        "note": None if outcome.t is not None else outcome.note,
+    }
 
 
 def _alone(found: BlockFound, what: str) -> dict[str, Any]:

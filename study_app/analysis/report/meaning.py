@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
-from study_app.analysis.report.words import counted, interval, listed, ms, number, short
-from study_app.analysis.results import Against, BlockFound, Delivered, Results
+from study_app.analysis.report.words import counted, interval, listed, ms, number, p_equals, short
+from study_app.analysis.results import Against, BlockFound, Delivered, Lowest, Results
 
 VERDICTS: Final = ("equivalent", "different", "inconclusive")
 
@@ -14,13 +14,47 @@ VERDICTS: Final = ("equivalent", "different", "inconclusive")
 def tempting_ms(found: BlockFound) -> float | None:
     """Return the delay of which one would most like to say that it does not matter.
 
-    It is the longest at which no statement differs from the shortest delay; without any, the shortest that was added.
+    It is the longest that nothing here speaks against; without any, the shortest that was added.
     """
     if len(found.delays_ms) < 2:
         return None
-    different = {one.delay_ms for one in found.against if one.verdict == "different"}
-    calm = [delay for delay in found.delays_ms[1:] if delay not in different]
-    return max(calm) if calm and found.against else found.delays_ms[1]
+    calm = [delay for delay in found.delays_ms[1:] if not speaking_against(found, delay)]
+    return max(calm) if calm and (found.against or found.trends) else found.delays_ms[1]
+
+
+def speaking_against(found: BlockFound, delay_ms: float) -> tuple[str, ...]:
+    """Return what speaks against "delays up to this one do not matter", a clause for each statement.
+
+    It is a trend that shows up to this delay or a shorter one, or a difference at one, in the direction stated before
+    the study where one was, with the error rate held over all statements.
+    """
+    trends = {
+        one.item: f"“{short(found, one.item)}” follows the delay already up to {ms(shown_ms)}{_exploratory(found, one)}"
+        for one in found.lowest
+        if (shown_ms := one.over_all_ms) is not None and shown_ms <= delay_ms
+    }
+    differences: dict[str, str] = {}
+    for one in _differing(found, delay_ms):
+        if one.as_expected and one.item not in trends:
+            differences.setdefault(one.item, _differs(found, one))
+    return (*trends.values(), *differences.values())
+
+
+def _differing(found: BlockFound, delay_ms: float) -> list[Against]:
+    """Return the comparisons up to a delay that show a difference, corrected over all of them, shortest delay first."""
+    different = [one for one in found.against if one.verdict == "different" and one.delay_ms <= delay_ms]
+    return sorted(different, key=lambda one: one.delay_ms)
+
+
+def _differs(found: BlockFound, one: Against) -> str:
+    sign = "+" if (one.found.effect or 0.0) > 0 else ""
+    p = "" if one.p_adjusted is None else f", adjusted {p_equals(one.p_adjusted)}"
+    return f"“{short(found, one.item)}” differs at {ms(one.delay_ms)} ({sign}{number(one.found.effect)}{p})"
+
+
+def _exploratory(found: BlockFound, one: Lowest) -> str:
+    suggested = any(trend.item == one.item and not trend.primary for trend in found.trends)
+    return " (exploratory)" if suggested else ""
 
 
 def meaning(found: BlockFound, results: Results) -> tuple[str, ...]:
@@ -133,15 +167,18 @@ def _said(found: BlockFound, here: list[Against]) -> str:
             f"What can be said: at {delay} the mean answers to these statements stay within the bound. Not that "
             "nothing changes within it, not that no single person notices it, and not for other tasks or statements."
         )
-    if _speaks_against(found, here[0].delay_ms):
-        return f"These data speak against the sentence “delays up to {delay} do not matter”."
+    reasons = speaking_against(found, here[0].delay_ms)
+    if reasons:
+        return f"These data speak against the sentence “delays up to {delay} do not matter”: {'; '.join(reasons)}."
     return (
         f"So these data do not support the sentence “delays up to {delay} do not matter”, and do not refute it: they "
-        "are too few or too scattered to tell."
+        f"are too few or too scattered to tell.{_other_way(found, here[0].delay_ms)}"
     )
 
 
-def _speaks_against(found: BlockFound, delay_ms: float) -> bool:
-    """Return whether a delay up to this one differs from the shortest, or a trend shows already up to it."""
-    differs = any(one.verdict == "different" and one.delay_ms <= delay_ms for one in found.against)
-    return differs or any(one.steps.lowest_ms is not None and one.steps.lowest_ms <= delay_ms for one in found.lowest)
+def _other_way(found: BlockFound, delay_ms: float) -> str:
+    """Name the differences that go where they were not expected to go."""
+    told = [_differs(found, one) for one in _differing(found, delay_ms) if not one.as_expected]
+    if not told:
+        return ""
+    return f" Against the direction stated before the study: {'; '.join(told)}; that is a reason to look again."

@@ -120,7 +120,9 @@ def _delays(found: BlockFound, results: Results) -> Iterator[str]:
         yield (
             f"Equivalence to {found.delays_ms[0]:g} ms was tested by two one-sided t tests on paired differences with "
             f"a bound of ±{bound:g} {points}, decided before the first session, and {level:g} % "
-            "intervals; a difference that is neither shown nor excluded is called inconclusive."
+            "intervals, and called equivalent only where tests without normality agreed; it was called different where "
+            "the larger p of a t test and of exact signed ranks, Holm-adjusted over all these comparisons, was at most "
+            "alpha, and otherwise inconclusive."
         )
     if found.threshold is not None:
         yield (

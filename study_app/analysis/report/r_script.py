@@ -52,7 +52,7 @@ pair <- function(what, table, first, second, V, p) {{
   same(paste(what, "Wilcoxon V"), V, unname(found$statistic))
   about(paste(what, "p"), p, found$p.value)
 }}
-equivalent <- function(what, table, first, second, bound, p, low, high, level) {{
+equivalent <- function(what, table, first, second, bound, p, low, high, level, different) {{
   d <- table[, second] - table[, first]; d <- d[!is.na(d)]
   lower <- t.test(d, mu = -bound, alternative = "greater")$p.value
   upper <- t.test(d, mu = bound, alternative = "less")$p.value
@@ -60,6 +60,7 @@ equivalent <- function(what, table, first, second, bound, p, low, high, level) {
   limits <- t.test(d, conf.level = level)$conf.int
   same(paste(what, "interval, low"), low, limits[1])
   same(paste(what, "interval, high"), high, limits[2])
+  same(paste(what, "difference p by t"), different, t.test(d)$p.value)
 }}
 hits <- function(what, block, items, codes, right, hits) {{
   ratings <- lapply(items, function(item) wide(block, item, codes))
@@ -116,11 +117,11 @@ def _against(found: BlockFound, block: str, codes: str) -> Iterator[str]:
     by_delay = {setting.delay_ms: setting.code for setting in found.settings}
     for one in found.against:
         interval = one.found.interval
-        if one.found.p is None or interval is None:
+        if one.found.p is None or one.found.p_different is None or interval is None:
             continue
         first, second = _text(by_delay[one.control_ms]), _text(by_delay[one.delay_ms])
         what = _text(f"{one.item}, {one.delay_ms:g} ms")
-        numbers = (one.found.bound, one.found.p, interval.low, interval.high, interval.level)
+        numbers = (one.found.bound, one.found.p, interval.low, interval.high, interval.level, one.found.p_different)
         told = ", ".join(_number(value) for value in numbers)
         yield f"equivalent({what}, wide({block}, {_text(one.item)}, {codes}), {first}, {second}, {told})"
 

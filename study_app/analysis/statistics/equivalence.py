@@ -7,16 +7,16 @@ A difference that is not significant is no evidence of equivalence; here it is c
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Final, Literal, TypeAlias
+from typing import Any, Final, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import t as t_distribution
 
 from study_app.analysis.statistics.outcome import DRAWS, Array, Interval, Outcome, checked, told
-from study_app.analysis.statistics.paired import signed, signed_p
+from study_app.analysis.statistics.paired import Alternative, signed, signed_p
 from study_app.errors import AnalysisError
 
 Verdict: TypeAlias = Literal["equivalent", "different", "inconclusive"]
@@ -40,23 +40,25 @@ class Equivalence(Outcome):
     the pseudo-median) are the same question without normality; ``checks_agree`` tells whether both give the same
     answer as p, and ``smallest_check_p`` is the smallest that these two can be. ``n_needed`` is how many participants
     would give 80 % power, at this spread, were the true difference 0; never so few that these two could not agree.
+    ``p_different_ranks`` is that of signed ranks, two-sided, for a difference from 0.
     """
 
     bound: float
     alpha: float
     verdict: Verdict
-    t: float | None
-    t_lower: float | None
-    t_upper: float | None
-    p_different: float | None
-    p_lower: float | None
-    p_upper: float | None
-    p_permutation: float | None
-    p_ranks: float | None
-    smallest_check_p: float | None
-    checks_agree: bool | None
-    sd: float | None
-    n_needed: int | None
+    t: float | None = None
+    t_lower: float | None = None
+    t_upper: float | None = None
+    p_different: float | None = None
+    p_different_ranks: float | None = None
+    p_lower: float | None = None
+    p_upper: float | None = None
+    p_permutation: float | None = None
+    p_ranks: float | None = None
+    smallest_check_p: float | None = None
+    checks_agree: bool | None = None
+    sd: float | None = None
+    n_needed: int | None = None
 
 
 def tost(
@@ -82,50 +84,49 @@ def tost(
         raise AnalysisError(f"a bound of equivalence of {bound} means nothing; give one above 0 in points of the scale")
     array = checked(differences, "participants")
     kept = array[~np.isnan(array)]
-    n, dropped = len(kept), len(array) - len(kept)
-    sd = float(kept.std(ddof=1)) if n > 1 else 0.0
-    if sd == 0.0:
-        return _without_spread(kept, dropped, bound, alpha)
-    mean, error = float(kept.mean()), sd / math.sqrt(n)
+    found = _without_spread(kept, len(array) - len(kept), bound, alpha)
+    if not found.sd:
+        return found
+    found = replace(found, no_interval="", **_by_t(kept, found.sd, bound, alpha))
+    return replace(found, **_without_normality(kept, bound, alpha, seed, found)) if checks else found
+
+
+def _by_t(kept: Array, sd: float, bound: float, alpha: float) -> dict[str, Any]:
+    """Return what the t tests say."""
+    n, mean, error = len(kept), float(kept.mean()), sd / math.sqrt(len(kept))
     t_lower, t_upper = (mean + bound) / error, (mean - bound) / error
     p_lower, p_upper = float(t_distribution.sf(t_lower, n - 1)), float(t_distribution.cdf(t_upper, n - 1))
-    p_different = float(2 * t_distribution.sf(abs(mean / error), n - 1))
-    p = max(p_lower, p_upper)
+    p, p_different = max(p_lower, p_upper), float(2 * t_distribution.sf(abs(mean / error), n - 1))
     reach = float(t_distribution.ppf(1 - alpha, n - 1)) * error
-    level = 1 - 2 * alpha
-    permuted = max(_signs(kept + bound, seed), _signs(bound - kept, seed)) if checks else None
-    ranked = max(_ranks(kept + bound), _ranks(bound - kept)) if checks else None
-    return Equivalence(
-        test="equivalence, two one-sided t tests",
-        n=n,
-        dropped=dropped,
-        statistic_name="t",
-        statistic=min(t_lower, -t_upper),
-        p=p,
-        smallest_p=None,
-        method=f"t({n - 1}), bound ±{bound:g} points",
-        effect_name="mean difference",
-        effect=mean,
-        interval=Interval(mean - reach, mean + reach, level, "t"),
-        note=_note(p, p_different, alpha),
-        bound=bound,
-        alpha=alpha,
-        verdict="equivalent" if p <= alpha else "different" if p_different <= alpha else "inconclusive",
-        t=mean / error,
-        t_lower=t_lower,
-        t_upper=t_upper,
-        p_different=p_different,
-        p_lower=p_lower,
-        p_upper=p_upper,
-        p_permutation=permuted,
-        p_ranks=ranked,
-        smallest_check_p=_smallest(n) if checks else None,
-        checks_agree=None
-        if permuted is None or ranked is None
-        else all((q <= alpha) == (p <= alpha) for q in (permuted, ranked)),
-        sd=sd,
-        n_needed=_needed(sd / bound, alpha),
-    )
+    return {
+        "statistic": min(t_lower, -t_upper),
+        "p": p,
+        "method": f"t({n - 1}), bound ±{bound:g} points",
+        "interval": Interval(mean - reach, mean + reach, 1 - 2 * alpha, "t"),
+        "note": _note(p, p_different, alpha),
+        "verdict": "equivalent" if p <= alpha else "different" if p_different <= alpha else "inconclusive",
+        "t": mean / error,
+        "t_lower": t_lower,
+        "t_upper": t_upper,
+        "p_different": p_different,
+        "p_lower": p_lower,
+        "p_upper": p_upper,
+        "smallest_check_p": None,
+        "n_needed": _needed(sd / bound, alpha),
+    }
+
+
+def _without_normality(kept: Array, bound: float, alpha: float, seed: int, by_t: Equivalence) -> dict[str, Any]:
+    """Return what changing signs and signed ranks say to the same questions."""
+    permuted = max(_signs(kept + bound, seed), _signs(bound - kept, seed))
+    ranked = max(_ranks(kept + bound), _ranks(bound - kept))
+    return {
+        "p_permutation": permuted,
+        "p_ranks": ranked,
+        "p_different_ranks": _ranks(kept, "two-sided"),
+        "smallest_check_p": _smallest(len(kept)),
+        "checks_agree": all((p <= alpha) == (by_t.verdict == "equivalent") for p in (permuted, ranked)),
+    }
 
 
 def _note(p: float, p_different: float, alpha: float) -> str:
@@ -156,18 +157,8 @@ def _without_spread(kept: Array, dropped: int, bound: float, alpha: float) -> Eq
         bound=bound,
         alpha=alpha,
         verdict="inconclusive",
-        t=None,
-        t_lower=None,
-        t_upper=None,
-        p_different=None,
-        p_lower=None,
-        p_upper=None,
-        p_permutation=None,
-        p_ranks=None,
         smallest_check_p=_smallest(n) if n else None,
-        checks_agree=None,
-        sd=0.0 if n > 1 else None,
-        n_needed=None,
+        sd=float(kept.std(ddof=1)) if n > 1 else None,
     )
 
 
@@ -194,10 +185,10 @@ def _smallest(n: int) -> float:
     return least if n <= ALL_SIGNS_UP_TO else max(least, 1 / (1 + DRAWS))
 
 
-def _ranks(shifted: Array) -> float:
-    """Return the one-sided p of signed ranks that ``shifted`` lies above 0; 1 if all of it is 0."""
+def _ranks(shifted: Array, alternative: Alternative = "greater") -> float:
+    """Return the p of signed ranks that ``shifted`` lies above 0 (or elsewhere); 1 if all of it is 0."""
     ranks, signs = signed(shifted)
-    p, _, _ = signed_p(ranks, int(ranks[signs > 0].sum()), "greater")
+    p, _, _ = signed_p(ranks, int(ranks[signs > 0].sum()), alternative)
     return 1.0 if p is None else p
 
 
