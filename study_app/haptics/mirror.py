@@ -1,0 +1,99 @@
+"""Ticks taken again from what telemetry says of them, and the places at which they left a wake.
+
+A sample says when and where the device was read, whether that was new, and whether the force was stopped: all that a
+tick takes from outside. So the same tick beside the servo, with a model and a safety record of its own, answers with
+the same force to the last bit, or with that of another liquid on the same motion.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from study_app.haptics.compiled import kernel, part
+from study_app.haptics.effects.wake import REST_MPS
+from study_app.haptics.layout import (
+    EFFECT_LOCAL_WAKE,
+    EFFECT_WAKE,
+    LIMITER_STOP,
+    STATUS_DEVICE_LOST,
+    Record,
+    records,
+)
+from study_app.haptics.tick import tick
+from study_app.haptics.vector import clear, copy, distance
+
+PLACE = np.dtype(
+    [
+        ("hand_m", np.float64, (3,)),  # where the hand was, hand frame
+        ("segment", np.int64),  # number of the wake's segment
+        ("moving", np.int64),  # 0 for a zero element
+    ],
+    align=True,
+)
+
+TRAIL = np.dtype(
+    [
+        ("left", np.int64),  # elements left since the wake was empty; number q is in row q % (rows of the ring)
+        ("held", np.int64),  # how many of them are still in the wake
+        ("segments", np.int64),  # segments that hold one of them
+        ("time_s", np.float64),  # of a local wake, after the last tick
+    ],
+    align=True,
+)
+
+
+def new_trail(elements: int) -> tuple[Any, Any]:
+    """Return an empty trail, (1,) ``TRAIL``, and the ring of its places, (elements,) ``PLACE``."""
+    return records(TRAIL, 1), records(PLACE, elements)
+
+
+@kernel
+def take_again(model: Any, safety: Record, samples: Any, trail: Record, places: Any) -> None:
+    """Take each of ``samples`` as the servo took it, and write what comes out into them.
+
+    ``trail`` and ``places`` follow the wake of the model's first liquid.
+    """
+    for k in range(samples.shape[0]):
+        sample = samples[k]
+        if sample.status == STATUS_DEVICE_LOST and sample.fresh == 0:
+            clear(sample.velocity_mps)
+            clear(sample.wake_mps)
+            clear(sample.force_n)
+            clear(sample.device_force_n)
+            continue
+        safety.stop = 1 if sample.limiters & LIMITER_STOP else 0
+        tick(model, safety, sample)
+        _note(model, trail, places)
+
+
+@part
+def _note(model: Any, trail: Record, places: Any) -> None:
+    """Remember where the hand was, if this tick left an element of the wake there."""
+    if model.parameters[0].liquids == 0:
+        return
+    liquid, local, state = model.liquids[0], model.liquid_states[0], model.state[0]
+    if liquid.effects & EFFECT_WAKE:
+        wake, tracks = liquid.wake, local.wake
+        if tracks.stored > 0 and tracks.stored != trail.left:
+            place = places[(tracks.stored - 1) % places.shape[0]]
+            copy(state.hand_m, place.hand_m)
+            place.segment = tracks.last_segment
+            place.moving = model.elements[wake.row + (tracks.stored - 1) % wake.length].moving
+        trail.left = tracks.stored
+        trail.held = tracks.held
+        trail.segments = tracks.last_segment - tracks.first_segment + 1 if tracks.speed_mps > 0.0 else 0
+    elif liquid.effects & EFFECT_LOCAL_WAKE:
+        tracks = local.local_wake
+        if tracks.held == 0:
+            trail.left = 0
+        elif tracks.time_s != trail.time_s:
+            place = places[trail.left % places.shape[0]]
+            copy(state.hand_m, place.hand_m)
+            place.segment = 0
+            place.moving = 1 if distance(state.velocity_mps, state.drift_mps) >= REST_MPS else 0
+            trail.left += 1
+        trail.time_s = tracks.time_s
+        trail.held = tracks.held
+        trail.segments = tracks.cells

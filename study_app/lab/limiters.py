@@ -1,0 +1,72 @@
+"""Which limiter acted, and in how many of the last 10 s' ticks."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from study_app.haptics.layout import (
+    LIMITER_ENERGY,
+    LIMITER_FADE,
+    LIMITER_GLITCH,
+    LIMITER_NON_FINITE,
+    LIMITER_NORM,
+    LIMITER_SLEW,
+    LIMITER_SLOPE,
+    LIMITER_STALE,
+    LIMITER_STOP,
+)
+
+SPAN_NS: Final = 10_000_000_000
+NOW_NS: Final = 150_000_000
+
+_WORDS: Final = {
+    LIMITER_SLEW: "Slew, 0.5 N a tick",
+    LIMITER_FADE: "Fade",
+    LIMITER_SLOPE: "Slope",
+    LIMITER_NORM: "Force",
+    LIMITER_ENERGY: "Energy account",
+    LIMITER_STALE: "Stale sample",
+    LIMITER_GLITCH: "Refused position",
+    LIMITER_NON_FINITE: "Not a number",
+    LIMITER_STOP: "Force stopped",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Limiter:
+    """A limiter, the ticks of the last 10 s it acted in, and whether it does now."""
+
+    name: str
+    ticks: int
+    acting: bool
+
+
+class LimiterCounts:
+    """Counts of the last 10 s, batch by batch."""
+
+    def __init__(self) -> None:
+        self._batches: deque[tuple[int, Any]] = deque()
+
+    def add(self, samples: Any) -> None:
+        """Count in samples of telemetry (recarray of ``SAMPLE``)."""
+        if len(samples) == 0:
+            return
+        newest_ns = int(samples.time_ns[-1])
+        self._batches.append((newest_ns, np.array([np.count_nonzero(samples.limiters & bit) for bit in _WORDS])))
+        while self._batches[0][0] <= newest_ns - SPAN_NS:
+            self._batches.popleft()
+
+    def told(self, force_limit_n: float) -> tuple[Limiter, ...]:
+        """Return every limiter."""
+        newest_ns = self._batches[-1][0] if self._batches else 0
+        nothing = np.zeros(len(_WORDS), np.int64)
+        counts = sum((batch for _, batch in self._batches), nothing)
+        acting = sum((batch for when, batch in self._batches if when > newest_ns - NOW_NS), nothing)
+        return tuple(
+            Limiter(f"{words}, {force_limit_n:g} N" if bit == LIMITER_NORM else words, int(ticks), bool(now))
+            for (bit, words), ticks, now in zip(_WORDS.items(), counts, acting, strict=True)
+        )

@@ -1,0 +1,314 @@
+"""Device and servo of the lab: scenes felt as they are edited, paths that move the hand, and what came of it.
+
+It has no thread: whoever owns it calls `poll` some thirty times a second. The servo is only given whole scenes and
+asked for telemetry; whatever ends the lab calls `close`, which writes zero force before it lets go of the device.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Final, Self
+
+import numpy as np
+
+from study_app.devices import is_falcon, moves_by_itself, open_device
+from study_app.devices.hand_orders import hand_of
+from study_app.haptics.layout import SAMPLE, records
+from study_app.haptics.scene import Scene
+from study_app.haptics.servo import Servo
+from study_app.lab.limiters import Limiter, LimiterCounts
+from study_app.lab.programmes import led_to, programme
+from study_app.lab.shadow import Shadow, Trace
+from study_app.lab.tail import Tail
+from study_app.lab.workbench import Side, Workbench
+from study_app.protocol.streams import stream
+
+if TYPE_CHECKING:
+    from study_app.devices.base import Device
+    from study_app.haptics.motion import Motion
+
+Vector = tuple[float, float, float]
+
+WORKSPACE_M: Final[Vector] = (0.1, 0.06, 0.06)
+FORCE_LIMIT_N: Final = 8.0
+ELEMENTS: Final = 100_000  # the most that a wake's length can be
+SPACING_NS: Final = 50_000_000  # a fade: a drag that loaded scenes faster would never be felt
+_LONGEST_GAP_NS: Final = 200_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """Where the hand is [m, hand frame], the force on it [N], the wake the body meets [m/s, scene], and the servo.
+
+    ``fault`` is why the servo stopped itself, in a sentence; empty while it has not.
+    """
+
+    position_m: Vector
+    force_n: Vector
+    wake_mps: Vector
+    force_on: bool
+    fault: str
+
+
+class Live:
+    """One device's servo, felt with.
+
+    Parameters
+    ----------
+    device : an opened device
+    servo : its servo, not started; ``rate_hz`` is the rate of all scenes here
+    """
+
+    def __init__(self, device: Device, servo: Servo) -> None:
+        self.device = device
+        self.servo = servo
+        self.path: str | None = None
+        rest = Scene(rate_hz=servo.rate_hz)
+        self.shadow = Shadow(rest, servo.elements, device.force_limit_n)
+        self._ghost: _Ghost | None = None
+        self._reader = servo.telemetry.reader()
+        self._dropped = 0
+        self._hand = hand_of(device)
+        self._counts = LimiterCounts()
+        self._felt: Workbench | None = None
+        self._due: Workbench | None = None
+        self._loaded_ns: int | None = None
+        self._closed = False
+
+    def prepare(self) -> None:
+        """Compile all that runs later, or load it from the cache; takes seconds when first used after a change."""
+        self.servo.prepare()
+        self.shadow.prepare()
+
+    def feel(self, bench: Workbench) -> None:
+        """Present the felt setting of ``bench`` from the next tick on, and follow the other beside it.
+
+        A scene begins with a fade of 50 ms; one that comes sooner after another waits for its end, the newest counts.
+
+        Raises
+        ------
+        StudyError
+            The servo cannot present it, or has stopped itself.
+        """
+        self._due = bench
+        self._load_what_is_due()
+
+    @property
+    def due_in_s(self) -> float | None:
+        """How long until a scene that waits may be loaded, by `poll`; None where none waits."""
+        if self._due is None or self._loaded_ns is None:
+            return None
+        return max(self._loaded_ns + SPACING_NS - self.servo.now_ns(), 0) * 1e-9
+
+    def poll(self) -> None:
+        """Follow what the servo did since, load a scene that waited, and begin a path again that is over.
+
+        Raises
+        ------
+        StudyError
+            A scene that waited cannot be presented.
+        """
+        samples = self._reader.read()
+        lost, self._dropped = self._reader.dropped != self._dropped, self._reader.dropped
+        if len(samples):
+            self._counts.add(samples)
+            self.shadow.take(samples, lost=lost)
+        if self._ghost is not None:
+            self._ghost.follow(self.servo.now_ns())
+        self._load_what_is_due()
+        if self.path is not None and self._hand is not None and not self._hand.moving:
+            self._lead()
+
+    def play(self, name: str | None) -> None:
+        """Move the hand along a programmed path, again and again; with None give it back.
+
+        A device that a person holds goes on as it is: then the path is only computed and drawn.
+
+        Raises
+        ------
+        StudyError
+            No such path, or nothing is felt yet.
+        """
+        self.path, self._ghost = None, None
+        if name is None:
+            if self._hand is not None:
+                self._hand.rest()
+            return
+        motion = self._programme(name)
+        self.path = name
+        if self._hand is not None:
+            self._lead()
+        else:
+            self._ghost = _Ghost(motion, self.servo.rate_hz, self.device.force_limit_n, self.servo.now_ns())
+            self._tell_ghost()
+
+    def point_to(self, x_m: float, y_m: float, z_m: float) -> None:
+        """Say where the pointer is [m, hand frame], to a device that has one, unless a path moves it."""
+        point_to: Callable[[float, float, float], None] | None = getattr(self.device, "point_to", None)
+        if point_to is not None and self.path is None:
+            point_to(x_m, y_m, z_m)
+
+    def stop_force(self) -> None:
+        """Send zero force from the next tick on, until `fade_in`."""
+        self.servo.stop_force()
+
+    def fade_in(self) -> None:
+        """Let the force return after `stop_force`, as slowly as at a start."""
+        self.servo.fade_in()
+
+    def limiters(self) -> tuple[Limiter, ...]:
+        """Return which limiters acted in the last 10 s."""
+        limit_n = self.device.force_limit_n
+        if self._felt is not None:
+            limit_n = min(limit_n, self._felt.in_hand.scene.force_limit_n)
+        return self._counts.told(limit_n)
+
+    def trace(self) -> Trace | None:
+        """Return the last 2.5 s as A and as B have it."""
+        return self._shown.trace()
+
+    def tail(self, side: Side) -> Tail | None:
+        """Return the tail of a side; None where it has no wake."""
+        return self._shown.tail(side)
+
+    def reading(self) -> Reading | None:
+        """Return where things are now; None before the first tick."""
+        latest = self.servo.telemetry.latest()
+        if latest is None:
+            return None
+        return Reading(
+            position_m=_vector(latest.position_m),
+            force_n=_vector(latest.device_force_n),
+            wake_mps=_vector(latest.wake_mps),
+            force_on=self.servo.force_is_on,
+            fault=self.servo.fault or "",
+        )
+
+    def close(self) -> None:
+        """End in the order of safety: zero force, the servo's end, then the device; a second call does nothing."""
+        if self._closed:
+            return
+        self._closed = True
+        self.servo.stop_force()
+        try:
+            self.servo.stop()
+        finally:
+            self.device.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    @property
+    def _shown(self) -> Shadow:
+        return self.shadow if self._ghost is None else self._ghost.shadow
+
+    def _load_what_is_due(self) -> None:
+        now_ns = self.servo.now_ns()
+        if self._due is None or (self._loaded_ns is not None and now_ns < self._loaded_ns + SPACING_NS):
+            return
+        bench, self._due = self._due, None
+        a, b = (self._presentable(it.scene) for it in (bench.a, bench.b))
+        serial = self.servo.load(a if bench.felt == "A" else b)
+        self._loaded_ns, self._felt = now_ns, bench
+        self.shadow.expect(serial, bench.felt, a, b)
+        if self._ghost is not None:
+            self._tell_ghost()
+
+    def _presentable(self, scene: Scene) -> Scene:
+        """Return a scene at the servo's rate."""
+        return scene if scene.rate_hz == self.servo.rate_hz else _at_rate(scene, self.servo.rate_hz)
+
+    def _programme(self, name: str) -> Motion:
+        scene = Scene() if self._felt is None else self._felt.in_hand.scene
+        return programme(name, scene, self.device.workspace_m)
+
+    def _lead(self) -> None:
+        """Send the hand along the path, from where it is."""
+        assert self.path is not None and self._hand is not None  # noqa: S101, PT018 - called for a path and a hand
+        motion = led_to(self._programme(self.path), self._hand.aim_m)
+        self._hand.follow(motion.t_s, motion.position_m)
+
+    def _tell_ghost(self) -> None:
+        if self._ghost is not None and self._felt is not None:
+            a, b = (self._presentable(it.scene) for it in (self._felt.a, self._felt.b))
+            self._ghost.begin(self._felt.felt, a, b)
+
+
+class _Ghost:
+    """A path that nobody's hand goes along: samples as a servo would take them, for a shadow of its own."""
+
+    def __init__(self, motion: Motion, rate_hz: float, limit_n: float, now_ns: int) -> None:
+        self.shadow = Shadow(Scene(rate_hz=rate_hz), ELEMENTS, limit_n, alone=True)
+        self._motion = led_to(motion, motion.position_m[-1])
+        self._period_ns = round(1e9 / rate_hz)
+        self._started_ns = self._next_ns = now_ns
+        self._serial = 0
+
+    def begin(self, felt: Side, a: Scene, b: Scene) -> None:
+        """Present these from the next sample on."""
+        self._serial += 1
+        self.shadow.expect(self._serial, felt, a, b)
+
+    def follow(self, now_ns: int) -> None:
+        """Take what a servo would have taken by now; what was waited for too long is passed over."""
+        first_ns = max(self._next_ns, now_ns - _LONGEST_GAP_NS)
+        times_ns = np.arange(first_ns, now_ns, self._period_ns)
+        if len(times_ns) == 0:
+            return
+        self._next_ns = int(times_ns[-1]) + self._period_ns
+        samples = records(SAMPLE, len(times_ns))
+        samples.time_ns, samples.scene, samples.fresh = times_ns, self._serial, 1
+        t_s = ((times_ns - self._started_ns) * 1e-9) % self._motion.t_s[-1]
+        for axis in range(3):
+            samples.position_m[:, axis] = np.interp(t_s, self._motion.t_s, self._motion.position_m[:, axis])
+        self.shadow.take(samples)
+
+
+def open_live(
+    name: str,
+    *,
+    firmware: Path | None = None,
+    tell: Callable[[str], object] | None = None,
+    cancelled: Callable[[], bool] | None = None,
+) -> Live:
+    """Open a device and start its servo at rest; compiling takes a minute the first time.
+
+    ``tell`` is given what a device asks for while it is opened; it gives up when ``cancelled``.
+
+    Raises
+    ------
+    StudyError
+        It cannot be opened; then nothing of it is left open.
+    """
+    half_m = tuple(extent / 2 for extent in WORKSPACE_M)
+    options: dict[str, Any] = {"workspace_m": half_m, "force_limit_n": FORCE_LIMIT_N}
+    if moves_by_itself(name):
+        options["random"] = stream(1, "lab/tremor")
+    if is_falcon(name):
+        options |= {"firmware": firmware, "tell": tell, "cancelled": cancelled}
+    device = open_device(name, **options)
+    try:
+        live = Live(device, Servo(device, elements=ELEMENTS))
+        live.prepare()
+        live.servo.start()
+    except BaseException:
+        device.close()
+        raise
+    return live
+
+
+def _at_rate(scene: Scene, rate_hz: float) -> Scene:
+    return Scene(**(dict(scene) | {"rate_hz": rate_hz}))
+
+
+def _vector(values: Any) -> Vector:
+    x, y, z = values
+    return float(x), float(y), float(z)

@@ -1,0 +1,68 @@
+"""Programmed paths for a hand: those of the figures (``haptics.paths``), as large as the workspace lets them be."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+
+from study_app.errors import StudyError
+from study_app.haptics.motion import Motion
+from study_app.haptics.paths import RADIUS_M, path
+from study_app.haptics.scene import Scene
+
+Vector = tuple[float, float, float]
+
+TITLES: Final = {
+    "circle": "Three circles, then a stop",
+    "reverse": "Circles, then against the flow",
+    "line": "Straight line",
+    "stop": "Straight, then a stop",
+    "zigzag": "Turns of 90°",
+    "reach": "Reaches to and fro",
+}
+REACHED: Final = 0.85  # share of the workspace that a path may fill
+APPROACH_MPS: Final = 0.08
+SHORTEST_APPROACH_S: Final = 0.5
+_REST_S: Final = 2.0
+_LEGS: Final = 8
+_RATE_HZ: Final = 1000.0
+_HALF_TURN: Final = 0.7071  # of a leg, to either side of the way
+
+
+def programme(name: str, scene: Scene, half_m: Vector) -> Motion:
+    """Return a path in the hand frame, about the middle of a workspace of these half extents [m].
+
+    Its speed is that of the figures in the scene, 1 m/s; its size is theirs, or as much of it as fits.
+
+    Raises
+    ------
+    StudyError
+        No such path.
+    """
+    if name not in TITLES:
+        raise StudyError(f"no programmed path {name!r}: there are {', '.join(TITLES)}")
+    x_m, _, z_m = (REACHED * scene.scale * half for half in half_m)
+    radius_m = min(RADIUS_M, x_m, z_m)
+    sized: dict[str, dict[str, float]] = {
+        "circle": {"radius_m": radius_m, "rest_s": _REST_S},
+        "reverse": {"radius_m": radius_m, "rest_s": _REST_S},
+        "line": {"moving_s": 2 * x_m},
+        "stop": {"moving_s": 2 * x_m, "rest_s": _REST_S},
+        "zigzag": {"leg_s": min(2 * z_m / (_LEGS * _HALF_TURN), x_m / _HALF_TURN), "legs": _LEGS},
+        "reach": {"distance_m": min(0.6, 2 * x_m)},
+    }
+    found = path(name, rate_hz=_RATE_HZ, **sized[name])
+    places_m = found.position_m - (found.position_m.max(axis=0) + found.position_m.min(axis=0)) / 2
+    return Motion(found.t_s, places_m / scene.scale)
+
+
+def led_to(motion: Motion, from_m: Any) -> Motion:
+    """Return a motion that begins where the hand is, (3,) [m], with a smooth way to its first place."""
+    way_m = motion.position_m[0] - np.asarray(from_m, np.float64)
+    lasts_s = max(float(np.linalg.norm(way_m)) / APPROACH_MPS, SHORTEST_APPROACH_S)
+    t_s = np.arange(round(lasts_s * _RATE_HZ)) / _RATE_HZ
+    share = (t_s / lasts_s)[:, np.newaxis]
+    eased = share**3 * (10 - 15 * share + 6 * share**2)
+    places_m = np.concatenate([from_m + eased * way_m, motion.position_m])
+    return Motion(np.concatenate([t_s, motion.t_s + len(t_s) / _RATE_HZ]), places_m)

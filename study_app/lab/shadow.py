@@ -1,0 +1,217 @@
+"""What was felt, computed again beside the servo, and what the other setting would have been on the same motion.
+
+Telemetry comes in batches; the servo's own tick (``haptics.mirror``) answers for A and for B, each with a state of its
+own. The felt side shares what survives a change of scene with the servo's safety layer, so that its forces are the
+servo's to the last bit; the other side goes on with a copy of it. Nothing here can hold the servo up.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Final, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study_app.haptics.effects.fill import scaled_length
+from study_app.haptics.gate import resolve
+from study_app.haptics.layout import SAMPLE, records
+from study_app.haptics.mirror import new_trail, take_again
+from study_app.haptics.pack import pack, pack_into
+from study_app.haptics.safety import begin_scene, new_safety
+from study_app.haptics.scene import Scene
+from study_app.lab.tail import Tail, tail_of
+from study_app.lab.workbench import Side, other
+
+Floats: TypeAlias = NDArray[np.float64]
+
+SPAN_S: Final = 2.5
+_SIDES: Final[tuple[Side, Side]] = ("A", "B")
+
+_ROW: Final = np.dtype(
+    [
+        ("time_ns", np.int64),
+        ("force_a_n", np.float64, (3,)),
+        ("force_b_n", np.float64, (3,)),
+        ("body_mps", np.float64),
+        ("wake_a_mps", np.float64),
+        ("wake_b_mps", np.float64),
+        ("felt_a", np.bool_),
+    ]
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trace:
+    """The last 2.5 s of one motion as A and as B have it; ``t_s`` (n,) ends at 0, the newest sample.
+
+    ``force_a_n``, ``force_b_n`` (n, 3) are the forces on the hand, sent by the servo where the side was felt and as
+    they would have been sent where it was not; ``body_mps``, ``wake_a_mps`` and ``wake_b_mps`` (n,) speeds in the
+    scene; ``felt_a`` (n,) says where A was felt.
+    """
+
+    t_s: Floats
+    force_a_n: Floats
+    force_b_n: Floats
+    body_mps: Floats
+    wake_a_mps: Floats
+    wake_b_mps: Floats
+    felt_a: NDArray[np.bool_]
+
+
+@dataclass(slots=True)
+class _Presented:
+    """What the servo presents from a scene's first sample on."""
+
+    felt: Side
+    scenes: dict[Side, Scene]
+
+
+class Shadow:
+    """The two settings beside the servo.
+
+    Parameters
+    ----------
+    rest : the scene without liquids that the servo begins with
+    elements : wake elements there is room for
+    limit_n : the device's own force limit [N]
+    alone : there is no servo behind the samples: what comes of them here is shown for both sides
+    """
+
+    def __init__(self, rest: Scene, elements: int, limit_n: float, *, alone: bool = False) -> None:
+        self._alone = alone
+        self._sides = {side: _Half(rest, elements, limit_n) for side in _SIDES}
+        self._felt: Side = "A"
+        self._serial = 0
+        self._expected: dict[int, _Presented] = {}
+        self._recent = _Recent()
+        self.differing = 0  # ticks of which the felt side's force was not the servo's, to the last bit
+        self.followed = 0  # ticks that were compared
+
+    def prepare(self) -> None:
+        """Compile all that runs later, or load it from the cache."""
+        for half in self._sides.values():
+            half.begin(half.scene)
+            half.answer(records(SAMPLE, 0))
+            half.restart()
+
+    def expect(self, serial: int, felt: Side, a: Scene, b: Scene) -> None:
+        """Say what the servo will present as scene ``serial``, and what beside it."""
+        self._expected[serial] = _Presented(felt, {"A": a, "B": b})
+
+    def take(self, samples: Any, *, lost: bool = False) -> None:
+        """Follow the servo's next samples (recarray of ``SAMPLE``); ``lost`` where some before them were dropped."""
+        if lost:
+            for half in self._sides.values():
+                half.begin(half.scene)
+        borders = np.flatnonzero(np.diff(samples.scene, prepend=self._serial))
+        for first, behind in zip((0, *borders), (*borders, len(samples)), strict=True):
+            part = samples[first:behind]
+            if len(part):
+                self._change_to(int(part.scene[0]))
+                self._follow(part)
+
+    def trace(self) -> Trace | None:
+        """Return the last 2.5 s; None before the first sample."""
+        return self._recent.trace()
+
+    def tail(self, side: Side) -> Tail | None:
+        """Return the tail of a side; None where it has no wake."""
+        return self._sides[side].tail()
+
+    def _change_to(self, serial: int) -> None:
+        """Begin what the servo began with this scene: the felt side anew, the other where it is not what it was."""
+        if serial == self._serial:
+            return
+        self._serial = serial
+        presented = self._expected.get(serial)
+        if presented is None:  # rest: a servo that ends, or was told to present nothing
+            return
+        self._expected = {number: it for number, it in self._expected.items() if number >= serial}
+        felt, beside = self._sides[presented.felt], self._sides[other(presented.felt)]
+        if self._felt != presented.felt:
+            felt.safety, beside.safety = beside.safety, beside.safety.copy()  # the servo's own goes with what is felt
+        felt.begin(presented.scenes[presented.felt])
+        if beside.scene != presented.scenes[other(presented.felt)]:
+            beside.begin(presented.scenes[other(presented.felt)])
+        self._felt = presented.felt
+
+    def _follow(self, samples: Any) -> None:
+        """Let both sides answer to samples of one scene; of the felt one, what the servo sent is shown."""
+        out = {side: half.answer(samples) for side, half in self._sides.items()}
+        if not self._alone:
+            again, out[self._felt] = out[self._felt], samples
+            self.followed += len(samples)
+            self.differing += int(np.count_nonzero((again.device_force_n != samples.device_force_n).any(axis=1)))
+        self._recent.add(samples.time_ns, out["A"], out["B"], felt_a=self._felt == "A")
+
+
+class _Half:
+    """One side: its scene, the memory it lives in, and the safety layer behind it."""
+
+    def __init__(self, rest: Scene, elements: int, limit_n: float) -> None:
+        self.scene = rest
+        self.safety = new_safety(limit_n)
+        self._model = pack(rest, capacity=elements)
+        self._trail, self._places = new_trail(elements)
+
+    def restart(self) -> None:
+        """Be as before the first sample."""
+        self.safety = new_safety(self.safety[0].device_limit_n)
+
+    def begin(self, scene: Scene) -> None:
+        """Present a scene from now on, as the servo does: its state afresh, its force faded in."""
+        self.scene = scene
+        pack_into(self._model, scene)
+        begin_scene(self.safety[0])
+        self._trail.view(np.uint8)[:] = 0
+
+    def answer(self, samples: Any) -> Any:
+        """Return the samples with what comes of them here."""
+        out = samples.copy()
+        take_again(self._model, self.safety[0], out, self._trail[0], self._places)
+        return out
+
+    def tail(self) -> Tail | None:
+        """Return its tail."""
+        scene = resolve(self.scene)
+        if not scene.liquids:
+            return None
+        liquid = scene.liquids[0]
+        wake = (
+            liquid.wake if "wake" in liquid.effects else liquid.local_wake if "local_wake" in liquid.effects else None
+        )
+        return None if wake is None else tail_of(self._trail[0], self._places, scaled_length(wake, scene.rate_hz))
+
+
+class _Recent:
+    """The newest samples of both sides, as many as a trace shows."""
+
+    def __init__(self) -> None:
+        self._rows: Any = records(_ROW, 0)
+
+    def add(self, time_ns: Any, a: Any, b: Any, *, felt_a: bool) -> None:
+        """Add samples of the same moments, one array a side."""
+        rows = records(_ROW, len(time_ns))
+        rows.time_ns, rows.force_a_n, rows.force_b_n = time_ns, a.device_force_n, b.device_force_n
+        rows.body_mps = np.linalg.norm((a if felt_a else b).velocity_mps, axis=1)
+        rows.wake_a_mps = np.linalg.norm(a.wake_mps, axis=1)
+        rows.wake_b_mps = np.linalg.norm(b.wake_mps, axis=1)
+        rows.felt_a = felt_a
+        joined = np.concatenate([self._rows, rows])
+        self._rows = joined[joined["time_ns"] > time_ns[-1] - round(SPAN_S * 1e9)].view(np.recarray)
+
+    def trace(self) -> Trace | None:
+        """Return them; None where there are none."""
+        rows = self._rows
+        if len(rows) == 0:
+            return None
+        return Trace(
+            t_s=(rows.time_ns - rows.time_ns[-1]) * 1e-9,
+            force_a_n=rows.force_a_n,
+            force_b_n=rows.force_b_n,
+            body_mps=rows.body_mps,
+            wake_a_mps=rows.wake_a_mps,
+            wake_b_mps=rows.wake_b_mps,
+            felt_a=rows.felt_a,
+        )

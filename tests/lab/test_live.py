@@ -1,0 +1,293 @@
+"""Device and servo of the lab: what is edited is felt at once, and every way out ends in zero force."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+import pytest
+
+if numba.config.DISABLE_JIT:
+    pytest.skip("the servo exists compiled only", allow_module_level=True)
+
+from study_app.devices.mouse import MouseDevice
+from study_app.errors import ServoFault, StudyError
+from study_app.haptics.clock import VirtualClock
+from study_app.haptics.layout import LIMITER_NAMES, LIMITER_SLEW, LIMITER_STOP
+from study_app.haptics.servo import Servo
+from study_app.lab.live import Live, open_live
+from study_app.lab.programmes import REACHED, TITLES, led_to, programme
+from tests.haptics.probe import Probe
+from tests.lab.benches import SCENES, bench, live_with, run, scripted
+
+
+def sent_n(live: Live, ticks: int) -> np.ndarray:
+    """Return the sizes of the forces sent in the last ticks [N]."""
+    written = int(live.servo.telemetry.written[0])
+    ring = live.servo.telemetry.ring
+    return np.linalg.norm(ring.device_force_n[written - ticks : written], axis=1)
+
+
+def test_a_scene_is_presented_by_the_next_tick_and_felt_whole_within_fifty() -> None:
+    live = live_with(scripted())
+    sides = bench("honey", "water")
+    live.feel(sides)
+    live.play("circle")
+    run(live, 1500)
+    live.feel(sides.change("liquid.density_kg_m3", 700.0))
+    run(live, 60, batch=1)
+    ring = live.servo.telemetry.ring
+    assert ring.scene[1499] == 1
+    assert ring.scene[1500] == 2
+    sent, whole = (np.linalg.norm(it[1500:1560], axis=1) for it in (ring.device_force_n, ring.force_n))
+    assert whole[50:].min() > 0.2
+    assert sent[50:] == pytest.approx(whole[50:])
+    live.close()
+
+
+def test_every_value_of_a_drag_is_presented_within_fifty_ticks_or_a_newer_one_is() -> None:
+    live = live_with(scripted())
+    sides = bench()
+    live.feel(sides)
+    run(live, 300)
+    for k in range(20):  # a value every 8 ms
+        sides = sides.change("wake.length", 1600.0 - k, held=True)
+        live.feel(sides)
+        run(live, 8, batch=2)
+    assert live.due_in_s is not None
+    run(live, 50, batch=2)
+    assert live.due_in_s is None
+    scenes = live.servo.telemetry.ring.scene[300:510]
+    begins = np.flatnonzero(np.diff(scenes))
+    assert np.diff(begins).min() >= 50  # so that a fade ends
+    assert np.diff(begins).max() <= 52
+    assert live.shadow.differing == 0
+    tail = live.tail("A")
+    assert tail is not None
+    assert tail.elements == 1581
+    live.close()
+
+
+def test_stopping_the_force_is_zero_from_the_next_tick_whatever_is_chosen_until_it_fades_in() -> None:
+    live = live_with(scripted())
+    sides = bench("honey", "honey")
+    live.feel(sides)
+    live.play("circle")
+    run(live, 1500)
+    assert sent_n(live, 100).min() > 0.5
+    live.stop_force()
+    run(live, 1)
+    assert sent_n(live, 1)[0] == 0.0
+    live.feel(sides.switch())
+    run(live, 300)
+    assert sent_n(live, 301).max() == 0.0
+    reading = live.reading()
+    assert reading is not None
+    assert not reading.force_on
+    live.fade_in()
+    run(live, 50)
+    assert 0.0 < sent_n(live, 1)[0] < 0.5
+    run(live, 2500)
+    assert sent_n(live, 2000).max() > 0.5
+    live.close()
+
+
+def test_closing_ends_with_zero_force_then_the_servo_then_the_device() -> None:
+    device = scripted()
+    live = live_with(device)
+    live.feel(bench("honey", "water"))
+    live.play("circle")
+    run(live, 1500)
+    handle = device._state.handle
+    assert np.linalg.norm(handle.force_n) > 0.5
+    order: list[str] = []
+    stop, close = live.servo.stop, device.close
+
+    def servo_stops() -> None:
+        stop()
+        order.append(f"servo, {np.linalg.norm(handle.force_n):g} N")
+
+    def device_closes() -> None:
+        order.append("device")
+        close()
+
+    live.servo.stop, device.close = servo_stops, device_closes  # type: ignore[method-assign]
+    live.close()
+    live.close()
+    assert order == ["servo, 0 N", "device"]
+
+
+def test_a_servo_that_does_not_end_does_not_keep_the_device_open() -> None:
+    device = scripted()
+    live = live_with(device)
+    closed: list[bool] = []
+
+    def stuck() -> None:
+        raise ServoFault("stuck")
+
+    live.servo.stop = stuck  # type: ignore[method-assign]
+    device.close = lambda: closed.append(True)  # type: ignore[method-assign]
+    with pytest.raises(ServoFault):
+        live.close()
+    assert closed == [True]
+    assert not live.servo.force_is_on
+
+
+def test_an_exception_on_the_way_ends_in_zero_force() -> None:
+    device = scripted()
+
+    def feels_and_fails() -> None:
+        with live_with(device) as live:
+            live.feel(bench("honey", "water"))
+            live.play("circle")
+            run(live, 1500)
+            assert sent_n(live, 1)[0] > 0.5
+            raise RuntimeError
+
+    with pytest.raises(RuntimeError):
+        feels_and_fails()
+    assert np.linalg.norm(device._state.handle.force_n) == 0.0
+
+
+def test_a_fault_is_told_and_nothing_more_is_presented() -> None:
+    device = scripted()
+    live = live_with(device)
+    live.feel(bench())
+    run(live, 100)
+    device.unplug()
+    run(live, 5)
+    reading = live.reading()
+    assert reading is not None
+    assert "stopped answering" in reading.fault
+    assert not reading.force_on
+    with pytest.raises(StudyError, match="stopped answering"):
+        live.feel(bench())
+    live.close()
+
+
+@pytest.mark.parametrize("name", TITLES)
+def test_programmed_paths_fit_the_workspace_and_the_hand_goes_along_them(name: str) -> None:
+    live = live_with(scripted())
+    live.feel(bench("water", "water"))
+    run(live, 60)
+    motion = programme(name, SCENES["water"], live.device.workspace_m)
+    for axis, half_m in enumerate(live.device.workspace_m):
+        assert np.abs(motion.position_m[:, axis]).max() <= REACHED * half_m + 1e-9
+    steps_mps = np.linalg.norm(np.diff(motion.position_m, axis=0), axis=1) * 1000
+    assert steps_mps.max() < 0.15 + 0.01
+    live.play(name)
+    whole = led_to(motion, live._hand.aim_m)  # type: ignore[union-attr]
+    lasts = round(whole.t_s[-1] * 1000)
+    run(live, lasts)
+    places_m = live.servo.telemetry.ring.position_m[60 : 60 + lasts]
+    assert np.abs(places_m - whole.position_m[:lasts]).max() < 0.02  # the hand is a spring against the liquid
+    run(live, 200)
+    assert live.path == name
+    assert live._hand is not None and live._hand.moving  # noqa: PT018 - again from the start
+    live.play(None)
+    run(live, 50)
+    assert not live._hand.moving
+    live.close()
+
+
+def test_an_unknown_path_is_refused() -> None:
+    live = live_with(scripted())
+    with pytest.raises(StudyError, match="no programmed path 'square'"):
+        live.play("square")
+    live.close()
+
+
+def test_the_pointer_moves_the_mouse_unless_a_path_does() -> None:
+    device = MouseDevice(workspace_m=(0.05, 0.03, 0.03))
+    live = Live(device, Servo(device, clock=VirtualClock(), elements=10_000))
+    live.feel(bench())
+    live.point_to(0.02, 0.01, 0.0)
+    run(live, 600)
+    reading = live.reading()
+    assert reading is not None
+    assert reading.position_m == pytest.approx((0.02, 0.01, 0.0), abs=2e-3)
+    live.play("circle")
+    live.point_to(-0.04, 0.0, 0.0)
+    run(live, 1500)
+    places_m = live.servo.telemetry.ring.position_m[1600:2100]
+    assert np.linalg.norm(places_m[:, ::2], axis=1) == pytest.approx(0.0255, abs=0.01)
+    live.play(None)
+    live.point_to(-0.04, 0.0, 0.0)
+    run(live, 1500)
+    reading = live.reading()
+    assert reading is not None
+    assert reading.position_m[0] == pytest.approx(-0.04, abs=2e-3)
+    live.close()
+
+
+def test_a_path_beside_a_hand_that_takes_no_orders_is_computed_alone() -> None:
+    """The device goes on as it is; trace and tails are those of the path."""
+    probe = Probe(velocity_mps=(0.0, 0.0, 0.0))
+    live = Live(probe, Servo(probe, clock=VirtualClock(), elements=10_000))  # type: ignore[arg-type]
+    probe.workspace_m = (0.05, 0.03, 0.03)
+    live.feel(bench())
+    run(live, 100)
+    live.play("circle")
+    run(live, 2500)
+    trace, tail = live.trace(), live.tail("A")
+    assert trace is not None
+    assert tail is not None
+    assert np.linalg.norm(trace.force_a_n, axis=1).max() > 0.5
+    assert np.linalg.norm(trace.force_b_n, axis=1).max() > 0.5
+    assert np.linalg.norm(tail.positions_m, axis=1).max() == pytest.approx(0.0255, abs=1e-3)
+    assert sent_n(live, 2500).max() == 0.0
+    live.play(None)
+    run(live, 100)
+    trace = live.trace()
+    assert trace is not None
+    assert np.abs(trace.force_a_n).max() == 0.0
+    live.servo.stop()
+
+
+def test_limiters_are_counted_as_telemetry_has_them() -> None:
+    live = live_with(scripted())
+    live.feel(bench("light_oil", "water"))
+    live.play("reverse")
+    run(live, 6000)
+    ring = live.servo.telemetry.ring[:6000]
+    told = {it.name: it for it in live.limiters()}
+    assert told["Slew, 0.5 N a tick"].ticks == np.count_nonzero(ring.limiters & LIMITER_SLEW) > 0
+    assert len(told) == len(LIMITER_NAMES)
+    assert not told["Force stopped"].acting
+    live.stop_force()
+    run(live, 200)
+    told = {it.name: it for it in live.limiters()}
+    assert (
+        told["Force stopped"].ticks == 200 == np.count_nonzero(live.servo.telemetry.ring[:6200].limiters & LIMITER_STOP)
+    )
+    assert told["Force stopped"].acting
+    live.fade_in()
+    run(live, 11_000)
+    assert {it.name: it for it in live.limiters()}["Force stopped"].ticks == 0  # longer ago than 10 s
+    live.close()
+
+
+def test_a_scene_of_another_rate_is_felt_at_the_servos() -> None:
+    live = live_with(scripted())
+    sides = bench()
+    slow = sides.a.scene.model_copy(update={"rate_hz": 500.0})
+    live.feel(sides.choose("A", "slow", slow))
+    run(live, 40)
+    assert live.servo.telemetry.ring.scene[39] == 1
+    live.close()
+
+
+def test_the_lab_beside_a_servo_in_its_own_thread_sees_every_tick_of_it() -> None:
+    live = open_live("scripted")
+    try:
+        sides = bench()
+        live.feel(sides)
+        live.play("reverse")
+        while live.shadow.followed < 1500:
+            live.poll()
+            if live.shadow.followed > 700 and sides.felt == "A":
+                live.feel(sides := sides.switch())
+        assert live.shadow.differing == 0
+        assert live.servo.fault is None
+    finally:
+        live.close()
+    assert np.linalg.norm(live.device._state.handle.force_n) == 0.0  # type: ignore[attr-defined]

@@ -1,0 +1,176 @@
+"""What was felt, computed again beside the servo: the same bits, and the other liquid on the same motion."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+import pytest
+
+if numba.config.DISABLE_JIT:
+    pytest.skip("the servo exists compiled only", allow_module_level=True)
+
+from study_app.haptics.layout import SAMPLE, records
+from study_app.haptics.scene import Scene
+from study_app.lab.changes import changed
+from study_app.lab.shadow import SPAN_S, Shadow
+from study_app.lab.tail import MOST_POINTS
+from study_app.lab.workbench import Setting, Workbench
+from tests.haptics.scenes import EVERYTHING
+from tests.lab.benches import SCENES, bench, live_with, run, scripted
+
+
+def test_the_felt_sides_forces_are_the_servos_to_the_last_bit_through_switches_edits_and_stops() -> None:
+    live = live_with(scripted())
+    sides = bench()
+    live.feel(sides)
+    live.play("reverse")
+    run(live, 900)
+    live.feel(sides := sides.switch())
+    run(live, 500)
+    live.stop_force()
+    run(live, 100)
+    live.fade_in()
+    run(live, 700)
+    live.feel(sides := sides.change("wake.exponent", 2.0))
+    run(live, 10, batch=10)
+    live.feel(sides.switch())
+    run(live, 900)
+    assert live.shadow.followed == 3110
+    assert live.shadow.differing == 0
+    trace = live.trace()
+    assert trace is not None
+    assert np.linalg.norm(trace.force_a_n, axis=1).max() > 0.5
+    live.close()
+
+
+@pytest.mark.parametrize("name", ["tail", "places"])
+def test_so_they_are_with_every_effect(name: str) -> None:
+    scene = EVERYTHING[name]
+    live = live_with(scripted())
+    live.feel(Workbench(Setting("all", scene, scene), bench().b))
+    live.play("reach")
+    run(live, 2500)
+    assert live.shadow.differing == 0
+    live.close()
+
+
+def test_the_other_side_is_what_it_would_be_were_it_felt() -> None:
+    beside = live_with(scripted())
+    quiet = changed(SCENES["water"], "liquid.density_kg_m3", 1.0)
+    beside.feel(Workbench(Setting("hardly there", quiet, quiet), bench().b))
+    beside.play("reverse")
+    run(beside, 2000)
+    recorded = beside.servo.telemetry.ring[:2000].copy()
+    alone = Shadow(Scene(), 10_000, 8.0, alone=True)
+    alone.expect(1, "B", quiet, SCENES["light_oil"])
+    alone.take(recorded)
+    one, other = beside.trace(), alone.trace()
+    assert one is not None
+    assert other is not None
+    assert np.array_equal(one.force_b_n, other.force_b_n)
+    assert np.array_equal(one.wake_b_mps, other.wake_b_mps)
+    assert np.abs(one.force_b_n - one.force_a_n).max() > 1.0
+    beside.close()
+
+
+def test_a_side_that_is_not_touched_keeps_its_wake_while_the_other_is_edited() -> None:
+    live = live_with(scripted())
+    sides = bench("water", "light_oil")
+    live.feel(sides)
+    live.play("circle")
+    run(live, 1000)
+    before = live.tail("B")
+    live.feel(sides.change("wake.exponent", 1.0))
+    run(live, 2, batch=2)
+    felt, beside = live.tail("A"), live.tail("B")
+    assert before is not None
+    assert felt is not None
+    assert beside is not None
+    assert beside.alive == before.alive == 125
+    assert felt.alive <= 2
+    live.close()
+
+
+def test_a_trace_is_the_last_two_and_a_half_seconds() -> None:
+    live = live_with(scripted())
+    assert live.trace() is None
+    live.feel(bench())
+    run(live, 4000)
+    trace = live.trace()
+    assert trace is not None
+    assert trace.t_s[-1] == 0.0
+    assert trace.t_s[0] == pytest.approx(-SPAN_S, abs=2e-3)
+    assert len(trace.t_s) == len(trace.force_a_n) == len(trace.body_mps) == 2500
+    live.close()
+
+
+def test_a_tail_is_the_path_that_was_left_and_breaks_where_it_turns() -> None:
+    """A path with a right angle: every point lies on it, and one segment begins at the corner."""
+    scene = SCENES["water"]
+    wake = scene.liquids[0].wake
+    assert wake is not None
+    shadow = Shadow(Scene(), 2000, 8.0, alone=True)
+    shadow.expect(1, "A", scene, scene)
+    samples = records(SAMPLE, 600)
+    samples.time_ns, samples.scene, samples.fresh = np.arange(600) * 1_000_000, 1, 1
+    way_m = np.arange(600) * 1e-4
+    samples.position_m[:, 0] = np.minimum(way_m, 0.03)
+    samples.position_m[:, 2] = np.maximum(way_m - 0.03, 0.0)
+    shadow.take(samples)
+    tail = shadow.tail("A")
+    assert tail is not None
+    assert (tail.elements, tail.alive) == (1700, 600)
+    assert tail.segments == tail.breaks.sum() == 2
+    assert len(tail.positions_m) <= MOST_POINTS
+    corner = tail.positions_m[np.flatnonzero(tail.breaks)[1]]
+    assert corner == pytest.approx([0.03, 0.0, 0.0], abs=0.0075)  # a diameter of the ball, and the filter's lag
+    on_first = np.abs(tail.positions_m[:, 2]) < 1e-12
+    on_second = np.abs(tail.positions_m[:, 0] - 0.03) < 1e-12
+    assert (on_first | on_second).all()
+    assert (np.diff(tail.ages) < 0).all()
+    assert tail.ages[-1] == 0.0
+    assert tail.ages[0] == pytest.approx(598 / 1699, abs=2 / 1699)
+    assert (np.diff(tail.positions_m.sum(axis=1)) > 0).all()
+
+
+def test_a_tail_forgets_what_falls_off_it() -> None:
+    scene = changed(SCENES["water"], "wake.length", 100.0)
+    shadow = Shadow(Scene(), 2000, 8.0, alone=True)
+    shadow.expect(1, "A", scene, SCENES["honey"])
+    samples = records(SAMPLE, 400)
+    samples.time_ns, samples.scene, samples.fresh = np.arange(400) * 1_000_000, 1, 1
+    samples.position_m[:, 0] = np.arange(400) * 1e-4
+    shadow.take(samples)
+    tail = shadow.tail("A")
+    assert tail is not None
+    assert tail.alive == tail.elements == 100
+    assert tail.positions_m[:, 0] == pytest.approx(np.arange(300, 400) * 1e-4)
+    assert tail.ages[0] == 1.0
+    assert shadow.tail("B") is None  # honey has no wake
+
+
+def test_zero_elements_are_alive_and_not_drawn() -> None:
+    shadow = Shadow(Scene(), 2000, 8.0, alone=True)
+    shadow.expect(1, "A", SCENES["water"], SCENES["water"])
+    samples = records(SAMPLE, 700)
+    samples.time_ns, samples.scene, samples.fresh = np.arange(700) * 1_000_000, 1, 1
+    samples.position_m[:, 0] = np.minimum(np.arange(700), 100) * 1e-4
+    shadow.take(samples)
+    tail = shadow.tail("A")
+    assert tail is not None
+    assert tail.alive == 700
+    assert len(tail.positions_m) < 250
+    assert tail.ages[-1] > 0.2
+
+
+def test_samples_that_were_lost_begin_both_sides_anew() -> None:
+    shadow = Shadow(Scene(), 2000, 8.0)
+    shadow.expect(1, "A", SCENES["water"], SCENES["light_oil"])
+    samples = records(SAMPLE, 300)
+    samples.time_ns, samples.scene, samples.fresh = np.arange(300) * 1_000_000, 1, 1
+    samples.position_m[:, 0] = np.arange(300) * 1e-4
+    shadow.take(samples)
+    shadow.take(samples[-10:], lost=True)
+    tail = shadow.tail("A")
+    assert tail is not None
+    assert tail.alive == 10
