@@ -51,22 +51,23 @@ class Box:
 
 @dataclass(frozen=True, slots=True)
 class Camera:
-    """A pinhole at (0, ``eye_y``, ``eye_z``) [m]; focal length and the point looked at, ``centre``, in px."""
+    """A pinhole at (0, ``eye_y``, ``eye_z``) [m] that looks down by ``pitch`` [rad]; ``focal`` and ``centre`` in px."""
 
     eye_y: float
     eye_z: float
     focal: float
     centre_x: float
     centre_y: float
+    pitch: float = PITCH
 
     @classmethod
-    def fitted(cls, box: Box, left: float, top: float, width: float, height: float) -> Camera:
+    def fitted(cls, box: Box, left: float, top: float, width: float, height: float, *, pitch: float = PITCH) -> Camera:
         """Return the camera that shows the whole box as large as the rectangle allows, in its middle [px]."""
         middle = (box.top + box.floor) / 2
         distance = DISTANCE * (box.water - box.floor) + box.z
-        eye_y = middle + math.sin(PITCH) * distance
-        eye_z = math.cos(PITCH) * distance
-        bare = cls(eye_y, eye_z, 1.0, 0.0, 0.0)
+        eye_y = middle + math.sin(pitch) * distance
+        eye_z = math.cos(pitch) * distance
+        bare = cls(eye_y, eye_z, 1.0, 0.0, 0.0, pitch)
         pixels = [bare.point(corner) for corner in box.corners()]
         xs, ys = [x for x, _ in pixels], [y for _, y in pixels]
         focal = min(width / (max(xs) - min(xs)), height / (max(ys) - min(ys)))
@@ -76,12 +77,13 @@ class Camera:
             focal,
             left + width / 2 - focal * (max(xs) + min(xs)) / 2,
             top + height / 2 - focal * (max(ys) + min(ys)) / 2,
+            pitch,
         )
 
     def distance(self, point: Point) -> float:
         """Return how far a point is from the eye along the line of sight [m]."""
         _, y, z = point
-        return (self.eye_y - y) * math.sin(PITCH) + (self.eye_z - z) * math.cos(PITCH)
+        return (self.eye_y - y) * math.sin(self.pitch) + (self.eye_z - z) * math.cos(self.pitch)
 
     def scale(self, point: Point) -> float:
         """Return px per metre at a point's distance."""
@@ -90,6 +92,6 @@ class Camera:
     def point(self, point: Point) -> Pixel:
         """Return where a point falls on the screen [px]."""
         x, y, z = point
-        up = (y - self.eye_y) * math.cos(PITCH) - (z - self.eye_z) * math.sin(PITCH)
+        up = (y - self.eye_y) * math.cos(self.pitch) - (z - self.eye_z) * math.sin(self.pitch)
         scale = self.scale(point)
         return self.centre_x + scale * x, self.centre_y - scale * up
