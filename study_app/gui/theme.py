@@ -106,6 +106,9 @@ class TankColours:
     lit: str = "#F4FBFF"
     dim: str = "#A9C4D4"
     shadow: str = "#06131C"
+    tail_old: str = "#4E97C9"  # the lab's alone: participants never see a tail
+    tail: str = "#F4FBFF"
+    wake: str = "#8FD0F5"
 
 
 TANK = TankColours()
@@ -116,8 +119,8 @@ def stylesheet(theme: Theme) -> str:
 
     Dynamic properties: a QPushButton is outlined, ``role="primary"`` filled, ``role="danger"`` outlined in bad,
     ``role="plain"`` without an edge, ``role="stop"`` the force stop; a QFrame is a card with ``role="card"``; a QLabel
-    takes ``role`` text2, text3, ok, warn, bad or accent; a field is low with ``dense="true"``, its edge accent with
-    ``state="changed"`` and bad with ``state="refused"``.
+    takes ``role`` text2, text3, ok, warn, bad or accent; fields and buttons are low with ``dense="true"``; the edge of
+    a field is accent with ``state="changed"`` and bad with ``state="refused"``.
     """
     t = theme
     return "\n".join(
@@ -145,6 +148,8 @@ QPushButton:hover {{ background: {t.hover}; border-color: {t.text2}; }}
 QPushButton:pressed {{ background: {t.sunk}; }}
 QPushButton:focus {{ border: 2px solid {t.accent}; padding: 7px 15px; }}
 QPushButton:disabled {{ color: {t.text3}; border-color: {t.border}; background: transparent; }}
+QPushButton[dense='true'] {{ padding: 3px 10px; min-height: 24px; }}
+QPushButton[dense='true']:focus {{ padding: 2px 9px; }}
 QPushButton[role='primary'] {{ background: {t.accent}; color: {t.on_accent}; border: 1px solid {t.accent}; }}
 QPushButton[role='primary']:hover {{ background: {t.accent_hover}; border-color: {t.accent_hover}; }}
 QPushButton[role='primary']:focus {{ border: 2px solid {t.text}; padding: 7px 15px; }}
@@ -167,10 +172,10 @@ def _fields(t: Theme) -> str:
 {field} {{ background: {t.surface}; color: {t.text}; border: 1px solid {t.ctl}; border-radius: {RADIUS_CONTROL}px;
   padding: 7px 12px; min-height: 24px; selection-background-color: {t.accent}; selection-color: {t.on_accent}; }}
 {focused} {{ border: 2px solid {t.accent}; padding: 6px 11px; }}
-QLineEdit[dense='true'], QComboBox[dense='true'] {{ padding: 3px 9px; min-height: 22px; }}
-QLineEdit[dense='true']:focus, QComboBox[dense='true']:focus {{ padding: 2px 8px; }}
-QLineEdit[state='changed'], QComboBox[state='changed'] {{ border: 2px solid {t.accent}; padding: 2px 8px; }}
-QLineEdit[state='refused'] {{ border: 2px solid {t.bad}; padding: 2px 8px; }}
+QLineEdit[dense='true'], QComboBox[dense='true'] {{ padding: 3px 6px; min-height: 22px; }}
+QLineEdit[dense='true']:focus, QComboBox[dense='true']:focus {{ padding: 2px 5px; }}
+QLineEdit[state='changed'], QComboBox[state='changed'] {{ border: 2px solid {t.accent}; padding: 2px 5px; }}
+QLineEdit[state='refused'] {{ border: 2px solid {t.bad}; padding: 2px 5px; }}
 QComboBox::drop-down {{ border: none; width: 28px; }}
 QComboBox QAbstractItemView {{ background: {t.surface}; color: {t.text}; border: 1px solid {t.ctl};
   selection-background-color: {t.selected}; selection-color: {t.text}; outline: none; }}

@@ -7,28 +7,28 @@ how it is written.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias
+from typing import Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from study_app.lab.workbench import Workbench
+from study_app.lab.parameters import Parameter, Value, sections
+from study_app.lab.workbench import Setting, Side, Workbench
 
 Floats: TypeAlias = NDArray[np.float64]
-Side: TypeAlias = Literal["A", "B"]
 Point: TypeAlias = tuple[float, float, float]
 Choices: TypeAlias = tuple[tuple[str, str], ...]
 """Pairs of what is chosen and the words for it."""
 
 SPAN_S = 2.5
+SIDES: tuple[Side, Side] = ("A", "B")
 
 
 class TailShown(Protocol):
     """The wake's elements as places the body was at (see ``lab.shadow.Tail``), from the oldest to the newest.
 
     ``positions_m`` (n, 3) [m, hand frame]; ``breaks`` (n,) bool, true where a segment begins; ``ages`` (n,) from 0, the
-    newest, to 1, the oldest; ``alive`` of ``elements`` are held now.
+    newest, to 1, the oldest; ``alive`` of ``elements`` are held now, in ``segments`` segments.
     """
 
     @property
@@ -41,6 +41,8 @@ class TailShown(Protocol):
     def elements(self) -> int: ...  # noqa: D102
     @property
     def alive(self) -> int: ...  # noqa: D102
+    @property
+    def segments(self) -> int: ...  # noqa: D102
 
 
 class TraceShown(Protocol):
@@ -127,7 +129,7 @@ class LabView:
     live motion alone. ``busy`` says what is waited for ("Opening the Falcon"); ``refused`` is the parameter that could
     not be changed and one line why. ``tail_a``, ``tail_b``, ``trace`` and ``now`` are None where nothing has moved yet,
     a tail also where the setting has no wake. ``cost`` and ``errors`` are of the felt setting, empty until they are
-    measured; ``measuring`` while they are measured anew. ``first`` is the side that is called "setting 1" while blind.
+    measured; ``measuring`` while they are measured anew.
     """
 
     workbench: Workbench
@@ -151,7 +153,6 @@ class LabView:
     refused: tuple[str, str] | None = None
     workspace_m: Point = (0.1, 0.06, 0.06)
     body_radius_m: float = 0.0034
-    first: Side = "A"
 
     @property
     def felt(self) -> Side:
@@ -164,6 +165,34 @@ class LabView:
         return self.tail_a if self.felt == "A" else self.tail_b
 
 
-def setting(workbench: Workbench, side: Side) -> Any:
-    """Return the setting of a side."""
-    return workbench.a if side == "A" else workbench.b
+@dataclass(frozen=True, slots=True)
+class FormRow:
+    """A parameter as it is, and as it was when the liquid was chosen."""
+
+    parameter: Parameter
+    value: Value
+    preset: Value
+
+    @property
+    def changed(self) -> bool:
+        """Whether it is something else than it was."""
+        return self.value != self.preset
+
+
+@dataclass(frozen=True, slots=True)
+class FormSection:
+    """Parameters that stand under one heading."""
+
+    title: str
+    rows: tuple[FormRow, ...]
+
+
+def form(setting: Setting) -> tuple[FormSection, ...]:
+    """Return every parameter of a setting with its value."""
+    return tuple(
+        FormSection(
+            section.title,
+            tuple(FormRow(it, setting.value(it.name), setting.chosen_value(it.name)) for it in section.parameters),
+        )
+        for section in sections(setting.scene)
+    )

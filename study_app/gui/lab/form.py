@@ -1,0 +1,209 @@
+"""The left column: which liquid a side has, and every parameter of the side that is felt."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QScrollArea, QStackedLayout, QVBoxLayout, QWidget
+
+from study_app.gui.cards import Card, Rule
+from study_app.gui.controls import ActionButton, Choice
+from study_app.gui.hidden import Hidden
+from study_app.gui.lab.rows import ParameterRow, SwitchRow, row_for
+from study_app.gui.lab.switch import Badge
+from study_app.gui.lab.view import FormSection, LabView, form
+from study_app.gui.labels import label
+from study_app.gui.themed import dress
+from study_app.lab.workbench import Setting, other
+
+HIDDEN = "Hidden while blind"
+
+
+class SectionBlock(QWidget):
+    """A heading with its rows, and how many of them are changed."""
+
+    def __init__(self, title: str) -> None:
+        super().__init__()
+        self.rows: dict[str, ParameterRow] = {}
+        self.count = label("", "small", "text2")
+        head = QHBoxLayout()
+        head.addWidget(label(title, "strong"))
+        head.addStretch()
+        head.addWidget(self.count)
+        self._grid = QGridLayout()
+        self._grid.setContentsMargins(0, 0, 0, 0)
+        self._grid.setHorizontalSpacing(8)
+        self._grid.setVerticalSpacing(2)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 8, 0, 8)
+        column.setSpacing(4)
+        column.addLayout(head)
+        column.addLayout(self._grid)
+
+    def show_section(self, section: FormSection) -> list[ParameterRow]:
+        """Show the section's rows; return those that came new."""
+        names = [row.parameter.name for row in section.rows]
+        for name in self.rows.keys() - set(names):
+            gone = self.rows.pop(name)
+            self._grid.removeWidget(gone)
+            gone.hide()
+            gone.deleteLater()
+        came = []
+        for row in section.rows:
+            if row.parameter.name not in self.rows:
+                came.append(row_for(row.parameter))
+                self.rows[row.parameter.name] = came[-1]
+        self.rows = {name: self.rows[name] for name in names}
+        if came or len(names) != self._grid.count():
+            self._place()
+        for row in section.rows:
+            self.rows[row.parameter.name].show_row(row)
+        changed = sum(row.changed for row in section.rows)
+        self.count.setText(f"{changed} of {len(names)} changed" if changed else "")
+        return came
+
+    def _place(self) -> None:
+        """Stand switches two by two, everything else in lines of its own."""
+        line, column = 0, 0
+        for row in self.rows.values():
+            if isinstance(row, SwitchRow):
+                self._grid.addWidget(row, line, column)
+                line, column = (line + 1, 0) if column else (line, 1)
+                continue
+            line, column = (line + 1, 0) if column else (line, 0)
+            self._grid.addWidget(row, line, 0, 1, 2)
+            line += 1
+
+
+class FormPanel(Card):
+    """Liquid and parameters of the side that is felt; while blind, nothing of them in the same place."""
+
+    changed = Signal(str, object, bool)
+    liquid_chosen = Signal(str, object)
+    copied = Signal()
+
+    def __init__(self) -> None:
+        super().__init__(padding=16, gap=8)
+        self._setting: Setting | None = None
+        self._liquids: tuple[object, ...] = ()
+        self._side = "A"
+        self.blocks: dict[str, SectionBlock] = {}
+        self.rows: dict[str, ParameterRow] = {}
+        self.badge = Badge()
+        self.liquid = Choice()
+        self.liquid.setProperty("dense", "true")
+        self.liquid.activated.connect(self._choose)
+        self.copy = ActionButton("copy", "Copy to B", height=32)
+        self.copy.setProperty("dense", "true")
+        self.copy.clicked.connect(self.copied)
+        self._lay_out()
+
+    def _lay_out(self) -> None:
+        head = QHBoxLayout()
+        head.setSpacing(8)
+        head.addWidget(self.badge)
+        head.addWidget(self.liquid, 1)
+        head.addWidget(self.copy)
+        inside = QWidget()
+        self._column = QVBoxLayout(inside)
+        self._column.setContentsMargins(0, 0, 6, 0)
+        self._column.setSpacing(0)
+        self.area = QScrollArea()
+        self.area.setWidgetResizable(True)
+        self.area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.area.setWidget(inside)
+        whole = QWidget()
+        column = QVBoxLayout(whole)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(8)
+        column.addLayout(head)
+        column.addWidget(Rule())
+        column.addWidget(self.area, 1)
+        self.hidden = Hidden(HIDDEN, "Parameters tell settings apart.")
+        self._stack = QStackedLayout()
+        self._stack.addWidget(whole)
+        self._stack.addWidget(self.hidden)
+        self.column.addLayout(self._stack, 1)
+
+    def show_view(self, view: LabView) -> None:
+        """Show the felt side's liquid and parameters."""
+        bench = view.workbench
+        self._stack.setCurrentIndex(int(bench.blind))
+        if bench.blind:
+            return
+        self._show_liquids(view)
+        setting = bench.in_hand
+        if setting != self._setting or bench.felt != self._side:
+            refused = self._side != bench.felt
+            self._setting, self._side = setting, bench.felt
+            self._show_form(form(setting), forget=refused)
+        name, why = view.refused or ("", "")
+        if name in self.rows and why != self.rows[name].refused:
+            self.rows[name].show_refused(why)
+
+    def _show_liquids(self, view: LabView) -> None:
+        bench = view.workbench
+        if view.liquids != self._liquids:
+            self._liquids = view.liquids
+            self.liquid.clear()
+            for liquid in view.liquids:
+                self.liquid.addItem(liquid.title)
+        self.badge.show_side(bench.felt)
+        self.liquid.setAccessibleName(f"Liquid of {bench.felt}")
+        index = self.liquid.findText(bench.in_hand.name)
+        self.liquid.setCurrentIndex(index)
+        self.liquid.setPlaceholderText(bench.in_hand.name)
+        words = f"Copy to {other(bench.felt)}"
+        self.copy.show_action("copy", words)
+
+    def _show_form(self, sections: tuple[FormSection, ...], *, forget: bool) -> None:
+        titles = [section.title for section in sections]
+        new = titles != list(self.blocks)
+        for title in self.blocks.keys() - set(titles):
+            gone = self.blocks.pop(title)
+            self._column.removeWidget(gone)
+            gone.hide()
+            gone.deleteLater()
+        for title in titles:
+            if title not in self.blocks:
+                self.blocks[title] = SectionBlock(title)
+        self.blocks = {title: self.blocks[title] for title in titles}
+        if new:
+            self._stack_up()
+        if forget:
+            for row in self.rows.values():
+                row.show_refused("")
+        came = [row for section in sections for row in self.blocks[section.title].show_section(section)]
+        for row in came:
+            row.changed.connect(self.changed)
+        self.rows = {name: row for block in self.blocks.values() for name, row in block.rows.items()}
+        if new or came:
+            self._order()
+            for block in self.blocks.values():
+                dress(block, self.theme)
+
+    def _stack_up(self) -> None:
+        """Place the blocks below one another, a hairline between them."""
+        while self._column.count():
+            rule = self._column.takeAt(0).widget()
+            if isinstance(rule, Rule):
+                rule.hide()
+                rule.deleteLater()
+        for number, block in enumerate(self.blocks.values()):
+            if number:
+                rule = Rule()
+                rule.wear(self.theme)
+                self._column.addWidget(rule)
+            self._column.addWidget(block)
+        self._column.addStretch()
+
+    def _order(self) -> None:
+        """Let Tab go from top to bottom."""
+        before: QWidget = self.copy
+        for row in self.rows.values():
+            for part in row.parts():
+                QWidget.setTabOrder(before, part)
+                before = part
+
+    def _choose(self, index: int) -> None:
+        self.liquid_chosen.emit(self._side, self._liquids[index])

@@ -1,0 +1,211 @@
+"""The head of the lab: which side is felt, blinding, device and motion, undo, the force stop, and saving."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPaintEvent
+from PySide6.QtWidgets import (
+    QGridLayout,
+    QHBoxLayout,
+    QPushButton,
+    QSizePolicy,
+    QStyle,
+    QStyleOptionButton,
+    QStylePainter,
+    QWidget,
+)
+
+from study_app.gui.controls import ActionButton, Choice, Toggle
+from study_app.gui.icons import draw_icon
+from study_app.gui.lab.switch import SideSwitch
+from study_app.gui.lab.view import Choices, LabView
+from study_app.gui.labels import label
+from study_app.gui.theme import font
+from study_app.gui.themed import Themed
+
+BUTTON = 44
+FREE = "Free motion"
+
+
+class IconButton(Themed, QPushButton):
+    """A square button with an icon alone; its words are in its name and its tip."""
+
+    def __init__(self, icon: str, name: str, tip: str) -> None:
+        super().__init__()
+        self._icon = icon
+        self.setFixedSize(BUTTON, BUTTON)
+        self.setAccessibleName(name)
+        self.setToolTip(tip)
+        self.setCursor(Qt.CursorShape.PointingHandCursor)
+
+    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+        """Paint the button and its icon."""
+        super().paintEvent(event)
+        ink = self.theme.text if self.isEnabled() else self.theme.ctl
+        draw_icon(QPainter(self), self._icon, QRectF(self.rect()).adjusted(12, 12, -12, -12), ink, 2.0)
+
+
+class LabStop(Themed, QPushButton):
+    """Stop force, in the force stop's own colour; it acts when pressed, not when released, and is never disabled."""
+
+    WORDS = "Stop force"
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setProperty("role", "stop")
+        self.setAccessibleName(f"{self.WORDS}. Holding Esc does the same.")
+        self.setToolTip("Stop force (or hold Esc)")
+        self.setFixedHeight(BUTTON)
+        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+        self.setCursor(Qt.CursorShape.PointingHandCursor)
+        self._font = font("strong", scale=0.96)
+
+    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+        """Return the room for octagon and words."""
+        return QSize(round(QFontMetricsF(self._font).horizontalAdvance(self.WORDS)) + 62, BUTTON)
+
+    def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+        """Return the same: it is never cut."""
+        return self.sizeHint()
+
+    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+        """Paint the button, its octagon and its words."""
+        painter = QStylePainter(self)
+        option = QStyleOptionButton()
+        self.initStyleOption(option)
+        painter.drawControl(QStyle.ControlElement.CE_PushButtonBevel, option)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        ink = QColor(self.theme.on_stop)
+        draw_icon(painter, "stop", QRectF(17, self.height() / 2 - 10, 20, 20), ink, 2.0)
+        painter.setPen(ink)
+        painter.setFont(self._font)
+        painter.drawText(QRectF(46, 0, self.width() - 46, self.height()), Qt.AlignmentFlag.AlignVCenter, self.WORDS)
+
+
+class Picker(Choice):
+    """A list with an icon before the word it is at."""
+
+    def __init__(self, icon: str, name: str) -> None:
+        super().__init__()
+        self._icon = icon
+        self._choices: Choices = ()
+        self.setFont(font("label"))
+        self.setAccessibleName(name)
+        self.setFixedHeight(BUTTON)
+        self.setStyleSheet("QComboBox { padding-left: 40px; }")
+        self.setSizeAdjustPolicy(Choice.SizeAdjustPolicy.AdjustToContents)
+
+    def show_choices(self, choices: Choices, chosen: str) -> None:
+        """Offer ``choices`` (value, words), of which one is chosen."""
+        if choices != self._choices:
+            self._choices = choices
+            self.clear()
+            for value, words in choices:
+                self.addItem(words, value)
+        self.setCurrentIndex(self.findData(chosen))
+
+    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+        """Paint the list and its icon."""
+        super().paintEvent(event)
+        draw_icon(QPainter(self), self._icon, QRectF(13, self.height() / 2 - 10, 20, 20), self.theme.text2, 1.9)
+
+
+class LabHeader(Themed, QWidget):
+    """One row in a wide window, two in a narrow one."""
+
+    switched = Signal()
+    blind_asked = Signal(bool)
+    device_chosen = Signal(str)
+    path_chosen = Signal(object)
+    undo_asked = Signal()
+    redo_asked = Signal()
+    stop_asked = Signal()
+    save_asked = Signal()
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.title = label("Liquid lab", "title_dense")
+        self.sides = SideSwitch()
+        self.blind = Toggle("Blind A/B")
+        self.blind.setFont(font("label"))
+        self.blind.setToolTip("Hide which setting is which")
+        self.device = Picker("mouse", "Device")
+        self.path = Picker("route", "Motion")
+        self.undo = IconButton("undo", "Undo", "Undo (Ctrl+Z)")
+        self.redo = IconButton("redo", "Redo", "Redo (Ctrl+Shift+Z)")
+        self.stop = LabStop()
+        self.save = ActionButton("save", "Save preset …", role="primary", height=BUTTON)
+        self.save.setFixedHeight(BUTTON)
+        self._narrow: bool | None = None
+        self._lay_out()
+        self.arrange(narrow=False)
+        self._connect()
+
+    def _lay_out(self) -> None:
+        self._grid = QGridLayout(self)
+        self._grid.setContentsMargins(24, 12, 24, 13)
+        self._grid.setHorizontalSpacing(16)
+        self._grid.setVerticalSpacing(8)
+        self._left, self._middle, self._right = (_row() for _ in range(3))
+        parts: dict[QHBoxLayout, tuple[QWidget, ...]] = {
+            self._left: (self.title, self.sides),
+            self._middle: (self.blind, self.device, self.path),
+            self._right: (self.undo, self.redo, self.stop, self.save),
+        }
+        for row, inside in parts.items():
+            for part in inside:
+                row.addWidget(part)
+        self._left.setSpacing(16)
+        self._grid.setColumnStretch(2, 1)
+
+    def arrange(self, *, narrow: bool) -> None:
+        """Stand in one row or two; the force stop is at the right of the first in both."""
+        if narrow == self._narrow:
+            return
+        self._narrow = narrow
+        for row in (self._left, self._middle, self._right):
+            self._grid.removeItem(row)
+        if narrow:
+            self._grid.addLayout(self._left, 0, 0)
+            self._grid.addLayout(self._right, 0, 3)
+            self._grid.addLayout(self._middle, 1, 0, 1, 4, Qt.AlignmentFlag.AlignLeft)
+        else:
+            self._grid.addLayout(self._left, 0, 0)
+            self._grid.addLayout(self._middle, 0, 1)
+            self._grid.addLayout(self._right, 0, 3)
+
+    def _connect(self) -> None:
+        self.sides.switched.connect(self.switched)
+        self.blind.clicked.connect(self._ask_blind)
+        self.device.activated.connect(lambda index: self.device_chosen.emit(self.device.itemData(index)))
+        self.path.activated.connect(lambda index: self.path_chosen.emit(self.path.itemData(index) or None))
+        self.undo.clicked.connect(self.undo_asked)
+        self.redo.clicked.connect(self.redo_asked)
+        self.stop.pressed.connect(self.stop_asked)
+        self.save.clicked.connect(self.save_asked)
+
+    def show_view(self, view: LabView) -> None:
+        """Show what is chosen, and what can be done."""
+        self.sides.show_view(view)
+        self.blind.setChecked(view.workbench.blind)
+        self.device.show_choices(view.device.choices, view.device.chosen)
+        self.device.setToolTip(view.device.state)
+        self.path.show_choices((("", FREE), *view.paths), view.path or "")
+        self.undo.setEnabled(view.workbench.may_undo)
+        self.redo.setEnabled(view.workbench.may_redo)
+        self.save.setEnabled(not view.workbench.blind)
+
+    def _ask_blind(self, on: bool) -> None:
+        self.blind.setChecked(not on)  # the view says when it is
+        self.blind_asked.emit(on)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+        """Paint the hairline below."""
+        QPainter(self).fillRect(0, self.height() - 1, self.width(), 1, QColor(self.theme.border))
+
+
+def _row() -> QHBoxLayout:
+    row = QHBoxLayout()
+    row.setContentsMargins(0, 0, 0, 0)
+    row.setSpacing(10)
+    return row

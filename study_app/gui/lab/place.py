@@ -1,0 +1,240 @@
+"""The liquid lab: left what can be changed, in the middle what it does, right what it costs.
+
+It draws a `LabView` and says what is asked for; it knows no device and no servo.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from PySide6.QtCore import QEvent, QSize, Qt, Signal
+from PySide6.QtGui import QHideEvent, QKeySequence, QResizeEvent, QShortcut, QShowEvent
+from PySide6.QtWidgets import QFileDialog, QGridLayout, QScrollArea, QVBoxLayout, QWidget
+
+from study_app.gui.cards import SHADOW
+from study_app.gui.escape import EscapeHold
+from study_app.gui.lab.form import FormPanel
+from study_app.gui.lab.header import LabHeader
+from study_app.gui.lab.note import TankNote
+from study_app.gui.lab.plots import ForceCard, SpeedCard
+from study_app.gui.lab.readings import CostCard, ErrorCard, LimiterCard
+from study_app.gui.lab.switch import KEY
+from study_app.gui.lab.tank import LabTank
+from study_app.gui.lab.view import LabView
+from study_app.gui.theme import SPACE
+
+FORM_WIDTH, FORM_WIDTH_NARROW, SIDE_WIDTH = 404, 380, 300
+LEAST = QSize(928, 560)
+WIDE, ONE_ROW = 1240, 1400
+GAP = 14
+SUFFIX = ".toml"
+
+
+class LabPlace(QWidget):
+    """The lab as a place of the operator's window.
+
+    ``changed(name, value, held)`` is a parameter of the felt side in SI, ``held`` while its slider is dragged;
+    ``hand_moved`` [m, hand frame] and ``hand_pressed`` are the mouse's while it moves the ball; ``entered`` and
+    ``left`` come as the place is shown and hidden.
+    """
+
+    changed = Signal(str, object, bool)
+    liquid_chosen = Signal(str, object)
+    switched = Signal()
+    blind_asked = Signal(bool)
+    undo_asked = Signal()
+    redo_asked = Signal()
+    device_chosen = Signal(str)
+    path_chosen = Signal(object)
+    stop_asked = Signal()
+    fade_in_asked = Signal()
+    cancel_asked = Signal()
+    save_asked = Signal(Path)
+    copied = Signal()
+    hand_moved = Signal(float, float, float)
+    hand_pressed = Signal(int)
+    entered = Signal()
+    left = Signal()
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setProperty("role", "window")
+        self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
+        self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
+        self.setMinimumSize(LEAST)
+        self._view: LabView | None = None
+        self._wide: bool | None = None
+        self.dialog: QFileDialog | None = None
+        self.header = LabHeader()
+        self.form = FormPanel()
+        self.tank = LabTank()
+        self.note = TankNote(self.tank)
+        self.force, self.speed = ForceCard(), SpeedCard()
+        self.cost, self.error, self.limiters = CostCard(), ErrorCard(), LimiterCard()
+        self._escape = EscapeHold(self)
+        self._lay_out()
+        self._connect()
+        self._shortcuts()
+        self._arrange(wide=True)
+
+    def _lay_out(self) -> None:
+        self._side = QGridLayout()
+        self._side.setContentsMargins(0, 0, 0, 0)
+        self._side.setSpacing(GAP)
+        self._middle = QGridLayout()
+        self._middle.setContentsMargins(0, 0, 0, 0)
+        self._middle.setSpacing(GAP)
+        self._middle.setColumnStretch(0, 1)
+        self._middle.setColumnStretch(1, 1)
+        framed = QVBoxLayout()
+        framed.setContentsMargins(SHADOW, SHADOW - 1, SHADOW, SHADOW)  # as the cards beside and below it
+        framed.addWidget(self.tank)
+        self._middle.addLayout(framed, 0, 0, 1, 2)
+        self._middle.addWidget(self.force, 1, 0)
+        self._middle.addWidget(self.speed, 1, 1)
+        self._middle.addLayout(self._side, 2, 0, 1, 2)
+        self._area = _scrolled(self._middle)
+        self._side_area = _scrolled(QGridLayout())
+        self._body = QGridLayout()
+        self._body.setContentsMargins(SPACE[4] - 3, GAP, SPACE[4] - 3, GAP)
+        self._body.setSpacing(GAP)
+        self._body.addWidget(self.form, 0, 0)
+        self._body.addWidget(self._area, 0, 1)
+        self._body.addWidget(self._side_area, 0, 2)
+        self._body.setColumnStretch(1, 1)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        column.addWidget(self.header)
+        column.addLayout(self._body, 1)
+
+    def _arrange(self, *, wide: bool) -> None:
+        """Place the right column beside the middle, or under it where there is no room."""
+        if wide == self._wide:
+            return
+        self._wide = wide
+        cards = (self.cost, self.error, self.limiters)
+        column = self._side_area.widget().layout()
+        assert isinstance(column, QGridLayout)  # noqa: S101  # made so above
+        column.setSpacing(GAP)
+        column.setContentsMargins(0, 0, 0, 0)
+        for number, card in enumerate(cards):
+            if wide:
+                column.addWidget(card, number, 0)
+                column.setRowStretch(number, int(card is self.limiters))
+            else:
+                row, at = ((0, 0), (0, 1), (1, 0))[number]
+                self._side.addWidget(card, row, at, 1, 2 if card is self.limiters else 1)
+        self._side_area.setVisible(wide)
+        self._side_area.setFixedWidth(SIDE_WIDTH)
+        self._middle.setRowStretch(0, 61)
+        self._middle.setRowStretch(1, 39)
+
+    def _connect(self) -> None:
+        header, form = self.header, self.form
+        for mine, part in (
+            (self.switched, header.switched),
+            (self.blind_asked, header.blind_asked),
+            (self.device_chosen, header.device_chosen),
+            (self.path_chosen, header.path_chosen),
+            (self.undo_asked, header.undo_asked),
+            (self.redo_asked, header.redo_asked),
+            (self.stop_asked, header.stop_asked),
+            (self.stop_asked, self._escape.held),
+            (self.changed, form.changed),
+            (self.liquid_chosen, form.liquid_chosen),
+            (self.copied, form.copied),
+            (self.fade_in_asked, self.note.fade_in_asked),
+            (self.cancel_asked, self.note.cancel_asked),
+            (self.hand_moved, self.tank.moved),
+            (self.hand_pressed, self.tank.pressed),
+        ):
+            part.connect(mine)
+        header.save_asked.connect(self.ask_where_to_save)
+
+    def _shortcuts(self) -> None:
+        """Give X, undo and redo to the place alone: other places of the window have keys of their own."""
+        keys = QKeySequence.StandardKey
+        for sequence, signal in (
+            (QKeySequence(KEY), self.switched),
+            (QKeySequence(keys.Undo), self.undo_asked),
+            (QKeySequence(keys.Redo), self.redo_asked),
+        ):
+            shortcut = QShortcut(sequence, self)
+            shortcut.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
+            shortcut.activated.connect(signal)
+
+    def show_view(self, view: LabView) -> None:
+        """Show the lab as of now."""
+        self._view = view
+        for part in (
+            self.header, self.form, self.tank, self.note, self.force, self.speed, self.cost, self.error, self.limiters,
+        ):  # fmt: skip
+            part.show_view(view)
+
+    def ask_where_to_save(self) -> None:
+        """Ask for the preset's file; nothing waits meanwhile."""
+        if self.dialog is not None or self._view is None or self._view.workbench.blind:
+            return
+        dialog = QFileDialog(self, "Save preset", f"{preset_name(self._view.workbench.in_hand.title)}{SUFFIX}")
+        dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
+        dialog.setNameFilter("Presets (*.toml)")
+        dialog.setDefaultSuffix(SUFFIX[1:])
+        dialog.fileSelected.connect(lambda name: self.save_asked.emit(Path(name)))
+        dialog.finished.connect(self._forget_dialog)
+        self.dialog = dialog
+        dialog.open()
+
+    def _forget_dialog(self) -> None:
+        if self.dialog is not None:
+            self.dialog.deleteLater()
+        self.dialog = None
+
+    def event(self, event: QEvent) -> bool:
+        """Give the pointer back when the window is left."""
+        if event.type() == QEvent.Type.WindowDeactivate:
+            self.tank.let_go()
+        return super().event(event)
+
+    def showEvent(self, event: QShowEvent) -> None:  # noqa: N802 - Qt's name
+        """Watch for Esc held, whichever part has the focus, and say that the lab is entered."""
+        super().showEvent(event)
+        handle = self.window().windowHandle()
+        if handle is not None:
+            handle.removeEventFilter(self._escape)
+            handle.installEventFilter(self._escape)
+        self.setFocus()
+        self.entered.emit()
+
+    def hideEvent(self, event: QHideEvent) -> None:  # noqa: N802 - Qt's name
+        """Say that the lab is left."""
+        super().hideEvent(event)
+        handle = self.window().windowHandle()
+        if handle is not None:
+            handle.removeEventFilter(self._escape)
+        self.left.emit()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
+        """Give way in a small window: first the header, then the right column; the middle and the form scroll."""
+        super().resizeEvent(event)
+        self.header.arrange(narrow=self.width() < ONE_ROW)
+        self._arrange(wide=self.width() >= WIDE)
+        self.form.setFixedWidth(FORM_WIDTH if self.width() >= ONE_ROW else FORM_WIDTH_NARROW)
+
+
+def preset_name(title: str) -> str:
+    """Return a setting's title as a file is called: "Water, edited" becomes "water-edited"."""
+    words = "".join(sign if sign.isalnum() else " " for sign in title.lower()).split()
+    return "-".join(words) or "preset"
+
+
+def _scrolled(layout: QGridLayout) -> QScrollArea:
+    """Return ``layout`` in a frame that scrolls only where there is no room for it."""
+    inside = QWidget()
+    inside.setLayout(layout)
+    area = QScrollArea()
+    area.setWidgetResizable(True)
+    area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+    area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+    area.setWidget(inside)
+    return area

@@ -1,0 +1,112 @@
+"""A lab as it would look: a ball moved offline through two liquids, A felt and B on the same motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from study_app.gui.lab.view import CostRow, DeviceShown, ErrorRow, LabView, Now
+from study_app.haptics.layout import LIMITER_NAMES, SAMPLE, records
+from study_app.haptics.mirror import new_trail, take_again
+from study_app.haptics.pack import pack
+from study_app.haptics.safety import begin_scene, new_safety
+from study_app.haptics.scene import Scene
+from study_app.lab.shadow import Shadow
+from study_app.lab.workbench import Setting, Workbench
+from study_app.protocol.load import load_scene
+
+RATE_HZ = 1000
+ELEMENTS = 6000
+REST_S = 0.3
+# Corners of the hand's way [mm]: turns of more and of less than 45°, a drop that leaves no horizontal wake, an arc.
+CORNERS = (
+    (-42, 20, -20), (-42, 0, -20), (-40, 0, 10), (-6, -6, 20), (6, 0, 16), (13, 5, 5), (8, 10, -6),
+    (44, 14, -16), (17, -2, 14),
+)  # fmt: skip
+LEG_S = (0.3, 0.35, 0.45, 0.16, 0.16, 0.16, 0.42, 0.40)
+
+
+@dataclass(frozen=True)
+class Choice:
+    title: str
+
+
+@dataclass(frozen=True)
+class Limiter:
+    name: str
+    ticks: int
+    acting: bool
+
+
+def hand() -> Any:
+    """Return places (n, 3) [m] of a hand at 1 kHz: it slows at each corner that turns, and rests before the first."""
+    corners = np.array(CORNERS) / 1000
+    parts = [np.repeat(corners[:1], round(REST_S * RATE_HZ), axis=0)]
+    for start, end, leg_s in zip(corners[:-1], corners[1:], LEG_S, strict=True):
+        share = np.arange(1, round(leg_s * RATE_HZ) + 1) / round(leg_s * RATE_HZ)
+        ease = share if leg_s < 0.2 else 0.5 - 0.5 * np.cos(np.pi * share)
+        parts.append(start + ease[:, None] * (end - start))
+    return np.concatenate(parts)[:-150]
+
+
+def felt_samples(scene: Scene, hand_m: Any) -> Any:
+    """Return telemetry of a servo that presents ``scene`` along a hand's way."""
+    samples = records(SAMPLE, len(hand_m))
+    samples.tick = np.arange(len(hand_m))
+    samples.time_ns = 1_000_000_000 + samples.tick * (1_000_000_000 // RATE_HZ)
+    samples.scene, samples.fresh = 1, 1
+    samples.position_m = hand_m
+    safety = new_safety(8.0)
+    begin_scene(safety[0])
+    trail, places = new_trail(ELEMENTS)
+    take_again(pack(scene, capacity=ELEMENTS), safety[0], samples, trail[0], places)
+    return samples
+
+
+def workbench(**changes: float) -> Workbench:
+    """Return water, edited by ``changes`` (of the wake), beside light oil."""
+    water, oil = (load_scene("rek2024", liquid) for liquid in ("water", "light_oil"))
+    bench = Workbench(Setting("Water", water, water), Setting("Light oil", oil, oil))
+    for name, value in (changes or {"scaling": 2600.0, "exponent": 0.6, "breaking_angle_deg": 40.0}).items():
+        bench = bench.change(f"wake.{name}", value)
+    return bench
+
+
+def lab_view(bench: Workbench | None = None, *, cut: int | None = None, **fields: Any) -> LabView:
+    """Return the lab at the end of the hand's way, or after ``cut`` ticks of it."""
+    bench = bench or workbench()
+    rest = bench.a.scene.model_copy(update={"liquids": ()})
+    shadow = Shadow(rest, ELEMENTS, 8.0)
+    samples = felt_samples(bench.in_hand.scene, hand()[:cut])
+    shadow.expect(1, bench.felt, bench.a.scene, bench.b.scene)
+    shadow.take(samples)
+    last = samples[-1]
+    acted = [int(np.count_nonzero(samples.limiters & 1 << bit)) for bit in range(len(LIMITER_NAMES))]
+    shown: dict[str, Any] = {
+        "workbench": bench,
+        "liquids": tuple(Choice(title) for title in ("Water", "Honey", "Light oil", "Syrup")),
+        "device": DeviceShown((("mouse", "Mouse"), ("falcon", "Novint Falcon"), ("simulated", "Simulated")), "mouse"),
+        "paths": (("circle", "Circle"), ("zigzag", "Zigzag"), ("reverse", "There and back")),
+        "trace": shadow.trace(),
+        "tail_a": shadow.tail("A"),
+        "tail_b": shadow.tail("B"),
+        "now": Now(tuple(last.position_m), tuple(last.device_force_n), tuple(last.wake_mps)),
+        "limiters": tuple(
+            Limiter(name, ticks, acting=bool(last.limiters & 1 << bit))
+            for bit, (name, ticks) in enumerate(zip(LIMITER_NAMES, acted, strict=True))
+        ),
+        "cost": (
+            CostRow("Wake", 84.0), CostRow("Safety", 31.0), CostRow("Drag", 24.0), CostRow("Velocity", 18.0),
+            CostRow("Tests", 4.0), CostRow("Buoyancy", None, "out, 0.00 N"),
+            CostRow("Added mass", None, "not asked for"), CostRow("History", None, "not asked for"),
+            CostRow("Current", None, "not asked for"),
+        ),
+        "tick_ns": 161.0,
+        "errors": (
+            ErrorRow("Wake, of Σ|e|/S", "4e−15"), ErrorRow("Force, largest", "< 0.001 N"),
+            ErrorRow("Lag of the velocity filter", "9 ms"),
+        ),
+    }  # fmt: skip
+    return LabView(**(shown | fields))
