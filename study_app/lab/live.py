@@ -23,7 +23,7 @@ from study_app.lab.limiters import Limiter, LimiterCounts
 from study_app.lab.programmes import led_to, programme
 from study_app.lab.shadow import Shadow, Trace
 from study_app.lab.tail import Tail
-from study_app.lab.workbench import Side, Workbench
+from study_app.lab.workbench import Side, Workbench, other
 from study_app.protocol.streams import stream
 
 if TYPE_CHECKING:
@@ -83,16 +83,26 @@ class Live:
         self.servo.prepare()
         self.shadow.prepare()
 
-    def feel(self, bench: Workbench) -> None:
+    def feel(self, bench: Workbench, *, anew: bool = False) -> None:
         """Present the felt setting of ``bench`` from the next tick on, and follow the other beside it.
 
         A scene begins with a fade of 50 ms; one that comes sooner after another waits for its end, the newest counts.
+        What is felt already goes on as it is, unless it is to begin ``anew``: for a hand that may not know.
 
         Raises
         ------
         StudyError
             The servo cannot present it, or has stopped itself.
         """
+        felt = self._felt
+        goes_on = self._due is None and felt is not None and felt.felt == bench.felt and not anew
+        if goes_on and felt is not None and felt.in_hand.scene == bench.in_hand.scene:
+            self.servo.check()
+            side = other(bench.felt)
+            self._felt = bench
+            for shadow in (self.shadow, *([self._ghost.shadow] if self._ghost is not None else ())):
+                shadow.put_beside(side, self._presentable(bench.setting(side).scene))
+            return
         self._due = bench
         self._load_what_is_due()
 
@@ -150,6 +160,11 @@ class Live:
         point_to: Callable[[float, float, float], None] | None = getattr(self.device, "point_to", None)
         if point_to is not None and self.path is None:
             point_to(x_m, y_m, z_m)
+
+    def press(self, buttons: int) -> None:
+        """Hold down exactly these buttons of a device that has a pointer: button 1 is bit 0."""
+        if self._hand is not None and hasattr(self.device, "point_to"):
+            self._hand.press(buttons)
 
     def stop_force(self) -> None:
         """Send zero force from the next tick on, until `fade_in`."""

@@ -99,6 +99,13 @@ class Shadow:
         """Say what the servo will present as scene ``serial``, and what beside it."""
         self._expected[serial] = _Presented(felt, {"A": a, "B": b})
 
+    def put_beside(self, side: Side, scene: Scene) -> None:
+        """Exchange the scene of the side that is not felt; nothing happens where it is that already."""
+        for it in self._expected.values():
+            it.scenes[side] = scene
+        if self._sides[side].scene != scene:
+            self._sides[side].begin(scene)
+
     def take(self, samples: Any, *, lost: bool = False) -> None:
         """Follow the servo's next samples (recarray of ``SAMPLE``); ``lost`` where some before them were dropped."""
         if lost:

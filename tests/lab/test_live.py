@@ -44,6 +44,25 @@ def test_a_scene_is_presented_by_the_next_tick_and_felt_whole_within_fifty() -> 
     live.close()
 
 
+def test_exchanging_what_is_not_felt_leaves_the_servo_alone() -> None:
+    live = live_with(scripted())
+    sides = bench()
+    live.feel(sides)
+    live.play("circle")
+    run(live, 1500)
+    live.feel(sides := sides.choose("B", "honey", SCENES["honey"]))
+    run(live, 300)
+    assert set(live.servo.telemetry.ring.scene[:1800]) == {1}
+    assert live.tail("B") is None
+    trace = live.trace()
+    assert trace is not None
+    assert np.linalg.norm(trace.force_b_n[-1]) > 3 * np.linalg.norm(trace.force_a_n[-1])
+    live.feel(sides, anew=True)
+    run(live, 1)
+    assert live.servo.telemetry.ring.scene[1800] == 2
+    live.close()
+
+
 def test_every_value_of_a_drag_is_presented_within_fifty_ticks_or_a_newer_one_is() -> None:
     live = live_with(scripted())
     sides = bench()
