@@ -22,7 +22,7 @@ pytest.importorskip("PySide6.QtWidgets", reason="Qt's system libraries are missi
 from PySide6.QtCore import QPoint
 from PySide6.QtWidgets import QApplication, QWidget
 
-from study_app.gui.home import HomeWindow
+from study_app.app.visit import Visit
 from study_app.gui.home.cards import StudyCard
 from study_app.gui.pages.questionnaire import QuestionnaireWidget
 from study_app.gui.participant import ParticipantWindow
@@ -147,7 +147,7 @@ def test_a_session_by_keys_and_clicks_from_the_home_window_into_the_csv(display,
 def begin_session(program: Program, qtbot) -> None:
     """Click "New session" of the first study and fill in the dialog by keys."""
     home = program.window("^Liquid Study$")
-    plan = HomeWindow(Path("results"))
+    plan = Visit(Path("results")).window
     qtbot.addWidget(plan)
     plan.resize(*program.size(home))
     plan.show()

@@ -11,7 +11,8 @@ from study_app.gui.application import application_here
 from study_app.gui.choices import NewSession
 from study_app.gui.collector import collecting_here
 from study_app.gui.ending import ended_from_outside
-from study_app.gui.home import HomeWindow
+from study_app.gui.home import HomePlace
+from study_app.gui.main_window import MainWindow
 
 
 def home(results: Path | None = None) -> int:
@@ -23,7 +24,7 @@ def home(results: Path | None = None) -> int:
         A window cannot be opened here.
     """
     application = application_here()
-    visit = Visit(HomeWindow(results if results is not None else Path("results")))
+    visit = Visit(results if results is not None else Path("results"))
     with collecting_here(), ended_from_outside(visit.end_by_signal):
         visit.window.show()
         visit.loop.exec()
@@ -34,14 +35,19 @@ def home(results: Path | None = None) -> int:
 class Visit(QObject):
     """The home window's stay: one session at a time, and home again after it."""
 
-    def __init__(self, window: HomeWindow) -> None:
+    def __init__(self, results: Path) -> None:
         super().__init__()
-        self.window = window
+        self.results = results
+        self.window = MainWindow({"home": self._home})
         self.loop = QEventLoop()
         self.code = 0
         self.live: LiveSession | None = None
-        window.session_asked.connect(self._start)
-        window.closed.connect(self._leave)
+        self.window.closed.connect(self._leave)
+
+    def _home(self) -> HomePlace:
+        made = HomePlace(self.results)
+        made.session_asked.connect(self._start)
+        return made
 
     def end_by_signal(self, number: int) -> None:
         """End because the program is being ended from outside."""
@@ -54,15 +60,14 @@ class Visit(QObject):
     def _start(self, chosen: NewSession) -> None:
         self.live = LiveSession(chosen, self.window.theme)
         self.live.over.connect(self._return)
-        self.window.hide()
+        self.window.rest()
         self.live.open()
 
     def _return(self) -> None:
         live, self.live = self.live, None
         if self.code or live is None:
             return
-        self.window.show()
-        self.window.show_sessions()
+        self.window.come_back()
         if live.error is not None:
             self.window.tell("The session did not go to its end", f"{live.error}.")
         elif live.code == BUG:

@@ -75,7 +75,7 @@ def main() -> None:
     runs = parser.parse_args().runs
     print(f"{'window':<34}{'first':>8}{'median':>9}{'slowest':>9}   seconds from the start of the program")
     for kind, windows in (
-        ("home", ("HomeWindow",)),
+        ("home", ("MainWindow",)),
         ("run", ("OpeningWindow", "OperatorWindow", "ParticipantWindow")),
     ):
         times = [once(kind, windows) for _ in range(runs + 1)]

@@ -20,7 +20,7 @@ from study_app import app
 from study_app.app import live_session
 from study_app.errors import DeviceNotFound, DisplayError, SessionError, StoreError, StudyError
 from study_app.gui import beginning, ending
-from study_app.gui.home import HomeWindow
+from study_app.gui.main_window import MainWindow
 from study_app.gui.opening import OpeningWindow
 from study_app.gui.operator import OperatorWindow
 from study_app.gui.participant import ParticipantWindow
@@ -68,6 +68,12 @@ def window(kind):
     """Return the window of that kind that is shown, or None."""
     shown = [widget for widget in QApplication.topLevelWidgets() if isinstance(widget, kind) and widget.isVisible()]
     return shown[0] if shown else None
+
+
+def place_at_home():
+    """Return the main window's home, or None while the window is away."""
+    shown = window(MainWindow)
+    return None if shown is None else shown.place("home")
 
 
 class Person(QObject):
@@ -234,7 +240,7 @@ def test_a_mistake_in_the_program_is_an_exit_code_and_a_trace(short_demo, result
 
 
 def test_home_closes_with_exit_code_0(tmp_path):
-    QTimer.singleShot(0, lambda: QTimer.singleShot(0, lambda: window(HomeWindow).close()))
+    QTimer.singleShot(0, lambda: QTimer.singleShot(0, lambda: window(MainWindow).close()))
     assert app.home(tmp_path / "results") == 0
     assert not (tmp_path / "results").exists()
 
@@ -244,7 +250,7 @@ def test_from_home_into_a_session_and_home_again(tmp_path, monkeypatch):
     steps = []
 
     def step():
-        home, operator = window(HomeWindow), window(OperatorWindow)
+        home, operator = place_at_home(), window(OperatorWindow)
         if not steps and home is not None:
             steps.append("asked")
             card = next(card for card in home.grid.cards if card.facts.source == "demo")
@@ -257,7 +263,7 @@ def test_from_home_into_a_session_and_home_again(tmp_path, monkeypatch):
             operator.close()
         elif steps == ["asked", "ended"] and home is not None and home.sessions.lines:
             steps.append(home.sessions.lines[0].status.word)
-            home.close()
+            home.window().close()
 
     timer = QTimer()
     timer.timeout.connect(step)
@@ -351,7 +357,7 @@ def test_home_offers_first_to_go_on_with_a_session_that_stopped(stopped, results
     steps = []
 
     def step():
-        home, operator = window(HomeWindow), window(OperatorWindow)
+        home, operator = place_at_home(), window(OperatorWindow)
         if not steps and home is not None and home.banner.isVisible():
             steps.append(home.banner.heading.text())
             steps.append(home.banner.line.text())
@@ -362,7 +368,7 @@ def test_home_offers_first_to_go_on_with_a_session_that_stopped(stopped, results
             operator.close()
         elif len(steps) == 3 and home is not None and home.sessions.lines:
             steps.append(home.banner.isVisible())
-            home.close()
+            home.window().close()
 
     timer = QTimer()
     timer.timeout.connect(step)

@@ -1,5 +1,5 @@
-"""The first window: which studies there are, which sessions were held, and the way into the next."""
+"""Home: which studies there are, which sessions were held, and the way into the next."""
 
-from study_app.gui.home.window import HomeWindow
+from study_app.gui.home.place import HomePlace
 
-__all__ = ["HomeWindow"]
+__all__ = ["HomePlace"]

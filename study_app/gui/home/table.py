@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from datetime import datetime
 
-from PySide6.QtCore import QRectF, Qt
+from PySide6.QtCore import QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QGridLayout, QScrollArea, QVBoxLayout, QWidget
 
 from study_app.gui.cards import Card, Chip, Tone
+from study_app.gui.controls import ActionButton
 from study_app.gui.home.facts import SessionFacts, started_words
 from study_app.gui.labels import Elided, figures, label
 from study_app.gui.theme import RADIUS_CONTROL, font
@@ -107,6 +108,8 @@ class SessionLine(Themed, QWidget):
 class SessionsCard(Card):
     """The table, newest first; a row that needs care stands above all."""
 
+    all_asked = Signal()
+
     def __init__(self) -> None:
         self.where = Elided("small", "text2")
         super().__init__(gap=8, padding=20)
@@ -114,9 +117,11 @@ class SessionsCard(Card):
         title = label("Sessions", "card")
         head = QWidget()
         grid = _columns(head)
-        grid.addWidget(title, 0, 0, 1, 2)
-        self.where.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-        grid.addWidget(self.where, 0, 2, 1, 4)
+        self.all = ActionButton("chevron", "All results", role="plain", height=34)
+        self.all.clicked.connect(self.all_asked)
+        grid.addWidget(title, 0, 0)
+        grid.addWidget(self.where, 0, 1, 1, 3)
+        grid.addWidget(self.all, 0, 4, 1, 2, Qt.AlignmentFlag.AlignRight)
         for column, (name, _) in enumerate(COLUMNS):
             word = Elided("small", "text2")
             word.show_text(name)

@@ -1,4 +1,4 @@
-"""The home window: cards, sessions, and the ways into a session or a rehearsal."""
+"""Home: cards, sessions, and the ways into a session or a rehearsal."""
 
 from __future__ import annotations
 
@@ -6,10 +6,11 @@ import pytest
 from PySide6.QtCore import QPoint, QProcess, Qt
 from PySide6.QtWidgets import QLabel, QPushButton
 
-from study_app.gui.home import HomeWindow
+from study_app.gui.home import HomePlace
 from study_app.gui.home.cards import BrokenCard, StudyCard
 from study_app.gui.home.facts import study_facts
 from study_app.gui.home.rehearsal import RehearsalDialog, rehearsal_folder
+from study_app.gui.main_window import LEAST, MainWindow
 from study_app.gui.theme import DARK
 from study_app.protocol.load import load, source_bytes
 from study_app.store.exclusions import exclude
@@ -41,13 +42,23 @@ def results(tmp_path):
     return folder
 
 
+def open_home(qtbot, results, size=None):
+    window = MainWindow({"home": lambda: HomePlace(results)})
+    qtbot.addWidget(window)
+    if size is not None:
+        window.resize(size)
+    window.show()
+    home = window.place("home")
+    home.main = window  # or it would be collected here
+    qtbot.waitUntil(lambda: bool(home.sessions.lines) or not home.sessions.none.isHidden())
+    return home
+
+
 @pytest.fixture
 def home(qtbot, results):
-    window = HomeWindow(results)
-    qtbot.addWidget(window)
-    window.show()
-    qtbot.waitUntil(lambda: bool(window.sessions.lines))
-    return window
+    home = open_home(qtbot, results)
+    qtbot.waitUntil(lambda: bool(home.sessions.lines))
+    return home
 
 
 def study_cards(home):
@@ -70,12 +81,9 @@ def test_sessions_are_listed_with_status_and_answers(home):
 
 def test_a_simulated_session_says_so_in_full_in_the_smallest_window(qtbot, tmp_path):
     hold(tmp_path / "demo", "P001", simulated=True)
-    window = HomeWindow(tmp_path)
-    qtbot.addWidget(window)
-    window.resize(window.minimumSize())
-    window.show()
-    qtbot.waitUntil(lambda: bool(window.sessions.lines))
-    line = window.sessions.lines[0]
+    home = open_home(qtbot, tmp_path, LEAST)
+    qtbot.waitUntil(lambda: bool(home.sessions.lines))
+    line = home.sessions.lines[0]
 
     def whole():
         words = [one for one in line.findChildren(QLabel) if one.text() in ("demo", "simulated")]
@@ -93,20 +101,18 @@ def test_an_excluded_session_is_not_called_valid(qtbot, tmp_path):
     hold(tmp_path / "demo", "P001")
     hold(tmp_path / "demo", "P002")
     exclude(tmp_path / "demo", "P001", 1, by="AB", reason="fell asleep")
-    window = HomeWindow(tmp_path)
-    qtbot.addWidget(window)
-    window.show_sessions()
-    said = {line.accessibleName().split(",")[0]: line.validity for line in window.sessions.lines}
+    home = open_home(qtbot, tmp_path)
+    qtbot.waitUntil(lambda: bool(home.sessions.lines))
+    said = {line.accessibleName().split(",")[0]: line.validity for line in home.sessions.lines}
     assert (said["P001"].word, said["P002"].word) == ("Excluded", "Open")
     assert "fell asleep" in said["P001"].toolTip()
 
 
 def test_an_empty_results_folder_says_so(qtbot, tmp_path):
-    window = HomeWindow(tmp_path / "none")
-    qtbot.addWidget(window)
-    window.show_sessions()
-    assert not window.sessions.none.isHidden()
-    assert window.sessions.lines == []
+    home = open_home(qtbot, tmp_path / "none")
+    home.show_sessions()
+    assert not home.sessions.none.isHidden()
+    assert home.sessions.lines == []
     assert not (tmp_path / "none").exists()
 
 
@@ -124,7 +130,7 @@ def test_a_protocol_opened_from_elsewhere_gets_a_card(home, tmp_path, monkeypatc
     own.write_bytes(source_bytes("demo").replace(b'name = "demo"', b'name = "own"'))
     chosen = [(str(own), ""), (str(tmp_path / "broken.toml"), "")]
     (tmp_path / "broken.toml").write_text("format = 1\n")
-    monkeypatch.setattr("study_app.gui.home.window.QFileDialog.getOpenFileName", lambda *_arguments: chosen.pop(0))
+    monkeypatch.setattr("study_app.gui.home.place.QFileDialog.getOpenFileName", lambda *_arguments: chosen.pop(0))
     home.open_protocol.click()
     assert study_cards(home)[0].facts.protocol.study.name == "own"
     home.open_protocol.click()
@@ -132,18 +138,20 @@ def test_a_protocol_opened_from_elsewhere_gets_a_card(home, tmp_path, monkeypatc
 
 
 def test_the_theme_changes(home, qtbot):
-    qtbot.mouseClick(home.rail.switch, Qt.MouseButton.LeftButton)
+    rail = home.main.rail
+    qtbot.mouseClick(rail.switch, Qt.MouseButton.LeftButton)
     assert home.sessions.lines[0].theme is DARK
-    assert home.rail.switch.text() == "Light theme"
+    assert rail.switch.text() == "Light theme"
 
 
 def test_a_small_window_cuts_nothing_off_sideways(home, qtbot):
-    home.resize(home.minimumSize())
+    window = home.main
+    window.resize(LEAST)
     inside, seen = home._area.widget(), home._area.viewport()
 
     def fits():
         """One round of events need not lay out what the new size asks for: other events may come first."""
-        assert home.size() == home.minimumSize()
+        assert window.size() == LEAST
         assert inside.width() <= seen.width()
         assert inside.minimumSizeHint().width() <= seen.width()
 
@@ -152,9 +160,8 @@ def test_a_small_window_cuts_nothing_off_sideways(home, qtbot):
 
 def test_no_button_is_dead(home):
     home.show_studies()
-    for button in home.findChildren(QPushButton):
-        if button is not home.rail.home:  # the place one is at
-            assert button.receivers("2clicked(bool)") or button.receivers("2clicked()"), button.text()
+    for button in home.main.findChildren(QPushButton):
+        assert button.receivers("2clicked(bool)") or button.receivers("2clicked()"), button.text()
 
 
 def test_rehearsals_get_a_folder_of_their_own(tmp_path):

@@ -1,0 +1,196 @@
+"""Home: choose a protocol and begin, go on where one stopped, or see what was held."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from pathlib import Path
+
+from PySide6.QtCore import Qt, QTimer, Signal
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QBoxLayout, QFileDialog, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
+
+from study_app.errors import StudyError
+from study_app.gui.cards import SHADOW
+from study_app.gui.choices import resumed
+from study_app.gui.controls import ActionButton
+from study_app.gui.home.banner import ResumeBanner
+from study_app.gui.home.beside import DeviceCard, LabCard
+from study_app.gui.home.cards import BrokenCard, CardGrid, StudyCard
+from study_app.gui.home.facts import (
+    BrokenFacts,
+    Interrupted,
+    StudyFacts,
+    held,
+    interrupted,
+    sessions,
+    sources,
+    study_facts,
+)
+from study_app.gui.home.rehearsal import RehearsalDialog
+from study_app.gui.home.table import SessionsCard
+from study_app.gui.labels import label
+from study_app.gui.new_session import NewSessionDialog
+from study_app.gui.place import Place
+from study_app.gui.themed import dress
+
+STACKED_BELOW = 1080
+BESIDE = 326
+
+
+class HomePlace(Place):
+    """Protocols, sessions, device, lab; ``session_asked`` carries what an operator chose.
+
+    Parameters
+    ----------
+    results
+        Folder that holds the studies' folders; it need not exist.
+    """
+
+    session_asked = Signal(object)
+
+    def __init__(self, results: Path) -> None:
+        super().__init__()
+        self.results = results
+        self.dialog: NewSessionDialog | RehearsalDialog | None = None
+        self._sources = list(sources())
+        self._facts: list[StudyFacts | BrokenFacts] = []
+        self.banner = ResumeBanner()
+        self.grid = CardGrid()
+        self.sessions = SessionsCard()
+        self.device = DeviceCard(_screens(self))
+        self.lab = LabCard()
+        self.open_protocol = ActionButton("file", "Open protocol …")
+        self._lay_out()
+        self.open_protocol.clicked.connect(self._open_protocol)
+        self.banner.resume_asked.connect(self._resume)
+        self.sessions.all_asked.connect(lambda: self.go_asked.emit("results"))
+        self.device.devices_asked.connect(lambda: self.go_asked.emit("devices"))
+        self.device.display_asked.connect(lambda: self.go_asked.emit("machine"))
+        self.lab.lab_asked.connect(lambda: self.go_asked.emit("lab"))
+        self.show_studies()
+
+    def enter(self) -> None:
+        """Read the results folder again, once the window stands."""
+        QTimer.singleShot(0, self, self.show_sessions)
+
+    def _lay_out(self) -> None:
+        titles = QVBoxLayout()
+        titles.setSpacing(4)
+        titles.addWidget(label("Studies", "title"))
+        titles.addWidget(label("Choose a protocol to start a session, or go on where one stopped.", "body", "text2"))
+        head = QHBoxLayout()
+        head.setContentsMargins(SHADOW, 0, SHADOW, 0)
+        head.addLayout(titles)
+        head.addStretch()
+        head.addWidget(self.open_protocol)
+        self._below = QBoxLayout(QBoxLayout.Direction.LeftToRight)
+        self._below.setSpacing(18)
+        self._below.addWidget(self.sessions, 1)
+        self._beside = QBoxLayout(QBoxLayout.Direction.TopToBottom)
+        self._beside.setSpacing(18)
+        self._beside.addWidget(self.device)
+        self._beside.addWidget(self.lab)
+        self._beside.addStretch()
+        self._below.addLayout(self._beside)
+        inside = QWidget()
+        page = QVBoxLayout(inside)
+        page.setContentsMargins(30, 30, 30, 22)
+        page.setSpacing(20)
+        page.addLayout(head)
+        page.addWidget(self.banner)
+        page.addWidget(self.grid)
+        page.addLayout(self._below, 1)
+        self._area = QScrollArea()
+        self._area.setWidgetResizable(True)
+        self._area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self._area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self._area.setWidget(inside)
+        row = QVBoxLayout(self)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.addWidget(self._area)
+
+    def show_studies(self) -> None:
+        """Show a card for each protocol at hand."""
+        self._facts = [study_facts(source) for source in self._sources]
+        cards: list[QWidget] = []
+        for facts in self._facts:
+            if isinstance(facts, BrokenFacts):
+                cards.append(BrokenCard(facts))
+                continue
+            card = StudyCard(facts, first=not any(isinstance(other, StudyCard) for other in cards))
+            card.new_session.connect(self.ask_for_session)
+            card.rehearsal.connect(self.ask_for_rehearsal)
+            cards.append(card)
+        for shown in cards:
+            dress(shown, self.theme)
+        self.grid.show_cards(cards)
+        self._arrange()
+
+    def show_sessions(self) -> None:
+        """Read the results folder again."""
+        studies = [facts for facts in self._facts if isinstance(facts, StudyFacts)]
+        answers = {facts.protocol.study.name: facts.protocol.responses_per_participant() for facts in studies}
+        found = sessions(self.results, answers)
+        now = datetime.now().astimezone()
+        self.sessions.show_sessions(found, str(self.results), now)
+        self.banner.show_interrupted(interrupted(found, studies, now))
+        for card in self.grid.cards:
+            if isinstance(card, StudyCard):
+                card.held.setText(held(found, card.facts.protocol.study.name))
+
+    def ask_for_session(self, facts: StudyFacts) -> None:
+        """Open the questions before a session; ``session_asked`` carries the answers."""
+        dialog = NewSessionDialog(facts, self.results, theme=self.theme, parent=self)
+        self._open(dialog)
+        dialog.accepted.connect(lambda: self.session_asked.emit(dialog.chosen()))
+
+    def _resume(self, session: Interrupted) -> None:
+        """Ask to go on with a session as it was begun, on the screens there are now."""
+        try:
+            alone = len(self.screen().virtualSiblings()) == 1
+            self.session_asked.emit(resumed(session.folder, protocol=session.source, windowed=alone))
+        except StudyError as error:
+            self.told.emit("The session cannot go on", f"{error}.")
+
+    def ask_for_rehearsal(self, facts: StudyFacts) -> None:
+        """Open the questions before a rehearsal; the table shows what it left."""
+        dialog = RehearsalDialog(facts, self.results, theme=self.theme, parent=self)
+        self._open(dialog)
+        dialog.finished.connect(self.show_sessions)
+
+    def _open(self, dialog: NewSessionDialog | RehearsalDialog) -> None:
+        self.dialog = dialog
+        dialog.finished.connect(dialog.deleteLater)
+        dialog.open()
+
+    def _open_protocol(self) -> None:
+        chosen, _ = QFileDialog.getOpenFileName(self, "Open protocol", "", "Protocols (*.toml)")
+        if chosen and chosen not in self._sources:
+            self._sources.insert(0, chosen)
+            self.show_studies()
+            self.show_sessions()
+
+    def _arrange(self) -> None:
+        stacked = self.width() < STACKED_BELOW
+        down, right = QBoxLayout.Direction.TopToBottom, QBoxLayout.Direction.LeftToRight
+        self._below.setDirection(down if stacked else right)
+        self._beside.setDirection(right if stacked else down)
+        for card in (self.device, self.lab):
+            card.setMinimumWidth(0 if stacked else BESIDE)
+            card.setMaximumWidth(16_777_215 if stacked else BESIDE)
+        self.grid.arrange(self.width() - 60)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
+        """Make room: cards go below each other."""
+        super().resizeEvent(event)
+        self._arrange()
+
+
+def _screens(window: QWidget) -> tuple[str, ...]:
+    """Return a line for each screen: size, rate and scaling."""
+    screens = window.screen().virtualSiblings()
+    return tuple(
+        f"Screen {number}: {screen.size().width()} × {screen.size().height()}, {screen.refreshRate():.0f} Hz, "
+        f"{screen.devicePixelRatio():.0%}".replace("%", " %")
+        for number, screen in enumerate(screens, start=1)
+    )

@@ -1,0 +1,123 @@
+"""The main window: the rail, and one place at a time beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from PySide6.QtCore import QSize, Qt, Signal
+from PySide6.QtGui import QCloseEvent, QResizeEvent
+from PySide6.QtWidgets import QHBoxLayout, QMainWindow, QStackedWidget, QWidget
+
+from study_app.gui.dialogs import Notice
+from study_app.gui.place import Place
+from study_app.gui.rail import Rail
+from study_app.gui.theme import DARK, LIGHT, Theme
+from study_app.gui.themed import dress, wear
+
+FULL = QSize(1440, 900)
+LEAST = QSize(1024, 640)
+NARROW_BELOW = 1300
+
+
+class MainWindow(QMainWindow):
+    """The rail and the places; a place is made when one first goes there.
+
+    Parameters
+    ----------
+    makers
+        What makes each place, by its name; the first is where one begins.
+    """
+
+    closed = Signal()
+
+    def __init__(self, makers: Mapping[str, Callable[[], Place]], *, theme: Theme = LIGHT) -> None:
+        super().__init__()
+        self.setWindowTitle("Liquid Study")
+        self.setMinimumSize(LEAST)
+        self.theme = theme
+        self.notice: Notice | None = None
+        self._makers = makers
+        self._places: dict[str, Place] = {}
+        self._here = next(iter(makers))
+        self.rail = Rail(makers)
+        self.stack = QStackedWidget()
+        whole = QWidget()
+        whole.setProperty("role", "window")
+        row = QHBoxLayout(whole)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(0)
+        row.addWidget(self.rail)
+        row.addWidget(self.stack, 1)
+        self.setCentralWidget(whole)
+        whole.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
+        self.rail.theme_asked.connect(self._change_theme)
+        self.rail.go_asked.connect(self.go)
+        wear(self, theme)
+        self.resize(FULL)
+        self.go(self._here)
+        whole.setFocus()
+
+    @property
+    def here(self) -> str:
+        """The name of the place one is at."""
+        return self._here
+
+    def place(self, name: str) -> Place:
+        """Return a place, made on first use."""
+        if name not in self._places:
+            made = self._makers[name]()
+            made.told.connect(self.tell)
+            made.go_asked.connect(self.go)
+            self._places[name] = made
+            self.stack.addWidget(made)
+            dress(made, self.theme)
+        return self._places[name]
+
+    def go(self, name: str) -> None:
+        """Leave the place one is at and show another."""
+        asked = self.place(name)
+        if self.stack.currentWidget() is asked and name == self._here and asked.isVisible():
+            return
+        if name != self._here:
+            self.place(self._here).leave()
+        self._here = name
+        self.rail.mark(name)
+        self.stack.setCurrentWidget(asked)
+        self._arrange()
+        asked.enter()
+
+    def rest(self) -> None:
+        """Leave the place one is at, and the screen: a session takes over."""
+        self.place(self._here).leave()
+        self.hide()
+
+    def come_back(self) -> None:
+        """Be there again, where one was."""
+        self.show()
+        self.place(self._here).enter()
+
+    def tell(self, title: str, sentence: str) -> None:
+        """Say what went wrong, with one button."""
+        notice = Notice(self, self.theme, title, sentence)
+        notice.finished.connect(notice.deleteLater)
+        self.notice = notice
+        notice.show()
+
+    def _change_theme(self) -> None:
+        self.theme = LIGHT if self.theme.dark else DARK
+        wear(self, self.theme)
+
+    def _arrange(self) -> None:
+        self.rail.narrow(self.width() < NARROW_BELOW or self.place(self._here).wants_narrow_rail())
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
+        """Make room: the rail becomes narrow in a small window."""
+        super().resizeEvent(event)
+        self._arrange()
+
+    def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802 - Qt's name
+        """Leave the place one is at and say that the operator is done."""
+        for place in self._places.values():
+            place.leave()
+        super().closeEvent(event)
+        self.closed.emit()
