@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QEvent, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QEnterEvent, QFocusEvent, QFontMetricsF, QPainter, QPaintEvent, QPen
+from PySide6.QtGui import QColor, QEnterEvent, QFocusEvent, QFontMetricsF, QKeyEvent, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QPushButton, QSizePolicy, QWidget
 
+from study_app.gui.pages.base import page_painter
 from study_app.gui.theme import PARTICIPANT, RADIUS_CONTROL, font
 
+CENTRE = int(Qt.AlignmentFlag.AlignCenter)
+ARROWS = (Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_Left, Qt.Key.Key_Right)
 RING = 4.0  # room around a button for its focus ring [logical px]
 KEYBOARD = (Qt.FocusReason.TabFocusReason, Qt.FocusReason.BacktabFocusReason, Qt.FocusReason.ShortcutFocusReason)
 
@@ -40,7 +43,10 @@ def draw_key(
     painter.drawRoundedRect(cap, 4 * scale, 4 * scale)
     painter.setFont(font("key", scale=scale))
     painter.setPen(QColor(ink))
-    painter.drawText(cap, int(Qt.AlignmentFlag.AlignCenter), text)
+    way = painter.layoutDirection()
+    painter.setLayoutDirection(Qt.LayoutDirection.LeftToRight)  # "1–7" is so on every keyboard
+    painter.drawText(cap, CENTRE, text)
+    painter.setLayoutDirection(way)
     return width
 
 
@@ -74,10 +80,10 @@ class GoButton(QPushButton):
 
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802
         """Draw the button, its label and its key."""
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter = page_painter(self)
         scale, theme = self._scale, PARTICIPANT
         body = QRectF(self.rect()).adjusted(RING, RING, -RING, -RING)
+        flip = self.layoutDirection() == Qt.LayoutDirection.RightToLeft
         radius = RADIUS_CONTROL * scale
         lit = self.underMouse() and not self.isDown()
         painter.setPen(Qt.PenStyle.NoPen)
@@ -89,16 +95,21 @@ class GoButton(QPushButton):
             painter.drawRoundedRect(body.adjusted(-3, -3, 3, 3), radius + 3, radius + 3)
         label = QFontMetricsF(self.font()).horizontalAdvance(self.text())
         cap, _ = key_size(self._key, scale)
-        left = body.center().x() - (label + 12 * scale + cap) / 2
+        start = body.center().x() - (label + 12 * scale + cap) / 2
+        words_at, cap_at = (start + cap + 12 * scale, start) if flip else (start, start + label + 12 * scale)
         painter.setFont(self.font())
         painter.setPen(QColor(theme.on_accent))
-        place = QRectF(left, body.top(), label + 2, body.height())
-        painter.drawText(place, int(Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft), self.text())
+        painter.drawText(QRectF(words_at - 1, body.top(), label + 2, body.height()), CENTRE, self.text())
         ink = theme.on_accent
-        draw_key(
-            painter, left + label + 12 * scale, body.center().y(), self._key, scale, ink=ink, edge=ink, strength=0.5
-        )
+        draw_key(painter, cap_at, body.center().y(), self._key, scale, ink=ink, edge=ink, strength=0.5)
         painter.end()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802
+        """Leave arrows to the page: they scroll or move there, and must not lead the keyboard away."""
+        if event.key() in ARROWS:
+            event.ignore()
+        else:
+            super().keyPressEvent(event)
 
     def focusInEvent(self, event: QFocusEvent) -> None:  # noqa: N802
         """Show the ring where the keyboard led here; a page that begins here has its key cap to say so."""

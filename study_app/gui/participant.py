@@ -26,6 +26,7 @@ from study_app.gui.pages.text import NoticeWidget, PauseWidget, ReadingPage, Tex
 from study_app.gui.pointer import PointerCapture
 from study_app.gui.scene_view import TankWidget
 from study_app.gui.theme import PARTICIPANT, font, load_fonts, stylesheet
+from study_app.protocol.words import Words, words
 from study_app.session.events import Continue, ForceStopped, PauseAsked
 from study_app.session.pages import (
     EndPage,
@@ -38,7 +39,6 @@ from study_app.session.pages import (
 )
 
 if TYPE_CHECKING:
-    from study_app.protocol.words import Words
     from study_app.session.runner import TankView
 
 LEAST_SIZE = QSize(1024, 640)
@@ -52,11 +52,12 @@ class ParticipantWindow(QWidget):
 
     Parameters
     ----------
-    words : the interface's words in the participant's language
+    said : the interface's words in the participant's language, until a page is in another
     clock : seconds since the session's origin, for the events' times
     windowed : a window of at least 1024 × 640 instead of the whole screen
     captures_pointer : hold and hide the pointer in the tank, because it is the device
     pilot : a coloured frame and the title say that this is no participant's session
+    text_scale : how much larger than designed words must be at least, for this screen at this distance
 
     While ``may_close`` is false, closing the window in the middle of a session is a pause.
     ``event`` carries the session's events; ``pointer`` the hand's place [m] and ``buttons`` the buttons' bits while the
@@ -70,24 +71,26 @@ class ParticipantWindow(QWidget):
 
     def __init__(
         self,
-        words: Words,
+        said: Words,
         *,
         clock: Callable[[], float],
         windowed: bool = False,
         captures_pointer: bool = False,
         pilot: bool = False,
+        text_scale: float = 1.0,
     ) -> None:
         super().__init__()
         load_fonts()
-        self._words = words
+        self._words = said
         self._clock = clock
+        self._text_scale = text_scale
         self._windowed = windowed
         self._captures = captures_pointer
         self.may_close = False
         self.frame_px = PILOT_FRAME if pilot else 0
         self._page: Page | None = None
         self._widget: PageWidget | TankWidget = ReadingPage(
-            ("clock", words.preparing, (), PARTICIPANT.accent), words, clock, parent=self
+            ("clock", said.preparing, (), PARTICIPANT.accent), said, clock, parent=self, text_scale=text_scale
         )
         self._capture = PointerCapture(self)
         self._capture.moved.connect(self.pointer)
@@ -99,11 +102,12 @@ class ParticipantWindow(QWidget):
         self._escape.held.connect(self._stop_force)
         self._escape.tapped.connect(self._pause)
         self.installEventFilter(self._escape)
-        self.setWindowTitle(f"{words.window_title} – pilot" if pilot else words.window_title)
+        self._pilot = pilot
+        self._title()
         self.setObjectName("participant")
         self.setFont(font("body"))
         self.setStyleSheet(stylesheet(PARTICIPANT))
-        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)  # it has the keyboard in the tank; Tab stays on the page
         self.setMinimumSize(LEAST_SIZE)
 
     @property
@@ -139,6 +143,9 @@ class ParticipantWindow(QWidget):
     def show_page(self, page: Page) -> None:
         """Put a page in place of the present one, whole and at once."""
         self._capture.release()
+        if isinstance(page, TextPage) and page.language != self._words.language:
+            self._words = words(page.language)
+            self._title()
         old = self._widget
         made = self._make(page, old)
         made.setGeometry(self._room())
@@ -201,27 +208,31 @@ class ParticipantWindow(QWidget):
         painter.fillRect(self.rect(), QColor(PARTICIPANT.warn if self.frame_px else PARTICIPANT.window))
         painter.end()
 
+    def _title(self) -> None:
+        title = self._words.window_title
+        self.setWindowTitle(f"{title} – pilot" if self._pilot else title)
+
     def _room(self) -> QRect:
         """Return where pages are."""
         frame = self.frame_px
         return self.rect().adjusted(frame, frame, -frame, -frame)
 
     def _make(self, page: Page, old: QWidget) -> PageWidget | TankWidget:
-        words, clock = self._words, self._clock
+        said, clock, text = self._words, self._clock, self._text_scale
         made: PageWidget
         match page:
             case TaskPage():
-                tank = TankWidget(page, words, self)
+                tank = TankWidget(page, said, self, text_scale=text)
                 tank.painted.connect(self.painted)
                 return tank
             case QuestionnairePage():
-                made = QuestionnaireWidget(page, words, clock, self)
+                made = QuestionnaireWidget(page, said, clock, self, text_scale=text)
             case TextPage():
-                made = TextWidget(page, words, clock, self)
+                made = TextWidget(page, said, clock, self, text_scale=text)
             case PausePage():
-                made = PauseWidget(page, words, clock, under=_picture(old), parent=self)
+                made = PauseWidget(page, said, clock, under=_picture(old), parent=self, text_scale=text)
             case TroublePage() | EndPage():
-                made = NoticeWidget(page, words, clock, self)
+                made = NoticeWidget(page, said, clock, self, text_scale=text)
         made.event_made.connect(self.event)
         return made
 

@@ -15,7 +15,7 @@ from PySide6.QtWidgets import QWidget
 from study_app.gui.tank import sprites
 from study_app.gui.tank.backdrop import Backdrop, backdrop
 from study_app.gui.tank.camera import Box, Camera
-from study_app.gui.tank.captions import Captions, below_tank, caption_scale
+from study_app.gui.tank.captions import Captions
 from study_app.gui.tank.frame import (
     DEPTH_STEPS,
     BallPlace,
@@ -50,13 +50,13 @@ class TankWidget(QWidget):
 
     painted = Signal(object)
 
-    def __init__(self, page: TaskPage, words: Words, parent: QWidget | None = None) -> None:
+    def __init__(self, page: TaskPage, words: Words, parent: QWidget | None = None, *, text_scale: float = 1.0) -> None:
         super().__init__(parent)
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.setAccessibleName(page.instruction)
         self._page = page
         self._box = Box.around(page.workspace_m, page.body_radius_m)
-        self._captions = Captions(page, words)
+        self._captions = Captions(page, words, text_scale)
         self._patch = OnsetPatch()
         self._view: TankView | None = None
         self._unpainted = False
@@ -134,7 +134,8 @@ class TankWidget(QWidget):
     def _lay_out(self, ratio: float) -> None:
         width, height = self.width(), self.height()
         left, top, wide, high = AREA
-        room = (1 - top) * height - below_tank(caption_scale(width, height))
+        top = max(top, self._captions.above(width, height) / height)
+        room = (1 - top) * height - self._captions.below(width, height)
         place = (left * width, top * height, wide * width, min(high * height, room))
         self._camera = Camera.fitted(self._box, *place)
         self._captions.lay_out(width, height, self._camera.point((0, self._box.floor, self._box.z))[1])

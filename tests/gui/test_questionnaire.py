@@ -11,7 +11,7 @@ from PySide6.QtGui import QFontMetricsF
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
-from study_app.gui.pages.grid import LEAST_CELL, grid
+from study_app.gui.pages.grid import LEAST_CELL, Asked, grid, holds, parts
 from study_app.gui.pages.questionnaire import QuestionnaireWidget
 from study_app.gui.pages.rows import WRAP_LEFT, Row
 from study_app.gui.theme import font
@@ -302,12 +302,30 @@ def test_growing_window_brings_all_statements_back(qtbot: Any) -> None:
 def test_grid_keeps_cells_large_and_rows_above_the_foot() -> None:
     for width in range(800, 2600, 60):
         for height in range(600, 1500, 60):
-            for judge in (False, True):
-                places = grid(width, height, items=9, statement=470, heading=34, intro=20, judge=judge)
-                assert min(places.cell_width, places.cell_height) >= LEAST_CELL
-                assert places.rows_top + places.per_page * places.pitch <= places.foot_top
-                assert places.statement_width >= 120
-                assert places.cell(6)[0] + places.cell_width <= places.row_width
+            for judge in (0, 60):
+                asked = Asked(9, 470, lambda _scale, _judge: 34, lambda _width: 20, judge)
+                made = (grid(width, height, asked, per_page) for per_page in parts(9, width))
+                places = next(one for one in made if holds(one))
+                for placed in (places, places.mirrored()):
+                    assert min(placed.cell_width, placed.cell_height) >= LEAST_CELL
+                    assert placed.rows_top + placed.per_page * placed.pitch <= placed.foot_top
+                    assert placed.statement_width >= 120
+                    assert placed.cell(0)[0] >= 0
+                    assert placed.cell(6)[0] + placed.cell_width <= placed.row_width
+
+
+def test_parts_are_as_even_as_they_can_be() -> None:
+    assert list(parts(9, 1366)) == [9, 5, 3, 3, 2, 1]
+    assert list(parts(9, 880)) == [5, 3, 3, 2, 1]
+    assert list(parts(3, 1366)) == [3, 3, 2, 1]
+
+
+def test_mirrored_places_keep_the_order_of_the_scale() -> None:
+    places = grid(1366, 768, Asked(9, 470, lambda _scale, _judge: 34, lambda _width: 20, 60), 9)
+    mirror = places.mirrored()
+    assert [mirror.cell(n)[0] for n in range(7)] == sorted(mirror.cell(n)[0] for n in range(7))
+    assert mirror.cell(7)[0] < mirror.cell(0)[0] < mirror.statement_left < mirror.number_left
+    assert mirror.mirrored().cells_left == pytest.approx(places.cells_left)
 
 
 def test_heading_gives_way_when_two_labels_would_touch(qtbot: Any) -> None:

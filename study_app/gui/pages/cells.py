@@ -7,6 +7,7 @@ from PySide6.QtGui import QColor, QEnterEvent, QFontMetricsF, QPainter, QPaintEv
 from PySide6.QtWidgets import QRadioButton, QWidget
 
 from study_app.gui.icons import draw_icon
+from study_app.gui.pages.base import page_painter
 from study_app.gui.pages.grid import POINTS
 from study_app.gui.theme import PARTICIPANT, RADIUS_CONTROL, font
 
@@ -20,12 +21,13 @@ class Cell(QRadioButton):
     entered = Signal(int)
     left = Signal()
 
-    def __init__(self, column: int, name: str, parent: QWidget) -> None:
+    def __init__(self, column: int, name: str, statement: str, parent: QWidget) -> None:
         super().__init__(parent)
         self._column = column
         self._scale = 1.0
         self._pointed = False
         self.setAccessibleName(name)
+        self.setAccessibleDescription(statement)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # the row holds the keyboard
         self.setCursor(Qt.CursorShape.PointingHandCursor)
 
@@ -66,8 +68,7 @@ class Cell(QRadioButton):
 
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802
         """Draw the cell."""
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter = page_painter(self)
         theme, scale = PARTICIPANT, self._scale
         text = NO_VALUE if self._column == POINTS else str(self._column + 1)
         if self.isChecked():

@@ -3,14 +3,28 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QRectF, Qt
-from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPaintEvent
+from PySide6.QtGui import QColor, QFontMetricsF, QPaintEvent
 from PySide6.QtWidgets import QWidget
 
+from study_app.gui.pages.base import page_painter
 from study_app.gui.pages.grid import POINTS, Grid
 from study_app.gui.pages.rows import WRAP_LEFT
 from study_app.gui.theme import PARTICIPANT, font
 
 LABEL_WIDTH = 98.0  # in which a label over a column wraps, where there is room
+SHARES = (1.0, 1.2, 1.4, 1.6, 1.8)
+
+
+def label_height(labels: tuple[str, ...], widest: float) -> float:
+    """Return the height [px] of labels at scale 1 that may be ``widest`` px wide, where they wrap as they are drawn."""
+    metrics = QFontMetricsF(font("label", weight=600))
+    room = QRectF(0, 0, min(LABEL_WIDTH, widest), 1e3)
+    return max((metrics.boundingRect(room, WRAP_LEFT, text).height() for text in labels), default=0.0)
+
+
+def widest_word(metrics: QFontMetricsF, text: str) -> float:
+    """Return the width [px] of the widest word of a text, 0 without any."""
+    return max((metrics.horizontalAdvance(word) for word in text.split()), default=0.0)
 
 
 class Heading(QWidget):
@@ -46,8 +60,8 @@ class Heading(QWidget):
         """Draw the labels, their last lines level."""
         if self._grid is None:
             return
-        painter = QPainter(self)
-        painter.setFont(font("label", scale=self._grid.scale, weight=600))
+        painter = page_painter(self)
+        painter.setFont(font("label", scale=self._grid.text, weight=600))
         flags = int(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignBottom | Qt.TextFlag.TextWordWrap)
         for column in self._columns():
             if column == self._pointed:
@@ -76,7 +90,7 @@ class Heading(QWidget):
     def _fits(self, column: int, width: float) -> bool:
         """Return whether a label can be read in ``width`` [px] and the height of the heading."""
         assert self._grid is not None  # noqa: S101  # asked only when placed
-        metrics = QFontMetricsF(font("label", scale=self._grid.scale, weight=600))
+        metrics = QFontMetricsF(font("label", scale=self._grid.text, weight=600))
         bounds = metrics.boundingRect(QRectF(0, 0, width, 1e4), WRAP_LEFT, self._labels[column])
         return bounds.width() <= width and bounds.height() <= self.height() + 1
 
@@ -84,9 +98,7 @@ class Heading(QWidget):
         """Return the room of a label: its column, and beside it as much as it needs, within the row."""
         assert self._grid is not None  # noqa: S101  # painted only when placed
         left, width = self._grid.cell(column)
-        pitch = min(self._grid.cell_pitch, LABEL_WIDTH * self._grid.scale) if column < POINTS else width
-        wide = next(
-            (pitch * share for share in (1.0, 1.2, 1.4, 1.6, 1.8) if self._fits(column, pitch * share)), 2 * pitch
-        )
-        middle = min(left + width / 2, self.width() - wide / 2)
+        pitch = min(self._grid.cell_pitch, LABEL_WIDTH * self._grid.text) if column < POINTS else width
+        wide = next((pitch * share for share in SHARES if self._fits(column, pitch * share)), 2 * pitch)
+        middle = max(min(left + width / 2, self.width() - wide / 2), wide / 2)
         return QRectF(middle - wide / 2, 0, wide, self.height())

@@ -1,4 +1,4 @@
-"""The questionnaire: all statements of a setting on one page, answered with mouse or keyboard alone."""
+"""The questionnaire: all statements of a setting on one page, answered with mouse, keyboard or touch alone."""
 
 from __future__ import annotations
 
@@ -11,12 +11,13 @@ from PySide6.QtWidgets import QPushButton, QWidget
 
 from study_app.gui.icons import draw_icon
 from study_app.gui.keys import GoButton, draw_key, key_size
-from study_app.gui.pages.base import PageWidget
-from study_app.gui.pages.grid import Grid, grid
-from study_app.gui.pages.heading import LABEL_WIDTH, Heading
+from study_app.gui.pages.base import PageWidget, page_painter
+from study_app.gui.pages.grid import LEAST_CELL, Asked, Grid, grid, holds, parts
+from study_app.gui.pages.heading import Heading, label_height, widest_word
 from study_app.gui.pages.rows import WRAP_LEFT, Row
+from study_app.gui.pages.speech import say
 from study_app.gui.progress import ProgressLine
-from study_app.gui.theme import PARTICIPANT, font
+from study_app.gui.theme import PARTICIPANT, TYPE, font
 from study_app.session.events import Chosen, ItemShown, Submitted
 from study_app.session.pages import QuestionnairePage
 
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from study_app.protocol.words import Words
 
 LEFT = int(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
-RIGHT = int(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+CENTRE = int(Qt.AlignmentFlag.AlignCenter)
 
 
 class QuestionnaireWidget(PageWidget):
@@ -35,9 +36,15 @@ class QuestionnaireWidget(PageWidget):
     """
 
     def __init__(
-        self, page: QuestionnairePage, words: Words, clock: Callable[[], float], parent: QWidget | None = None
+        self,
+        page: QuestionnairePage,
+        words: Words,
+        clock: Callable[[], float],
+        parent: QWidget | None = None,
+        *,
+        text_scale: float = 1.0,
     ) -> None:
-        super().__init__(words, clock, parent)
+        super().__init__(words, clock, parent, text_scale=text_scale)
         self._page = page
         self._first = 0
         self._submitted = False
@@ -98,6 +105,7 @@ class QuestionnaireWidget(PageWidget):
                 row.ask(missing=True)
             self._go_to(waiting[0])
             self.button.setAccessibleDescription(self.message)
+            say(self, self.message)
             self.update()
         elif not self._submitted:
             self._submitted = True
@@ -105,85 +113,88 @@ class QuestionnaireWidget(PageWidget):
             self.event_made.emit(Submitted(self._clock()))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802
-        """Move with up and down, confirm with Enter."""
+        """Move with up and down, go back with Backspace, confirm with Enter."""
         if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
             if not event.isAutoRepeat():
                 self.submit()
-        elif event.key() in (Qt.Key.Key_Up, Qt.Key.Key_Down):
+        elif event.key() in (Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_Backspace):
             self._move(1 if event.key() == Qt.Key.Key_Down else -1)
         else:
             super().keyPressEvent(event)
 
     def lay_out(self, scale: float) -> None:
         """Place head, rows and foot; decide how many statements a page shows."""
-        page = self._page
-        bare = QFontMetricsF(font("statement"))
-        label = QFontMetricsF(font("label", weight=600))
-        inner = (self.width() - 80) / scale
-        labels = (*page.labels, *((page.cannot_judge,) if page.cannot_judge else ()))
-        self._grid = places = grid(
-            self.width(),
-            self.height(),
-            items=len(self.rows),
-            statement=max(bare.horizontalAdvance(row.item.text) for row in self.rows),
-            heading=max(
-                label.boundingRect(QRectF(0, 0, LABEL_WIDTH, 1e3), WRAP_LEFT, text).height() for text in labels
-            ),
-            intro=bare.boundingRect(QRectF(0, 0, inner, 1e3), WRAP_LEFT, page.intro).height(),
-            judge=page.cannot_judge is not None,
-        )
-        self._progress.set_scale(scale)
+        self._grid = places = self._places()
+        self._progress.set_scale(places.text)
         self._progress.setGeometry(
             round(places.margin), round(places.top), round(self.width() - 2 * places.margin), self._progress.height()
         )
         self._heading.place(places, places.rows_top - places.heading_height - (4 if places.tight else 8) * scale)
-        self.button.set_scale(scale * (0.9 if places.tight else 1.0))
-        foot = self.height() - places.foot_top
-        self.button.move(
-            round(self.width() - places.margin - self.button.width() + 4),
-            round(places.foot_top + (foot - self.button.height()) / 2),
-        )
+        self.button.set_scale(places.text * (0.95 if places.tight else 1.0))
+        foot, size = self.height() - places.foot_top, self.button.size()
+        top = places.foot_top + (foot - size.height()) / 2
+        left = self.width() - places.margin - size.width() + 4
+        self.button.move(self.placed(QRectF(left, round(top), size.width(), size.height())).topLeft().toPoint())
         self._tab_pages()
         self._show_part(self._first)
+
+    def _places(self) -> Grid:
+        """Return where everything lies, with as many statements on a part as can be read and hit."""
+        page = self._page
+        bare, label = QFontMetricsF(font("statement")), QFontMetricsF(font("label", weight=600))
+        off = () if page.cannot_judge is None else (page.cannot_judge,)
+        asked = Asked(
+            items=len(self.rows),
+            statement=max(bare.horizontalAdvance(row.item.text) for row in self.rows),
+            heading=lambda wide, judge: max(label_height(page.labels, wide), label_height(off, judge)),
+            intro=lambda width: bare.boundingRect(QRectF(0, 0, width, 1e3), WRAP_LEFT, page.intro).height(),
+            judge=widest_word(label, page.cannot_judge or ""),
+            word=max(widest_word(label, text) for text in page.labels),
+        )
+        note = self._words.please_answer
+        for per_page in parts(len(self.rows), self.width()):
+            places = grid(self.width(), self.height(), asked, per_page, text_scale=self._text_scale)
+            if holds(places) and all(row.fits(places, note) for row in self.rows):
+                break
+        return places.mirrored() if self.mirrored else places
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802
         """Draw the words of head and foot."""
         super().paintEvent(event)
         if self._grid is None:
             return
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter = page_painter(self)
         self._paint_head(painter, self._grid)
         self._paint_foot(painter, self._grid)
         painter.end()
 
     def _paint_head(self, painter: QPainter, places: Grid) -> None:
-        scale = places.scale
         left, width = places.margin, self.width() - 2 * places.margin
-        face = font("title", scale=scale * places.title / (28 * scale))
+        face = font("title", scale=places.title / TYPE["title"].size)
         painter.setFont(face)
         painter.setPen(QColor(PARTICIPANT.text))
         height = QFontMetricsF(face).height()
         painter.drawText(QRectF(left, places.title_top, width, height), LEFT, self._page.title)
-        painter.setFont(font("statement", scale=scale))
+        painter.setFont(font("statement", scale=places.text))
         painter.setPen(QColor(PARTICIPANT.text2))
         below = QRectF(left, places.intro_top, width, places.rows_top - places.intro_top)
         painter.drawText(below, WRAP_LEFT, self._page.intro)
 
     def _paint_foot(self, painter: QPainter, places: Grid) -> None:
-        scale, words = places.scale, self._words
+        """Draw, from the end of the line to its beginning: count, keys where there is room, what is missing."""
+        text, words = places.text, self._words
         painter.setPen(QPen(QColor(PARTICIPANT.border), 1))
         y = round(places.foot_top) + 0.5
         painter.drawLine(QPointF(0, y), QPointF(self.width(), y))
         middle = self.button.geometry().center().y()
-        right = self.button.geometry().left() - 18 * scale
+        right = self.width() - places.margin - self.button.width() + 4 - 18 * text
         done = sum(row.answered for row in self.rows)
         counted = words.answered.format(done=done, of=len(self.rows))
-        painter.setFont(font("cell", scale=scale * 0.95))
+        painter.setFont(font("cell", scale=text * 0.95))
         width = QFontMetricsF(painter.font()).horizontalAdvance(counted) + 2
         painter.setPen(QColor(PARTICIPANT.text2))
-        painter.drawText(QRectF(right - width, middle - 20 * scale, width, 40 * scale), RIGHT, counted)
-        right -= width + 28 * scale
+        painter.drawText(self.placed(QRectF(right - width, middle - 20 * text, width, 40 * text)), CENTRE, counted)
+        right -= width + 28 * text
         room = right - places.margin
         if self.message:
             room -= self._paint_message(painter, places, room, middle)
@@ -191,28 +202,33 @@ class QuestionnaireWidget(PageWidget):
 
     def _paint_message(self, painter: QPainter, places: Grid, room: float, middle: float) -> float:
         """Draw what is missing; return the width that is taken [px]."""
-        scale, left = places.scale, places.margin
+        scale, start = places.text, places.margin
         mark = 22 * scale
         face, small = font("statement", scale=scale, weight=600), font("body", scale=scale * 0.94)
         strong, light = QFontMetricsF(face), QFontMetricsF(small)
-        text = left + mark + 11 * scale
+        beside = start + mark + 11 * scale
         wide = min(strong.horizontalAdvance(self.message) + 4, room - mark - 11 * scale)
-        bounds = strong.boundingRect(QRectF(0, 0, wide, 1e3), WRAP_LEFT, self.message)
-        top = middle - (bounds.height() + light.height() + 2 * scale) / 2
-        draw_icon(painter, "warning", QRectF(left, middle - mark / 2, mark, mark), PARTICIPANT.warn)
+        height = strong.boundingRect(QRectF(0, 0, wide, 1e3), WRAP_LEFT, self.message).height()
+        kept = self._words.answers_kept
+        whole = height + light.height() + 2 * scale
+        roomy = whole <= self.height() - places.foot_top and light.horizontalAdvance(kept) <= room - mark - 11 * scale
+        top = middle - (whole if roomy else height) / 2
+        icon = self.placed(QRectF(start, middle - mark / 2, mark, mark))
+        draw_icon(painter, "warning", icon, PARTICIPANT.warn)
         painter.setFont(face)
         painter.setPen(QColor(PARTICIPANT.text))
-        painter.drawText(QRectF(text, top, wide, bounds.height() + 2), WRAP_LEFT, self.message)
+        painter.drawText(self.placed(QRectF(beside, top, wide, height + 2)), WRAP_LEFT, self.message)
+        if not roomy:
+            return wide + mark + 36 * scale
         painter.setFont(small)
         painter.setPen(QColor(PARTICIPANT.text2))
-        kept = self._words.answers_kept
-        below = top + bounds.height() + 2 * scale
-        painter.drawText(QRectF(text, below, room, light.height() + 2), LEFT, kept)
+        below = QRectF(beside, top + height + 2 * scale, room - mark - 11 * scale, light.height() + 2)
+        painter.drawText(self.placed(below), LEFT, kept)
         return max(wide, light.horizontalAdvance(kept)) + mark + 36 * scale
 
     def _paint_hints(self, painter: QPainter, places: Grid, right: float, middle: float, room: float) -> None:
         """Draw which keys answer and move, as far as there is room; side notes give way first."""
-        scale, words = places.scale, self._words
+        scale, words = places.text, self._words
         face = font("body", scale=scale * 0.94)
         metrics = QFontMetricsF(face)
         hints = (("1–7", words.key_answer), ("↑ ↓", words.key_move))
@@ -222,10 +238,12 @@ class QuestionnaireWidget(PageWidget):
             return
         left = right - total - 8 * scale
         for (key, text), width in zip(hints, widths, strict=True):
-            cap = draw_key(painter, left, middle, key, scale)
+            cap, _ = key_size(key, scale)
+            draw_key(painter, self.placed(QRectF(left, 0, cap, 1)).left(), middle, key, scale)
             painter.setFont(face)
             painter.setPen(QColor(PARTICIPANT.text2))
-            painter.drawText(QRectF(left + cap + 8 * scale, middle - 20 * scale, width, 40 * scale), LEFT, text)
+            beside = QRectF(left + cap + 8 * scale, middle - 20 * scale, width - cap - 6 * scale, 40 * scale)
+            painter.drawText(self.placed(beside), LEFT, text)
             left += width + 20 * scale
 
     def _shown(self) -> tuple[Row, ...]:
@@ -261,12 +279,11 @@ class QuestionnaireWidget(PageWidget):
         for index, (tab, start) in enumerate(zip(self._tabs, starts, strict=True)):
             last = min(start + many, len(self.rows))
             tab.setText(str(last) if last == start + 1 else f"{start + 1}–{last}")
-            tab.setFont(font("label", scale=places.scale))
-            width, height = 60 * places.scale, 32 * places.scale
-            y = self._heading.geometry().bottom() - height
-            tab.setGeometry(
-                round(places.margin + index * (width + 8 * places.scale)), round(y), round(width), round(height)
-            )
+            tab.setFont(font("label", scale=places.text))
+            width, height = 60 * places.text, max(LEAST_CELL * places.scale, 32 * places.text)
+            top = self._heading.geometry().bottom() - height
+            place = QRectF(places.margin + index * (width + 8 * places.scale), top, width, height)
+            tab.setGeometry(self.placed(place).toRect())
 
     def _new_tab(self, part: int) -> QPushButton:
         theme = PARTICIPANT

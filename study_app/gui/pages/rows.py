@@ -2,28 +2,37 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import math
+from typing import TYPE_CHECKING, TypeAlias
 
 from PySide6.QtCore import QPointF, QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QFocusEvent, QFont, QFontMetricsF, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPen
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QGroupBox, QWidget
 
 from study_app.gui.icons import draw_icon
+from study_app.gui.pages.base import mirrored, page_painter
 from study_app.gui.pages.cells import Cell
-from study_app.gui.pages.grid import POINTS, Grid
+from study_app.gui.pages.grid import NUMBER, POINTS, Grid
+from study_app.gui.pages.speech import say
 from study_app.gui.theme import PARTICIPANT, font
 from study_app.session.pages import ItemView
 
 if TYPE_CHECKING:
     from study_app.protocol.words import Words
 
+LINE = int(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
+SHRINKING = (1.0, 0.94, 0.88, 0.82, 0.76)  # of words that are larger than they must be, in a window that is too small
 WRAP_LEFT = int(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop | Qt.TextFlag.TextWordWrap)
 
 
-class Row(QWidget):
-    """A statement with its cells: one stop of the Tab key.
+Fitted: TypeAlias = tuple[QFont, QFont, float, float]
 
-    1 … 7 choose; left and right move a pointer of the keyboard's own, Space chooses there; the mouse chooses anywhere.
+
+class Row(QGroupBox):
+    """A statement with its cells: one stop of the Tab key, and for a screen reader a group of radio buttons.
+
+    1 … 7 choose; left and right move a pointer of the keyboard's own, Space chooses there; mouse and touch choose
+    anywhere. What is pointed at with the keyboard and what is chosen is said to a screen reader.
     ``chosen(changed, by_key)`` comes when a choice is made; ``wandered(column)`` is the column pointed at, -1 for none;
     ``seen`` comes with the first painting on a screen.
     """
@@ -48,7 +57,8 @@ class Row(QWidget):
         self._wandering = -1
         names = [f"{point} {label}" for point, label in enumerate(labels, start=1)]
         self.cells = tuple(
-            Cell(column, name, self) for column, name in enumerate([*names, judge] if judge is not None else names)
+            Cell(column, name, item.text, self)
+            for column, name in enumerate([*names, judge] if judge is not None else names)
         )
         for cell in self.cells:
             cell.clicked.connect(lambda _=False, cell=cell: self._clicked(cell))
@@ -65,6 +75,10 @@ class Row(QWidget):
         self._name()
         self.update()
 
+    def fits(self, places: Grid, note: str) -> bool:
+        """Return whether statement and ``note`` can be read in a row of these places, no smaller than they must."""
+        return self._fitted(places, note) is not None
+
     def ask(self, missing: bool) -> None:
         """Mark the statement as still to be answered."""
         self.missing = missing and not self.answered
@@ -79,7 +93,7 @@ class Row(QWidget):
         y = round((self.height() - places.cell_height) / 2)
         for cell in self.cells:
             x, width = places.cell(cell.column)
-            cell.set_scale(places.scale)
+            cell.set_scale(places.text)
             cell.setGeometry(round(x), y, round(width), round(places.cell_height))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802
@@ -89,7 +103,7 @@ class Row(QWidget):
             if not event.isAutoRepeat():
                 self._choose(point, by_key=True)
         elif event.key() in (Qt.Key.Key_Left, Qt.Key.Key_Right):
-            self._step(1 if event.key() == Qt.Key.Key_Right else -1)
+            self._step(1 if event.key() == Qt.Key.Key_Right else -1)  # the scale's order is the same in every language
         elif event.key() == Qt.Key.Key_Space and self._wandering >= 0 and not event.isAutoRepeat():
             self._choose(self.cells[self._wandering].value, by_key=True)
         else:
@@ -115,8 +129,7 @@ class Row(QWidget):
         """Draw number, statement, marks and ring."""
         if self._grid is None:
             return
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter = page_painter(self)
         self._paint_ground(painter, self._grid)
         self._paint_statement(painter, self._grid)
         painter.end()
@@ -139,7 +152,7 @@ class Row(QWidget):
         if self.missing:
             painter.setPen(Qt.PenStyle.NoPen)
             painter.setBrush(QColor(theme.warn))
-            bar = QRectF(4 * scale, self.height() * 0.19, 4 * scale, self.height() * 0.62)
+            bar = self._placed(QRectF(4 * scale, self.height() * 0.19, 4 * scale, self.height() * 0.62))
             painter.drawRoundedRect(bar, 2 * scale, 2 * scale)
         if places.rule is not None:
             painter.setPen(QPen(QColor(theme.border), 1))
@@ -149,31 +162,39 @@ class Row(QWidget):
             painter.drawLine(QPointF(x, middle - half), QPointF(x, middle + half))
 
     def _paint_statement(self, painter: QPainter, places: Grid) -> None:
-        theme, scale = PARTICIPANT, places.scale
+        theme, text = PARTICIPANT, places.text
         note = self._note()
-        face, note_face, height, note_height = self._fitted(places, note)
+        face, note_face, height, note_height = self._fitted(places, note) or self._smallest(places, note)
         top = (self.height() - height - note_height) / 2
-        width = places.statement_width
+        left, width = places.statement_left, places.statement_width
         line = QFontMetricsF(face).height()
-        painter.setFont(font("cell", scale=scale * 0.9, weight=700 if self.missing else 400))
+        painter.setFont(font("cell", scale=text * 0.9, weight=700 if self.missing else 400))
         painter.setPen(QColor(theme.warn if self.missing else theme.text3))
-        painter.drawText(
-            QRectF(16 * scale, top, 28 * scale, line), Qt.AlignmentFlag.AlignVCenter, str(self.item.number)
-        )
+        painter.drawText(QRectF(places.number_left, top, NUMBER * text, line), LINE, str(self.item.number))
         painter.setFont(face)
         painter.setPen(QColor(theme.text))
-        painter.drawText(QRectF(places.statement_left, top, width, height + 4), WRAP_LEFT, self.item.text)
+        painter.drawText(QRectF(left, top, width, height + 4), WRAP_LEFT, self.item.text)
         if not note:
             return
-        mark = note_height
         ink = theme.warn if self.missing else theme.text3
-        left = places.statement_left
+        taken = 0.0
         if self.missing:
-            draw_icon(painter, "warning", QRectF(left, top + height + 1, mark, mark - 1), ink, 2.0)
-            left += mark + 5 * scale
+            mark = QRectF(left, top + height + 1, note_height, note_height - 1)
+            if self._mirrored:
+                mark.moveRight(left + width)
+            draw_icon(painter, "warning", mark, ink, 2.0)
+            taken = note_height + 5 * places.scale
         painter.setFont(note_face)
         painter.setPen(QColor(ink))
-        painter.drawText(QRectF(left, top + height, width, note_height), Qt.AlignmentFlag.AlignVCenter, note)
+        beside = QRectF(left if self._mirrored else left + taken, top + height, width - taken, note_height)
+        painter.drawText(beside, LINE, note)
+
+    @property
+    def _mirrored(self) -> bool:
+        return self.layoutDirection() == Qt.LayoutDirection.RightToLeft
+
+    def _placed(self, place: QRectF) -> QRectF:
+        return mirrored(place, self.width()) if self._mirrored else place
 
     def _note(self) -> str:
         """Return the small line under the statement."""
@@ -182,20 +203,36 @@ class Row(QWidget):
             return f"{words.please_answer} · {words.press_keys}" if self.hasFocus() else words.please_answer
         return "" if self.item.required else self._words.optional
 
-    def _fitted(self, places: Grid, note: str) -> tuple[QFont, QFont, float, float]:
-        """Return the largest fonts with which statement and note fit the row, and their heights [px]."""
-        room = self.height() - 3 * places.scale
-        for shrink in (1.0, 0.94, 0.88, 0.82, 0.76):
-            weight = 500 if self.missing or self.hasFocus() else 400
-            face = font("statement", scale=places.scale * shrink, weight=weight)
-            note_face = font("label", scale=places.scale * max(shrink, 0.88), weight=600)
-            bounds = QFontMetricsF(face).boundingRect(
-                QRectF(0, 0, places.statement_width, 1e4), WRAP_LEFT, self.item.text
-            )
-            note_height = QFontMetricsF(note_face).height() if note else 0.0
-            if bounds.height() + note_height <= room:
+    def _fitted(self, places: Grid, note: str) -> Fitted | None:
+        """Return the largest fonts with which statement and note fit the row, and their heights [px]; None if none do.
+
+        Words that must be so large (``places.text`` beyond ``places.scale``) are not made smaller; a note may be.
+        """
+        room = math.floor(places.pitch) - 3 * places.scale
+        must = places.text > places.scale
+        sizes = ((1.0, 1.0), (1.0, places.scale / places.text)) if must else ((s, max(s, 0.88)) for s in SHRINKING)
+        for shrink, note_shrink in sizes:
+            fitted = self._measured(places, note, shrink, note_shrink)
+            if fitted[2] + fitted[3] <= room:
+                return fitted
+        return None
+
+    def _smallest(self, places: Grid, note: str) -> Fitted:
+        """Return fonts for a row that is alone on its page and still too low."""
+        room = math.floor(places.pitch) - 3 * places.scale
+        for percent in range(95, 30, -5):
+            fitted = self._measured(places, note, percent / 100, percent / 100)
+            if fitted[2] + fitted[3] <= room:
                 break
-        return face, note_face, bounds.height(), note_height
+        return fitted
+
+    def _measured(self, places: Grid, note: str, shrink: float, note_shrink: float) -> Fitted:
+        weight = 500 if self.missing or self.hasFocus() else 400
+        face = font("statement", scale=places.text * shrink, weight=weight)
+        note_face = font("label", scale=places.text * note_shrink, weight=600)
+        room = QRectF(0, 0, places.statement_width, 1e4)
+        height = QFontMetricsF(face).boundingRect(room, WRAP_LEFT, self.item.text).height()
+        return face, note_face, height, QFontMetricsF(note_face).height() if note else 0.0
 
     def _clicked(self, cell: Cell) -> None:
         self.setFocus(Qt.FocusReason.MouseFocusReason)
@@ -204,6 +241,8 @@ class Row(QWidget):
     def _choose(self, value: int | None, *, by_key: bool) -> None:
         changed = not self.answered or value != self.value
         self.answer(value)
+        if changed:
+            say(self, self.accessibleDescription())
         if changed or by_key:
             self.chosen.emit(changed, by_key)
 
@@ -213,6 +252,7 @@ class Row(QWidget):
             checked = next((cell.column for cell in self.cells if cell.isChecked()), None)
             start = checked if checked is not None else (-1 if by > 0 else len(self.cells))
         self._wander(min(max(start + by, 0), len(self.cells) - 1))
+        say(self.cells[self._wandering], self.cells[self._wandering].accessibleName())
 
     def _wander(self, column: int) -> None:
         self._wandering = column

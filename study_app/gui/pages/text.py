@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import html
+import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QRectF, Qt
-from PySide6.QtGui import QColor, QKeyEvent, QPainter, QPaintEvent, QPen, QPixmap
-from PySide6.QtWidgets import QFrame, QLabel, QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtCore import QRectF, Qt, QTimer
+from PySide6.QtGui import QColor, QKeyEvent, QPaintEvent, QPen, QPixmap
+from PySide6.QtWidgets import QFrame, QLabel, QScrollArea, QScroller, QVBoxLayout, QWidget
 
 from study_app.gui.icons import draw_icon
 from study_app.gui.keys import GoButton
-from study_app.gui.pages.base import PageWidget, page_scale
+from study_app.gui.pages.base import PageWidget, page_painter, page_scale
+from study_app.gui.pages.languages import LanguageSwitch
+from study_app.gui.pages.speech import say
 from study_app.gui.progress import ProgressLine
 from study_app.gui.theme import PARTICIPANT, RADIUS_CARD, font
-from study_app.session.events import Continue, ResumeAsked
+from study_app.session.events import Continue, LanguageChosen, ResumeAsked
 from study_app.session.pages import EndPage, PausePage, TextPage, TroublePage
 
 if TYPE_CHECKING:
@@ -25,14 +28,20 @@ ICONS = {"consent": "pen", "instructions": "drop", "break": "clock", "debrief": 
 COLUMN = 700.0  # a line that reads well [logical px at scale 1]
 LINE_PERCENT = 140
 SCROLLBAR = 16
+LINE_STEP = 48
+TICK_MS = 200
 GIVING_WAY = ((1.0, True), (0.94, True), (0.89, True), (0.89, False))  # size of the text, whether with a badge
+MUST_BE_READ = ((1.0, True), (1.0, False))  # where words are as small as they may be
+LINE_KEYS = {Qt.Key.Key_Up: -1, Qt.Key.Key_Down: 1}
+PAGE_KEYS = {Qt.Key.Key_PageUp: -1, Qt.Key.Key_PageDown: 1}
 VEIL = 0.80  # how much of the page under a pause is hidden
 
 
-def paragraphs_html(paragraphs: tuple[str, ...], gap: float) -> str:
+def paragraphs_html(paragraphs: tuple[str, ...], gap: float, *, right_to_left: bool = False) -> str:
     """Return paragraphs with room between their lines, for a QLabel."""
     style = f"line-height: {LINE_PERCENT}%; margin: 0 0 {round(gap)}px 0"
-    return "".join(f'<p style="{style}">{html.escape(text)}</p>' for text in paragraphs)
+    way = "rtl" if right_to_left else "ltr"
+    return "".join(f'<p dir="{way}" style="{style}">{html.escape(text)}</p>' for text in paragraphs)
 
 
 class Badge(QWidget):
@@ -51,8 +60,7 @@ class Badge(QWidget):
 
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802
         """Draw the disc and the icon."""
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter = page_painter(self)
         disc = QRectF(self.rect()).adjusted(1, 1, -1, -1)
         painter.setPen(QPen(QColor(PARTICIPANT.border), 1))
         painter.setBrush(QColor(PARTICIPANT.surface))
@@ -70,6 +78,8 @@ class Column(QWidget):
     ) -> None:
         super().__init__(parent)
         self._paragraphs = paragraphs
+        flip = self.layoutDirection() == Qt.LayoutDirection.RightToLeft
+        self._start = Qt.AlignmentFlag.AlignRight if flip else Qt.AlignmentFlag.AlignLeft
         self._badge = Badge(icon, colour)
         self._title = QLabel(title)
         self._title.setWordWrap(True)
@@ -78,12 +88,13 @@ class Column(QWidget):
         self._body.setTextFormat(Qt.TextFormat.RichText)
         self._layout = QVBoxLayout(self)
         self._layout.setContentsMargins(0, 0, 0, 0)
-        self._layout.addWidget(self._badge)
+        self._layout.addWidget(self._badge, 0, Qt.AlignmentFlag.AlignLeading)
         self._layout.addWidget(self._title)
         self._layout.addWidget(self._body)
         self._layout.addStretch(1)
         for label, ink in ((self._title, PARTICIPANT.text), (self._body, PARTICIPANT.text2)):
             label.setStyleSheet(f"color: {ink}; background: transparent;")
+            label.setAlignment(Qt.AlignmentFlag.AlignAbsolute | self._start)
 
     def set_scale(self, scale: float, *, text: float = 1.0, badge: bool = True) -> None:
         """Grow with the page; in a small window with smaller text, then without the badge."""
@@ -91,7 +102,8 @@ class Column(QWidget):
         self._badge.setVisible(badge)
         self._title.setFont(font("display", scale=scale * text))
         self._body.setFont(font("statement", scale=scale * text * 1.125))
-        self._body.setText(paragraphs_html(self._paragraphs, 10 * scale))
+        flip = self.layoutDirection() == Qt.LayoutDirection.RightToLeft
+        self._body.setText(paragraphs_html(self._paragraphs, 10 * scale, right_to_left=flip))
         self._layout.setSpacing(round(14 * scale))
 
     def needed(self, width: int) -> int:
@@ -111,8 +123,9 @@ class ReadingPage(PageWidget):
         button: tuple[str, str] | None = None,
         progress: ProgressLine | None = None,
         parent: QWidget | None = None,
+        text_scale: float = 1.0,
     ) -> None:
-        super().__init__(words, clock, parent)
+        super().__init__(words, clock, parent, text_scale=text_scale)
         icon, title, paragraphs, colour = column
         self.setAccessibleName(title)
         self.setAccessibleDescription("\n".join(paragraphs))
@@ -128,6 +141,7 @@ class ReadingPage(PageWidget):
         self._scroll.viewport().setAutoFillBackground(False)
         self._column.setAutoFillBackground(False)
         self._content = QRectF()
+        QScroller.grabGesture(self._scroll.viewport(), QScroller.ScrollerGestureType.TouchGesture)
         self.button = GoButton(*button, parent=self) if button is not None else None
         if self.button is not None:
             self.button.clicked.connect(self.go_on)
@@ -135,58 +149,162 @@ class ReadingPage(PageWidget):
     def go_on(self) -> None:
         """Do what the page's button says."""
 
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802
+        """Scroll a text that is too long for the window."""
+        bar = self._scroll.verticalScrollBar()
+        if (lines := LINE_KEYS.get(Qt.Key(event.key()))) is not None:
+            bar.setValue(bar.value() + lines * LINE_STEP)
+        elif (pages := PAGE_KEYS.get(Qt.Key(event.key()))) is not None:
+            bar.setValue(bar.value() + pages * (bar.pageStep() - LINE_STEP))
+        else:
+            super().keyPressEvent(event)
+
     def lay_out(self, scale: float) -> None:
-        """Put the column into the middle, a little above it, the button under its left edge."""
+        """Put the column into the middle, a little above it, the button under the edge where its lines begin."""
+        least = self.words_scale > scale
+        scale = self.words_scale
         margin = round((40 if self.width() >= 1100 else 24) * scale)
         top = round(20 * scale)
         if self._progress is not None:
             self._progress.set_scale(scale)
             self._progress.setGeometry(margin, top, self.width() - 2 * margin, self._progress.height())
             top += self._progress.height()
+        top = self._lay_out_head(scale, margin, top)
         width = min(round(COLUMN * scale), self.width() - 2 * margin)
         foot = 0
         if self.button is not None:
             self.button.set_scale(scale)
-            foot = self.button.height() + round(28 * scale)
-        room = self.height() - top - round(48 * scale) - foot
-        for text, badge in GIVING_WAY:
+            foot = self.button.height() + round((16 if least else 28) * scale)
+        room = self.height() - top - round((28 if least else 48) * scale) - foot
+        for text, badge in MUST_BE_READ if least else GIVING_WAY:
             self._column.set_scale(scale, text=text, badge=badge)
             needed = self._column.needed(width)
             if needed <= room:
                 break
         height = min(needed, room)
         self._column.setFixedSize(width, needed)
-        y = top + round(24 * scale) + round((room - height) * 0.42)
+        y = top + round((12 if least else 24) * scale) + round((room - height) * 0.42)
         x = (self.width() - width) // 2
-        self._scroll.setGeometry(x, y, width + (SCROLLBAR if needed > height else 0), height)
+        bar = SCROLLBAR if needed > height else 0
+        self._scroll.setGeometry(x - (bar if self.mirrored else 0), y, width + bar, height)
         policy = Qt.ScrollBarPolicy
         self._scroll.setVerticalScrollBarPolicy(
             policy.ScrollBarAlwaysOn if needed > height else policy.ScrollBarAlwaysOff
         )
         self._content = QRectF(x, y, width, height + foot)
         if self.button is not None:
-            self.button.move(x - 4, y + height + round(28 * scale))
+            left = x + width - self.button.width() + 4 if self.mirrored else x - 4
+            self.button.move(left, y + height + foot - self.button.height())
+
+    def _lay_out_head(self, _scale: float, _margin: int, top: int) -> int:
+        """Place what stands above the column from ``top`` on; return where the column's room begins [px]."""
+        return top
 
 
 class TextWidget(ReadingPage):
     """Consent, instructions, a break or the debrief.
 
-    Space or Enter goes on; a consent asks for more: its button, or Enter.
+    Space or Enter goes on; a consent asks for more: its button, or Enter. A break with a least time counts it down in
+    the place of its button. Before the consent another language can be chosen.
     """
 
-    def __init__(self, page: TextPage, words: Words, clock: Callable[[], float], parent: QWidget | None = None) -> None:
+    def __init__(
+        self,
+        page: TextPage,
+        words: Words,
+        clock: Callable[[], float],
+        parent: QWidget | None = None,
+        *,
+        text_scale: float = 1.0,
+    ) -> None:
         self._consent = page.kind == "consent"
         key = words.enter_key if self._consent else words.space_key
         progress = ProgressLine(page.progress, words, 0.0) if page.progress is not None else None
         column = (ICONS[page.kind], page.title, page.paragraphs, PARTICIPANT.accent)
-        super().__init__(column, words, clock, button=(page.button, key), progress=progress, parent=parent)
+        super().__init__(
+            column, words, clock, button=(page.button, key), progress=progress, parent=parent, text_scale=text_scale
+        )
+        self._stays_until_s = page.stays_until_s
+        self._count = QLabel(self)
+        self._count.setStyleSheet(f"color: {PARTICIPANT.text2}; background: transparent;")
+        self._ticker = QTimer(self)
+        self._ticker.setInterval(TICK_MS)
+        self._ticker.timeout.connect(self.tick)
+        self.languages: LanguageSwitch | None = None
+        if page.languages:
+            self.languages = LanguageSwitch(page.languages, page.language, words.choose_language, self)
+            self.languages.chosen.connect(self._choose_language)
+        if page.stays_until_s is not None:
+            self._ticker.start()
+        self.tick()
+
+    @property
+    def seconds_left(self) -> int:
+        """Whole seconds until the page may be left, 0 when it may."""
+        if self._stays_until_s is None:
+            return 0
+        return max(0, math.ceil(self._stays_until_s - self._clock()))
+
+    @property
+    def count(self) -> str:
+        """The words of the count, "" when it is over."""
+        return self._count.text()
+
+    def tick(self) -> None:
+        """Count down; when the time is over, put the button where the count was."""
+        assert self.button is not None  # noqa: S101  # these pages have one
+        left = self.seconds_left
+        self._count.setText(self._words.continue_in.format(seconds=left) if left else "")
+        self._count.adjustSize()
+        self._count.setVisible(left > 0)
+        self._place_count()
+        if left:
+            self.button.hide()
+            return
+        self._ticker.stop()
+        if self.button.isHidden():
+            self.button.show()
+            if self.isVisible():
+                self.focus_first()
+                say(self.button, self.button.text())
 
     def focus_first(self) -> None:
         """Leave the consent's button alone: Space must not agree by itself."""
-        if self._consent or self.button is None:
+        if self._consent or self.button is None or self.button.isHidden():
             self.setFocus()
         else:
             self.button.setFocus()
+
+    def lay_out(self, scale: float) -> None:
+        """Place the count where the button will be."""
+        super().lay_out(scale)
+        self._count.setFont(font("card", scale=self.words_scale * 1.125, weight=500, tabular=True))
+        self._count.adjustSize()
+        self._place_count()
+
+    def _place_count(self) -> None:
+        assert self.button is not None  # noqa: S101  # these pages have one
+        place, size = self.button.geometry(), self._count.size()
+        left = place.right() - size.width() - 3 if self.mirrored else place.left() + 4
+        self._count.move(left, place.center().y() - size.height() // 2)
+
+    def _lay_out_head(self, scale: float, margin: int, top: int) -> int:
+        """Put the languages into the upper corner where lines end."""
+        if self.languages is None:
+            return top
+        self.languages.set_scale(min(scale, self._room_for_languages(margin)))
+        width, height = self.languages.width(), self.languages.height()
+        self.languages.move(margin if self.mirrored else self.width() - margin - width, top - 4)
+        return top + height - 8
+
+    def _room_for_languages(self, margin: int) -> float:
+        """Return the largest scale at which the languages stand beside each other in the window."""
+        assert self.languages is not None  # noqa: S101  # asked only where there are some
+        self.languages.set_scale(1.0)
+        return max(1.0, (self.width() - 2 * margin) / self.languages.width())
+
+    def _choose_language(self, language: str) -> None:
+        self.event_made.emit(LanguageChosen(self._clock(), language))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802
         """Go on with Enter, and but for a consent with Space."""
@@ -198,8 +316,9 @@ class TextWidget(ReadingPage):
             super().keyPressEvent(event)
 
     def go_on(self) -> None:
-        """Tell that the participant goes on."""
-        self.event_made.emit(Continue(self._clock()))
+        """Tell that the participant goes on, once the page may be left."""
+        if not self.seconds_left:
+            self.event_made.emit(Continue(self._clock()))
 
 
 class PauseWidget(ReadingPage):
@@ -216,6 +335,7 @@ class PauseWidget(ReadingPage):
         *,
         under: QPixmap | None = None,
         parent: QWidget | None = None,
+        text_scale: float = 1.0,
     ) -> None:
         self.under = under
         if page.force_off:
@@ -228,7 +348,7 @@ class PauseWidget(ReadingPage):
             column = ("pause", words.pause_title, (body,), PARTICIPANT.accent)
             label = words.resume
         button = (label, words.enter_key) if page.held is None else None
-        super().__init__(column, words, clock, button=button, parent=parent)
+        super().__init__(column, words, clock, button=button, parent=parent, text_scale=text_scale)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802
         """Go on with Enter; Space alone could still be the key of the page before."""
@@ -245,13 +365,12 @@ class PauseWidget(ReadingPage):
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802
         """Paint the page below as a shade, and a card on it."""
         super().paintEvent(event)
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter = page_painter(self)
         if self.under is not None and not self.under.isNull():
             painter.setOpacity(1 - VEIL)
             painter.drawPixmap(self.rect(), self.under)
             painter.setOpacity(1.0)
-        space = 40 * page_scale(self.width(), self.height())
+        space = min(40 * page_scale(self.width(), self.height()), self._content.top(), self._content.left())
         painter.setPen(QPen(QColor(PARTICIPANT.border), 1))
         painter.setBrush(QColor(PARTICIPANT.window))
         painter.drawRoundedRect(self._content.adjusted(-space, -space, space, space), 2 * RADIUS_CARD, 2 * RADIUS_CARD)
@@ -262,8 +381,15 @@ class NoticeWidget(ReadingPage):
     """Something broke, or the session is over: a calm sentence and nothing to do."""
 
     def __init__(
-        self, page: TroublePage | EndPage, words: Words, clock: Callable[[], float], parent: QWidget | None = None
+        self,
+        page: TroublePage | EndPage,
+        words: Words,
+        clock: Callable[[], float],
+        parent: QWidget | None = None,
+        *,
+        text_scale: float = 1.0,
     ) -> None:
         ended = isinstance(page, EndPage)
         icon, colour = ("check", PARTICIPANT.ok) if ended else ("info", PARTICIPANT.warn)
-        super().__init__((icon, page.title, (page.paragraph,), colour), words, clock, parent=parent)
+        column = (icon, page.title, (page.paragraph,), colour)
+        super().__init__(column, words, clock, parent=parent, text_scale=text_scale)
