@@ -21,8 +21,10 @@ from PySide6.QtWidgets import QWidget
 
 from study_app.gui.escape import EscapeHold
 from study_app.gui.pages.base import PageWidget
+from study_app.gui.pages.notices import NoticeWidget, PauseWidget
 from study_app.gui.pages.questionnaire import QuestionnaireWidget
-from study_app.gui.pages.text import NoticeWidget, PauseWidget, ReadingPage, TextWidget
+from study_app.gui.pages.reading import ReadingPage
+from study_app.gui.pages.text import TextWidget
 from study_app.gui.pointer import PointerCapture
 from study_app.gui.scene_view import TankWidget
 from study_app.gui.theme import PARTICIPANT, font, load_fonts, stylesheet

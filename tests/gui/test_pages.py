@@ -11,7 +11,9 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLabel
 
 from study_app.gui.pages.base import page_scale
-from study_app.gui.pages.text import NoticeWidget, PauseWidget, ReadingPage, TextWidget
+from study_app.gui.pages.notices import NoticeWidget, PauseWidget
+from study_app.gui.pages.reading import ReadingPage
+from study_app.gui.pages.text import TextWidget
 from study_app.gui.progress import ProgressLine, progress_words
 from study_app.protocol.words import words
 from study_app.session.events import Continue, ResumeAsked

@@ -11,8 +11,9 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.gui.escape import HOLD_MS
+from study_app.gui.pages.notices import NoticeWidget, PauseWidget
 from study_app.gui.pages.questionnaire import QuestionnaireWidget
-from study_app.gui.pages.text import NoticeWidget, PauseWidget, TextWidget
+from study_app.gui.pages.text import TextWidget
 from study_app.gui.participant import LEAST_SIZE, ParticipantWindow
 from study_app.gui.pointer import NOTCHES, SHARE_OF_SCREEN, PointerCapture
 from study_app.gui.scene_view import TankWidget
