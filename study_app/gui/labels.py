@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Literal, TypeAlias
 
 from PySide6.QtCore import QSize, Qt
-from PySide6.QtGui import QFontMetricsF, QResizeEvent
+from PySide6.QtGui import QFontMetricsF, QResizeEvent, QTextLayout
 from PySide6.QtWidgets import QLabel, QSizePolicy
 
 from study_app.gui.theme import TypeRole, font
@@ -71,6 +71,43 @@ class Elided(QLabel):
         shown = self.fontMetrics().elidedText(self._whole, Qt.TextElideMode.ElideRight, self.width())
         self.setText(shown)
         self.setToolTip(self._whole if shown != self._whole else "")
+
+
+class Clamped(QLabel):
+    """A label of at most so many lines, which ends in "…" where they are too few; the whole text is in its tip."""
+
+    def __init__(self, text: str, lines: int, role: TypeRole = "body", ink: Ink = "text") -> None:
+        super().__init__()
+        self.setTextFormat(Qt.TextFormat.PlainText)
+        self.setFont(font(role))
+        self.setProperty("role", ink)
+        self.setWordWrap(True)
+        self.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self.setAccessibleName(text)
+        self._whole, self._most = text, lines
+        self.setFixedHeight(lines * self.fontMetrics().lineSpacing() + 2)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
+        """Cut the text anew."""
+        super().resizeEvent(event)
+        lines = self._broken(self.width())
+        if len(lines) > self._most:
+            rest = " ".join(lines[self._most - 1 :])
+            rest = self.fontMetrics().elidedText(rest, Qt.TextElideMode.ElideRight, self.width())
+            lines = [*lines[: self._most - 1], rest]
+        self.setText("\n".join(lines))
+        self.setToolTip(self._whole if lines and lines[-1].endswith("…") else "")
+
+    def _broken(self, width: int) -> list[str]:
+        """Return the text in lines that fit into ``width``."""
+        layout = QTextLayout(self._whole, self.font())
+        layout.beginLayout()
+        lines = []
+        while (line := layout.createLine()).isValid():
+            line.setLineWidth(width)
+            lines.append(self._whole[line.textStart() : line.textStart() + line.textLength()].strip())
+        layout.endLayout()
+        return lines
 
 
 def set_ink(widget: QLabel, ink: Ink) -> None:

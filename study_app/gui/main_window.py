@@ -16,7 +16,7 @@ from study_app.gui.themed import dress, wear
 
 FULL = QSize(1440, 900)
 LEAST = QSize(1024, 640)
-NARROW_BELOW = 1300
+NARROW_BELOW = 1400
 
 
 class MainWindow(QMainWindow):

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from PySide6.QtCore import QRectF, Qt, Signal
+from PySide6.QtCore import QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
-from PySide6.QtWidgets import QHBoxLayout, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QPushButton, QSizePolicy, QVBoxLayout, QWidget
 
 from study_app.gui.cards import Logo
 from study_app.gui.icons import draw_icon
@@ -47,14 +47,23 @@ class RailButton(Themed, QPushButton):
         self.setProperty("role", "plain")
         self.setAccessibleName(word)
         self.setCursor(Qt.CursorShape.PointingHandCursor)
+        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
         self.narrow(False)
 
     def narrow(self, yes: bool) -> None:
         """Stand in a narrow rail or a wide one."""
         self._narrow = yes
         self.setText(self.short if yes else self.word)
-        self.setFixedHeight(58 if yes else 42)
+        self.updateGeometry()
         self.update()
+
+    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+        """Return the room for icon and word; a fixed height would not outlast a change of theme."""
+        return QSize(NARROW_RAIL - 24, 58) if self._narrow else QSize(WIDE_RAIL - 24, 42)
+
+    def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+        """Return the same room."""
+        return self.sizeHint()
 
     @property
     def here(self) -> bool:

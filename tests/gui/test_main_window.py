@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import pytest
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QFontMetrics
 from PySide6.QtWidgets import QPushButton, QVBoxLayout
 
 from study_app.gui.main_window import FULL, LEAST, MainWindow
 from study_app.gui.place import Place
 from study_app.gui.rail import DESTINATIONS, NARROW_RAIL, WIDE_RAIL
-from study_app.gui.theme import DARK
+from study_app.gui.theme import DARK, font
 
 
 class Room(Place):
@@ -90,3 +91,11 @@ def test_the_rail_gives_way(main, size, place, width):
     main.resize(size)
     main.go(place)
     assert main.rail.width() == width
+
+
+def test_the_words_of_a_narrow_rail_stay_whole_in_another_theme(main, qtbot):
+    main.resize(LEAST)
+    main.rail.theme_asked.emit()
+    for button in (*main.rail.buttons.values(), main.rail.switch):
+        qtbot.waitUntil(lambda button=button: button.height() == 58)
+        assert QFontMetrics(font("key")).horizontalAdvance(button.text()) <= button.width()

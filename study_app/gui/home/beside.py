@@ -7,14 +7,14 @@ from itertools import pairwise
 
 from PySide6.QtCore import QPointF, QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QLinearGradient, QPainter, QPainterPath, QPaintEvent, QPen, QRadialGradient
-from PySide6.QtWidgets import QHBoxLayout
+from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout
 
 from study_app.gui.cards import SHADOW, Card, Chip, Icon
 from study_app.gui.controls import ActionButton
 from study_app.gui.labels import label
 from study_app.gui.theme import RADIUS_CARD, TANK, font
 
-PICTURE = 64
+PICTURE = 56
 WAKE_POINTS = 48
 
 
@@ -60,16 +60,18 @@ class LabCard(Card):
     def __init__(self) -> None:
         super().__init__(padding=20, gap=6)
         self.column.addSpacing(PICTURE - 8)
-        self.column.addWidget(label("Liquid lab", "card"))
         about = label("Tune a liquid by feel and save it.", "label", "text2", wraps=True)
         about.setFont(font("label", weight=400))
-        self.column.addWidget(about)
-        self.open = ActionButton("", "Open the lab", height=38)
+        self.open = ActionButton("", "Open", height=38)
+        self.open.setAccessibleName("Open the liquid lab")
         self.open.clicked.connect(self.lab_asked)
+        words = QVBoxLayout()
+        words.setSpacing(4)
+        words.addWidget(label("Liquid lab", "card"))
+        words.addWidget(about)
         foot = QHBoxLayout()
+        foot.addLayout(words, 1)
         foot.addWidget(self.open)
-        foot.addStretch()
-        self.column.addSpacing(4)
         self.column.addLayout(foot)
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802 - Qt's name

@@ -8,10 +8,12 @@ from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QSizePolicy, QWidget
 from study_app.gui.cards import Card, Icon
 from study_app.gui.controls import ActionButton
 from study_app.gui.home.facts import BrokenFacts, StudyFacts
-from study_app.gui.labels import Elided, label
+from study_app.gui.labels import Clamped, Elided, label
 from study_app.gui.theme import font
 
 LEAST_WIDTH = 330
+LEAST_HEIGHT = 252
+ABOUT_LINES = 3
 
 
 class StudyCard(Card):
@@ -21,19 +23,16 @@ class StudyCard(Card):
     rehearsal = Signal(object)
 
     def __init__(self, facts: StudyFacts, *, first: bool) -> None:
-        super().__init__(padding=22, gap=10)
+        super().__init__(padding=20, gap=8)
         self.facts = facts
         title = Elided("card")
         title.setFont(font("card", scale=1.12))
         title.show_text(facts.title)
-        head = QHBoxLayout()
-        head.addWidget(title, 1)
-        head.addWidget(label(facts.languages, "small", "text2"))
-        self.column.addLayout(head)
-        about = label(facts.description or facts.title, "body", "text2", wraps=True)
-        about.setAlignment(Qt.AlignmentFlag.AlignTop)
-        self.column.addWidget(about, 1)
-        for icon, words in (("layers", facts.extent), ("clock", facts.duration), ("mouse", facts.force)):
+        self.column.addWidget(title)
+        self.column.addWidget(Clamped(facts.description or facts.title, ABOUT_LINES, "body", "text2"))
+        self.column.addStretch()
+        time = f"{facts.duration}  ·  {facts.languages}"
+        for icon, words in (("layers", facts.extent), ("clock", time), ("device", facts.needs)):
             row = QHBoxLayout()
             row.setSpacing(10)
             row.addWidget(Icon(icon, "text2", 18))
@@ -51,9 +50,8 @@ class StudyCard(Card):
         buttons.setSpacing(12)
         buttons.addWidget(self.new, 1)
         buttons.addWidget(self.rehearse, 1)
-        self.column.addSpacing(2)
         self.column.addLayout(buttons)
-        self.setMinimumHeight(286)
+        self.setMinimumHeight(LEAST_HEIGHT)
 
 
 class BrokenCard(Card):
@@ -71,7 +69,7 @@ class BrokenCard(Card):
         said = label(facts.problem, "label", "text2", wraps=True)
         said.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.column.addWidget(said, 1)
-        self.setMinimumHeight(286)
+        self.setMinimumHeight(LEAST_HEIGHT)
 
 
 class CardGrid(QWidget):

@@ -35,7 +35,7 @@ class StudyFacts:
     languages: str
     extent: str
     duration: str
-    force: str
+    needs: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +104,7 @@ def study_facts(source: str) -> StudyFacts | BrokenFacts:
             )
         ),
         duration=f"about {max(1, round(expected_duration_s(protocol) / 60))} min",
-        force=f"a mouse will do; at most {protocol.device.force_limit_n:g} N",
+        needs=f"Falcon or mouse; at most {protocol.device.force_limit_n:g} N",
     )
 
 

@@ -94,8 +94,8 @@ class HomePlace(Place):
         self._below.addLayout(self._beside)
         inside = QWidget()
         page = QVBoxLayout(inside)
-        page.setContentsMargins(30, 30, 30, 22)
-        page.setSpacing(20)
+        page.setContentsMargins(28, 20, 28, 12)
+        page.setSpacing(14)
         page.addLayout(head)
         page.addWidget(self.banner)
         page.addWidget(self.grid)
@@ -178,7 +178,7 @@ class HomePlace(Place):
         for card in (self.device, self.lab):
             card.setMinimumWidth(0 if stacked else BESIDE)
             card.setMaximumWidth(16_777_215 if stacked else BESIDE)
-        self.grid.arrange(self.width() - 60)
+        self.grid.arrange(self.width() - 56)
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
         """Make room: cards go below each other."""

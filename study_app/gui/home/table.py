@@ -117,7 +117,7 @@ class SessionsCard(Card):
         title = label("Sessions", "card")
         head = QWidget()
         grid = _columns(head)
-        self.all = ActionButton("chevron", "All results", role="plain", height=34)
+        self.all = ActionButton("", "All results  ›", role="plain", height=34)
         self.all.clicked.connect(self.all_asked)
         grid.addWidget(title, 0, 0)
         grid.addWidget(self.where, 0, 1, 1, 3)

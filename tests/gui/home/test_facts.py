@@ -120,7 +120,7 @@ def test_a_protocol_is_told_by_what_one_chooses_by():
     assert isinstance(facts, StudyFacts)
     assert facts.extent == "2 parts, 10 settings, 62 answers"
     assert facts.languages == "Dutch, English"
-    assert "8 N" in facts.force
+    assert "8 N" in facts.needs
     assert facts.duration.startswith("about ")
 
 
