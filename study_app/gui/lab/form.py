@@ -12,6 +12,7 @@ from study_app.gui.lab.rows import ParameterRow, SwitchRow, row_for
 from study_app.gui.lab.switch import Badge
 from study_app.gui.lab.view import FormSection, LabView, form
 from study_app.gui.labels import label
+from study_app.gui.theme import font
 from study_app.gui.themed import dress
 from study_app.lab.workbench import Setting, other
 
@@ -91,6 +92,7 @@ class FormPanel(Card):
         self.badge = Badge()
         self.liquid = Choice()
         self.liquid.setProperty("dense", "true")
+        self.liquid.setFont(font("label"))
         self.liquid.activated.connect(self._choose)
         self.copy = ActionButton("copy", "Copy to B", height=32)
         self.copy.setProperty("dense", "true")

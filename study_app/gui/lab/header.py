@@ -25,6 +25,7 @@ from study_app.gui.themed import Themed
 
 BUTTON = 44
 FREE = "Free motion"
+LETTERS = 13  # of a choice before it is cut
 
 
 class IconButton(Themed, QPushButton):
@@ -93,7 +94,8 @@ class Picker(Choice):
         self.setAccessibleName(name)
         self.setFixedHeight(BUTTON)
         self.setStyleSheet("QComboBox { padding-left: 40px; }")
-        self.setSizeAdjustPolicy(Choice.SizeAdjustPolicy.AdjustToContents)
+        self.setMinimumContentsLength(LETTERS)
+        self.setSizeAdjustPolicy(Choice.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
 
     def show_choices(self, choices: Choices, chosen: str) -> None:
         """Offer ``choices`` (value, words), of which one is chosen."""
@@ -189,7 +191,7 @@ class LabHeader(Themed, QWidget):
         self.sides.show_view(view)
         self.blind.setChecked(view.workbench.blind)
         self.device.show_choices(view.device.choices, view.device.chosen)
-        self.device.setToolTip(view.device.state)
+        self.device.setAccessibleDescription(view.device.state)
         self.path.show_choices((("", FREE), *view.paths), view.path or "")
         self.undo.setEnabled(view.workbench.may_undo)
         self.redo.setEnabled(view.workbench.may_redo)

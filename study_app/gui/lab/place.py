@@ -25,7 +25,7 @@ from study_app.gui.theme import SPACE
 
 FORM_WIDTH, FORM_WIDTH_NARROW, SIDE_WIDTH = 404, 380, 300
 LEAST = QSize(928, 560)
-WIDE, ONE_ROW = 1240, 1400
+WIDE, ONE_ROW = 1240, 1460
 GAP = 14
 SUFFIX = ".toml"
 

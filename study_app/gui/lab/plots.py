@@ -20,7 +20,7 @@ from study_app.gui.plots import MINUS, Plot, number, pen
 from study_app.gui.theme import LIGHT, Theme, font
 from study_app.gui.themed import Themed
 
-POINTS = 420  # of a curve: about one a pixel
+POINTS = 240  # of a curve: one for one to two pixels; painting takes as long as there are points
 STEPS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 MOST_TICKS, TICK_PX = 5, 22
 LEGEND_LINE, LEGEND_GAP, STROKE_WIDTH = 20, 16.0, 24.0

@@ -21,19 +21,6 @@ NAME_WIDTH = 84
 LINE = 26
 LimiterState = Literal["acting", "acted", "quiet"]
 
-LIMITERS = {
-    "slope": "Slope",
-    "non_finite": "Not a number",
-    "energy": "Energy account",
-    "norm": "Force limit",
-    "slew": "Slew",
-    "fade": "Fade at the start",
-    "stale": "Stale sample",
-    "glitch": "Glitch",
-    "stop": "Stop",
-}
-"""The limiters of a tick in people's words (``haptics.layout.LIMITER_NAMES``)."""
-
 
 class ReadingCard(Card):
     """A card whose content is hidden, in the same place, while the comparison is blind."""
@@ -204,9 +191,8 @@ class LimiterLine(Themed, QWidget):
 
     def show_limiter(self, limiter: LimiterShown) -> None:
         """Show whether it acts, acted or did not."""
-        name = LIMITERS.get(limiter.name, limiter.name)
         state: LimiterState = "acting" if limiter.acting else "acted" if limiter.ticks else "quiet"
-        self.name.show_text(name)
+        self.name.show_text(limiter.name)
         self.count.setText(grouped(limiter.ticks))
         if state != self._state:
             self._state = state
@@ -216,7 +202,7 @@ class LimiterLine(Themed, QWidget):
             self.name.setFont(font("label", weight=weight))
             self.count.setFont(font("label", weight=weight, tabular=True))
             self.update()
-        self.setAccessibleName(f"{name}: {self.word.text() or 'did not act'}, {limiter.ticks} ticks")
+        self.setAccessibleName(f"{limiter.name}: {self.word.text() or 'did not act'}, {limiter.ticks} ticks")
 
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
         """Paint tint and mark."""

@@ -9,11 +9,12 @@ import itertools
 import math
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, Qt
-from PySide6.QtGui import QColor, QPainter, QPainterPath, QPen, QPolygonF
+from PySide6.QtGui import QColor, QPainter, QPen, QPolygonF
 
 from study_app.gui.lab.view import Floats, TailShown
 from study_app.gui.tank.camera import Box, Camera
@@ -23,6 +24,7 @@ SHADES = 14  # steps of age that are told apart
 THICKEST_PX, THINNEST_PX = 5.0, 1.6
 RING_PX = 4.6
 HEAD_PX = 11.0
+STEP_PX = 2.5
 LEAST_FOR_HEAD_PX = 46.0  # of a segment's length on the screen
 
 
@@ -30,46 +32,46 @@ LEAST_FOR_HEAD_PX = 46.0  # of a segment's length on the screen
 class TailPlaces:
     """Runs of one shade from the oldest to the newest, where segments begin, and an arrow head (place, turn) on each.
 
-    ``floor`` is the tail's shadow, one path.
+    ``floor`` is the tail's shadow.
     """
 
     runs: tuple[tuple[int, QPolygonF], ...]
     breaks: tuple[QPointF, ...]
     heads: tuple[tuple[QPointF, float, int], ...]
-    floor: QPainterPath
+    floor: tuple[QPolygonF, ...]
 
 
 def tail_places(tail: TailShown, camera: Camera, box: Box) -> TailPlaces:
     """Return where a tail goes on the screen of ``camera``."""
+    count = len(tail.positions_m)
     x, y, z = (np.clip(tail.positions_m[:, k], *span) for k, span in enumerate(_inside(box)))
-    px, py = camera.point((x, y, z))  # type: ignore[arg-type]  # arithmetic alone: whole columns at once
-    fx, fy = camera.point((x, np.full_like(x, box.floor), z))  # type: ignore[arg-type]
+    pixels = _pixels(camera, x, y, z)
+    floor = _pixels(camera, x, np.full(count, box.floor), z)
     shades = np.minimum((tail.ages * SHADES).astype(int), SHADES - 1)
-    starts = np.flatnonzero(tail.breaks)
-    bounds = [0, *(int(start) for start in starts if start), len(x)]
-    floor = QPainterPath()
+    bounds = [0, *(int(start) for start in np.flatnonzero(tail.breaks) if start), count]
     runs: list[tuple[int, QPolygonF]] = []
+    shadows: list[QPolygonF] = []
     heads: list[tuple[QPointF, float, int]] = []
-    for first, last in itertools.pairwise(bounds):
-        span = slice(max(0, first - 1), last)  # a segment begins where the one before ended
-        points = _points(np.asarray(px)[span], np.asarray(py)[span])
-        runs += _runs(points, shades[span])
-        floor.addPolygon(QPolygonF(_points(np.asarray(fx)[span], np.asarray(fy)[span])))
-        head = _head(np.asarray(px)[span], np.asarray(py)[span])
+    for first, behind in itertools.pairwise(bounds if count else ()):
+        rows = np.arange(max(0, first - 1), behind)  # a segment begins where the one before ended
+        rows = rows[_kept(pixels[rows])]
+        runs += _runs(_points(pixels[rows]), shades[rows])
+        shadows.append(QPolygonF(_points(floor[rows])))
+        head = _head(pixels[rows])
         if head is not None:
-            heads.append((*head, int(shades[(span.start + last - 1) // 2])))
-    rings = tuple(QPointF(float(px[k - 1]), float(py[k - 1])) for k in bounds[1:-1])  # type: ignore[index]
-    first_place = (QPointF(float(px[0]), float(py[0])),) if len(x) else ()  # type: ignore[index]
-    return TailPlaces(tuple(runs), (*first_place, *rings), tuple(heads), floor)
+            place, turn, row = head
+            heads.append((place, turn, int(shades[rows[row]])))
+    begins = [0, *(bound - 1 for bound in bounds[1:-1])] if count else []
+    return TailPlaces(tuple(runs), tuple(_points(pixels[begins])), tuple(heads), tuple(shadows))
 
 
 def paint_floor(painter: QPainter, places: TailPlaces) -> None:
     """Paint the tail's shadow on the floor."""
     ink = QColor(TANK.shadow)
     ink.setAlphaF(0.44)
-    painter.setBrush(Qt.BrushStyle.NoBrush)
-    painter.setPen(_round(ink, 3.0))
-    painter.drawPath(places.floor)
+    painter.setPen(QPen(ink, 3.0, Qt.PenStyle.SolidLine, Qt.PenCapStyle.FlatCap, Qt.PenJoinStyle.BevelJoin))
+    for points in places.floor:
+        painter.drawPolyline(points)
 
 
 def paint_tail(painter: QPainter, places: TailPlaces) -> None:
@@ -128,20 +130,32 @@ def _runs(points: list[QPointF], shades: NDArray[np.int_]) -> list[tuple[int, QP
     ]
 
 
-def _head(px: Floats, py: Floats) -> tuple[QPointF, float] | None:
-    """Return the middle of a segment's length and its direction there; None where it is too short for a head."""
-    steps = np.hypot(np.diff(px), np.diff(py))
+def _head(pixels: Floats) -> tuple[QPointF, float, int] | None:
+    """Return the middle of a segment's length, its direction there, and the row; None where it is too short."""
+    steps = np.hypot(*np.diff(pixels, axis=0).T)
     length = float(steps.sum())
     if length < LEAST_FOR_HEAD_PX:
         return None
-    k = int(np.searchsorted(np.cumsum(steps), 0.55 * length))
-    back, ahead = max(0, k - 2), min(len(px) - 1, k + 2)
-    turn = math.atan2(float(py[ahead] - py[back]), float(px[ahead] - px[back]))
-    return QPointF(float(px[k]), float(py[k])), turn
+    row = int(np.searchsorted(np.cumsum(steps), 0.55 * length))
+    right, down = pixels[min(len(pixels) - 1, row + 1)] - pixels[max(0, row - 1)]
+    return QPointF(*pixels[row].tolist()), math.atan2(down, right), row
 
 
-def _points(px: Floats, py: Floats) -> list[QPointF]:
-    return [QPointF(x, y) for x, y in zip(px.tolist(), py.tolist(), strict=True)]
+def _kept(pixels: Floats) -> NDArray[np.int_]:
+    """Return the rows that are drawn: both ends, and one in every few px between."""
+    arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(pixels, axis=0).T))])
+    kept = np.flatnonzero(np.diff(np.floor(arc / STEP_PX), prepend=-1.0))
+    return np.unique(np.append(kept, len(pixels) - 1))
+
+
+def _pixels(camera: Camera, x: Floats, y: Floats, z: Floats) -> Floats:
+    """Return where points, a column each, fall on the screen: (n, 2) px."""
+    place: Any = camera.point((x, y, z))  # type: ignore[arg-type]  # arithmetic alone: whole columns at once
+    return np.column_stack(place)
+
+
+def _points(pixels: Floats) -> list[QPointF]:
+    return [QPointF(across, down) for across, down in pixels.tolist()]
 
 
 def _round(ink: QColor, width: float) -> QPen:

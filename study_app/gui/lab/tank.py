@@ -6,6 +6,7 @@ With the mouse as the device a click takes the pointer for the ball, as in a ses
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import TypeAlias
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
@@ -13,6 +14,7 @@ from PySide6.QtGui import (
     QColor,
     QFontMetricsF,
     QHideEvent,
+    QImage,
     QKeyEvent,
     QMouseEvent,
     QPainter,
@@ -65,7 +67,7 @@ class LabTank(Themed, QWidget):
         self._box = Box.around((0.1, 0.06, 0.06), 0.0034)
         self._placer: BallPlacer | None = None
         self._key: object = None
-        self._chip_font = font("label", weight=600, tabular=True)
+        self._name_font = font("label", weight=600)
         self.pointer = PointerCapture(self)
         self.pointer.moved.connect(self.moved)
         self.pointer.pressed.connect(self._press)
@@ -212,13 +214,13 @@ class LabTank(Themed, QWidget):
             painter.setPen(QPen(colour, width, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
             painter.drawLine(start, tip - along * (5.0 / length))
         draw_head(painter, tip, math.atan2(along.y(), along.x()), ink, 13.0)
-        wide = QFontMetricsF(self._chip_font).horizontalAdvance(word)
+        wide = QFontMetricsF(self._name_font).horizontalAdvance(word)
         middle = tip + along * ((12.0 + wide / 2) / length)
         place = QRectF(middle.x() - wide / 2, middle.y() - 9, wide, 18)
         if place.intersects(taken):
             place.moveTop(taken.bottom() + 2 if middle.y() >= taken.center().y() else taken.top() - 20)
         letters = QPainterPath()
-        letters.addText(place.left(), place.bottom() - 4.5, self._chip_font, word)
+        letters.addText(place.left(), place.bottom() - 4.5, self._name_font, word)
         painter.strokePath(letters, QPen(QColor(TANK.shadow), 2.6))
         painter.fillPath(letters, ink)
         return place
@@ -266,27 +268,12 @@ class LabTank(Themed, QWidget):
             self._chip(painter, right, self.width() - CHIP_EDGE - self._wide(right), beside)
 
     def _wide(self, words: Words) -> float:
-        text, icon = words
-        return QFontMetricsF(self._chip_font).horizontalAdvance(text) + (24 if icon else 0) + 24
+        return plate(words, self.devicePixelRatioF()).width() / self.devicePixelRatioF() if words[0] else 0.0
 
     def _chip(self, painter: QPainter, words: Words, left: float, top: float) -> None:
         """Paint words on a dark plate."""
-        text, icon = words
-        if not text:
-            return
-        plate = QRectF(left, top, self._wide(words), CHIP_HEIGHT)
-        ground = QColor(PARTICIPANT.window)
-        ground.setAlphaF(0.74)
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(ground)
-        painter.drawRoundedRect(plate, 7, 7)
-        if icon == RING:
-            draw_ring(painter, QPointF(left + 18, plate.center().y()))
-        elif icon:
-            draw_icon(painter, icon, QRectF(left + 10, top + 7, 16, 16), PARTICIPANT.text, 2.0)
-        painter.setPen(QColor(PARTICIPANT.text))
-        painter.setFont(self._chip_font)
-        painter.drawText(plate.adjusted(36 if icon else 12, 0, 0, 0), Qt.AlignmentFlag.AlignVCenter, text)
+        if words[0]:
+            painter.drawImage(QPointF(left, top), plate(words, self.devicePixelRatioF()))
 
     def _paint_corners(self, painter: QPainter) -> None:
         """Round the corners with the window's colour, and paint the focus ring."""
@@ -305,3 +292,31 @@ def _beyond(start: Point, vector: Point, scale: float) -> Point:
     """Return where an arrow from ``start`` ends."""
     x, y, z = (a + scale * v for a, v in zip(start, vector, strict=True))
     return x, y, z
+
+
+@lru_cache(maxsize=64)
+def plate(words: Words, ratio: float) -> QImage:
+    """Return words with their icon on a dark plate, for a screen of pixel ratio ``ratio``."""
+    text, icon = words
+    face = font("label", weight=600, tabular=True)
+    wide = QFontMetricsF(face).horizontalAdvance(text) + (24 if icon else 0) + 24
+    image = QImage(math.ceil(wide * ratio), math.ceil(CHIP_HEIGHT * ratio), QImage.Format.Format_ARGB32_Premultiplied)
+    image.setDevicePixelRatio(ratio)
+    image.fill(Qt.GlobalColor.transparent)
+    painter = QPainter(image)
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+    ground = QColor(PARTICIPANT.window)
+    ground.setAlphaF(0.74)
+    painter.setPen(Qt.PenStyle.NoPen)
+    painter.setBrush(ground)
+    painter.drawRoundedRect(QRectF(0, 0, wide, CHIP_HEIGHT), 7, 7)
+    if icon == RING:
+        draw_ring(painter, QPointF(18, CHIP_HEIGHT / 2))
+    elif icon:
+        draw_icon(painter, icon, QRectF(10, 7, 16, 16), PARTICIPANT.text, 2.0)
+    painter.setPen(QColor(PARTICIPANT.text))
+    painter.setFont(face)
+    room = QRectF(36 if icon else 12, 0, wide, CHIP_HEIGHT)
+    painter.drawText(room, Qt.AlignmentFlag.AlignVCenter, text)
+    painter.end()
+    return image

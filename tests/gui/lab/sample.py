@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 
 from study_app.gui.lab.view import CostRow, DeviceShown, ErrorRow, LabView, Now
-from study_app.haptics.layout import LIMITER_NAMES, SAMPLE, records
+from study_app.haptics.layout import SAMPLE, records
 from study_app.haptics.mirror import new_trail, take_again
 from study_app.haptics.pack import pack
 from study_app.haptics.safety import begin_scene, new_safety
 from study_app.haptics.scene import Scene
+from study_app.lab.limiters import LimiterCounts
 from study_app.lab.shadow import Shadow
 from study_app.lab.workbench import Setting, Workbench
 from study_app.protocol.load import load_scene
@@ -31,13 +32,6 @@ LEG_S = (0.3, 0.35, 0.45, 0.16, 0.16, 0.16, 0.42, 0.40)
 @dataclass(frozen=True)
 class Choice:
     title: str
-
-
-@dataclass(frozen=True)
-class Limiter:
-    name: str
-    ticks: int
-    acting: bool
 
 
 def hand() -> Any:
@@ -83,7 +77,9 @@ def lab_view(bench: Workbench | None = None, *, cut: int | None = None, **fields
     shadow.expect(1, bench.felt, bench.a.scene, bench.b.scene)
     shadow.take(samples)
     last = samples[-1]
-    acted = [int(np.count_nonzero(samples.limiters & 1 << bit)) for bit in range(len(LIMITER_NAMES))]
+    counts = LimiterCounts()
+    for first in range(0, len(samples), 33):
+        counts.add(samples[first : first + 33])
     shown: dict[str, Any] = {
         "workbench": bench,
         "liquids": tuple(Choice(title) for title in ("Water", "Honey", "Light oil", "Syrup")),
@@ -93,10 +89,7 @@ def lab_view(bench: Workbench | None = None, *, cut: int | None = None, **fields
         "tail_a": shadow.tail("A"),
         "tail_b": shadow.tail("B"),
         "now": Now(tuple(last.position_m), tuple(last.device_force_n), tuple(last.wake_mps)),
-        "limiters": tuple(
-            Limiter(name, ticks, acting=bool(last.limiters & 1 << bit))
-            for bit, (name, ticks) in enumerate(zip(LIMITER_NAMES, acted, strict=True))
-        ),
+        "limiters": counts.told(8.0),
         "cost": (
             CostRow("Wake", 84.0), CostRow("Safety", 31.0), CostRow("Drag", 24.0), CostRow("Velocity", 18.0),
             CostRow("Tests", 4.0), CostRow("Buoyancy", None, "out, 0.00 N"),
