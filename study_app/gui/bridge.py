@@ -8,21 +8,19 @@ from __future__ import annotations
 
 import logging
 import sys
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable
 from functools import wraps
 from types import TracebackType
-from typing import Concatenate, ParamSpec, Protocol
+from typing import Concatenate, ParamSpec
 
 from PySide6.QtCore import QObject, Qt, QTimer, Signal
 
 from study_app.errors import SessionError, StudyError
-from study_app.gui.operator.health import ServoHealth
-from study_app.gui.operator.view import OperatorView, Session, operator_view
-from study_app.gui.operator.watch import WatchedJournal
+from study_app.gui.lookout import Lookout
+from study_app.gui.operator.view import OperatorView
 from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.participant import ParticipantWindow
-from study_app.protocol.schedule import Schedule
+from study_app.gui.session_parts import Hand, Parts
 from study_app.session.events import (
     Begin,
     Broke,
@@ -36,56 +34,14 @@ from study_app.session.events import (
     ResumeAsked,
 )
 from study_app.session.pages import Page, TaskPage
-from study_app.session.ports import Ports, RecorderPort, ServoPort
-from study_app.session.resume import FIRST, Start
-from study_app.session.runner import Runner, TankView
+from study_app.session.ports import Ports
+from study_app.session.runner import Runner
 
 TRACE_MS = 33
 TILES_MS = 500
 END_SHOWN_MS = 5000
 log = logging.getLogger(__name__)
 P = ParamSpec("P")
-
-
-class ServoPanel(ServoPort, Protocol):
-    """What is asked of the servo here, beyond what the runner asks."""
-
-    @property
-    def force_is_on(self) -> bool: ...  # noqa: D102
-    @property
-    def overruns(self) -> int: ...  # noqa: D102
-
-
-class Hand(Protocol):
-    """A simulated hand: acts on what it sees, and tells whether it wants to go on."""
-
-    def act(self, now_s: float, view: TankView) -> bool: ...  # noqa: D102
-
-
-@dataclass(frozen=True, slots=True)
-class Parts:
-    """What a session is made of, but for its windows.
-
-    ``session`` is what the operator sees of it throughout; ``key`` is block → code → condition, never shown; ``start``
-    is where a resumed session goes on. ``exclude`` leaves a trial, or with None the session, out of the analysis for a
-    reason. ``aim_m`` gives where hand or pointer mean to be [m, hand frame]; ``point_to`` and ``press`` pass the mouse
-    on, None where the device is not the mouse; ``hand_for`` makes the simulated hand for a page, None with a real hand.
-    """
-
-    session: Session
-    schedule: Schedule
-    key: Mapping[str, Mapping[str, str]] = field(repr=False)
-    language: str
-    servo: ServoPanel
-    journal: WatchedJournal
-    clock: Callable[[], float]
-    aim_m: Callable[[], tuple[float, float, float]]
-    recorder: RecorderPort | None = None
-    start: Start = FIRST
-    exclude: Callable[[int | None, str], None] | None = None
-    point_to: Callable[[float, float, float], None] | None = None
-    press: Callable[[int], None] | None = None
-    hand_for: Callable[[Page], Hand | None] | None = None
 
 
 def _guarded(
@@ -108,7 +64,8 @@ def _guarded(
 class SessionBridge(QObject):
     """Runs one session in two windows.
 
-    ``done`` comes once, when the session is over and its windows may go.
+    ``done`` comes once, when the session is over and its windows may go; ``diagnose_asked`` when the operator wants to
+    know what is wrong with the device: the force is off and the session paused by then.
 
     Parameters
     ----------
@@ -121,6 +78,7 @@ class SessionBridge(QObject):
     """
 
     done = Signal()
+    diagnose_asked = Signal()
 
     def __init__(
         self, parts: Parts, participant: ParticipantWindow, operator: OperatorWindow, *, refresh_hz: float = 60.0
@@ -129,17 +87,14 @@ class SessionBridge(QObject):
         self.parts = parts
         self.participant = participant
         self.operator = operator
-        self.health = ServoHealth(parts.servo.rate_hz, refresh_hz)
+        self.lookout = Lookout(parts, refresh_hz)
         self.trouble = ""
         self.failure: BaseException | None = None
         ports = Ports(parts.servo, parts.journal, self.present, parts.clock, parts.recorder)
         self.runner = Runner(parts.session.protocol, parts.schedule, parts.key, ports, parts.language, parts.start)
-        self._reader = parts.servo.telemetry.reader()
         self._hand: Hand | None = None
         self._gone = False
         self._stalled: str | None = None
-        self._faulty = False
-        self._faults = 0
         self._hook_before = sys.excepthook
         self._timers = (
             self._timer(max(4, round(1000 / refresh_hz)), self._frame, precise=True),
@@ -169,6 +124,8 @@ class SessionBridge(QObject):
         operator.mark_set.connect(self._mark)
         operator.exclude_asked.connect(self._exclude)
         operator.close_asked.connect(self._close)
+        operator.diagnose_asked.connect(self._diagnose)
+        operator.escape.leave_to(participant)
         participant.event.connect(self._event)
         participant.painted.connect(self._painted)
         if self.parts.point_to is not None:
@@ -180,7 +137,7 @@ class SessionBridge(QObject):
         self.participant.show_page(page)
         self._hand = self.parts.hand_for(page) if self.parts.hand_for is not None else None
         if not isinstance(page, TaskPage):
-            self.health.frames_rest()
+            self.lookout.health.frames_rest()
 
     def start(self) -> None:
         """Begin the session."""
@@ -231,13 +188,10 @@ class SessionBridge(QObject):
     @_guarded
     def _frame(self) -> None:
         """Look at the device, and draw the tank as late as the trial asks."""
-        parts = self.parts
-        self._count_faults()
         self.runner.poll()
-        self.health.take(self._reader.read())
+        self.lookout.look()
         now_s = self._now()
-        self.health.hand(now_s, parts.aim_m())
-        view = self.runner.view(parts.servo.now_ns())
+        view = self.runner.view(self.parts.servo.now_ns())
         if view is None:
             return
         self.participant.show_view(view)
@@ -249,16 +203,15 @@ class SessionBridge(QObject):
         """Keep when a frame was painted; on the servo's clock, which is not every system's monotonic one."""
         painted_ns = self.parts.servo.now_ns()
         self.runner.frame_shown(painted_ns, sample_ns)
-        self.health.frame(painted_ns)
+        self.lookout.health.frame(painted_ns)
 
     @_guarded
     def _traces(self) -> None:
-        self.operator.show_traces(self.health, self._now())
+        self.lookout.show_traces(self.operator)
 
     @_guarded
     def _tiles(self) -> None:
-        self.health.overruns = self.parts.servo.overruns
-        self.operator.show_lateness(self.health)
+        self.lookout.show_lateness(self.operator)
         self._show()
 
     def _changed(self) -> None:
@@ -273,28 +226,9 @@ class SessionBridge(QObject):
     def _show(self) -> None:
         self.operator.show_view(self.view())
 
-    def _count_faults(self) -> None:
-        """Count the servo going from well to faulty."""
-        faulty = self.parts.servo.fault is not None
-        self._faults += faulty and not self._faulty
-        self._faulty = faulty
-
     def view(self) -> OperatorView:
         """Return what the operator is to see now."""
-        parts = self.parts
-        self._count_faults()
-        return operator_view(
-            parts.session,
-            parts.journal.progress,
-            self.health.vitals(),
-            now_s=self._now(),
-            force_on=parts.servo.force_is_on,
-            trouble=self.trouble or parts.servo.fault or self.runner.stalled or "",
-            waits=self.runner.stalled is not None and not self.trouble,
-            device_ready=not self._faulty,
-            faults=self._faults,
-            rate_hz=parts.servo.rate_hz,
-        )
+        return self.lookout.view(self.trouble, self.runner.stalled)
 
     @_guarded
     def _stop_force(self) -> None:
@@ -310,6 +244,16 @@ class SessionBridge(QObject):
     @_guarded
     def _resume(self) -> None:
         self._post(ResumeAsked(self._now(), "operator"))
+
+    @_guarded
+    def _diagnose(self) -> None:
+        """Zero force and a pause first: a device that is looked at must not push."""
+        self.parts.servo.stop_force()
+        try:
+            if not self.runner.finished:
+                self._post(ForceStopped(self._now(), "operator"))
+        finally:
+            self.diagnose_asked.emit()
 
     @_guarded
     def _pause(self) -> None:

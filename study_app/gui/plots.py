@@ -5,6 +5,7 @@ Horizontal grid only, few ticks, curves named at their ends and told apart by st
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -25,7 +26,10 @@ STROKE = 2.0
 NOTHING = QPen(QColor(0, 0, 0, 0))
 # Dash and gap in stroke widths: x solid, y long dashes, z dots.
 DASHES: tuple[tuple[float, float] | None, ...] = (None, (6.0, 3.0), (1.0, 1.6))
-NAME_MARGIN = 1.0  # around names in the plot of ticks [px]
+LINE_PX = 16.0  # a line of the plots' texts
+NAME_MARGIN = 1.0  # around names [px]
+NAMES_AFTER_PX = 6.0  # from a curve's end to its name
+HALF_TICK_PX = 24.0  # half of "10 000" under the end of an axis
 MOST_FOR_NAMES = 0.5  # of that plot's height
 P99_ABOVE = 0.1  # the highest the 99th percentile's line ends above the top grid line [decades]
 NAMES = ("x right", "y up", "z near")
@@ -117,49 +121,78 @@ class TracePlot(Plot):
         Seconds shown.
     reach
         Values from −reach to reach are shown; where a curve goes beyond, the plot widens.
+    names
+        What the curves are called.
     """
 
-    def __init__(self, span_s: float, reach: float) -> None:
+    def __init__(self, span_s: float, reach: float, names: Sequence[str] = NAMES) -> None:
         super().__init__()
         self._span_s = span_s
-        self._reach = 0.0
-        self.curves = [pg.PlotCurveItem(antialias=True) for _ in NAMES]
-        self.ends = [pg.TextItem(name, anchor=(0, 0.5)) for name in NAMES]
+        self._asked = self._reach = reach
+        self._rows_and_step = (0, 0.0)
+        self._name_height = self._names_after_s = 0.0
+        self._newest: list[float] = []
+        self.curves = [pg.PlotCurveItem(antialias=True) for _ in names]
+        self.ends = [pg.TextItem(name, anchor=(0, 0.5)) for name in names]
         for item in (*self.curves, *self.ends):
             self.box.addItem(item)
         for end in self.ends:
             end.textItem.setFont(font("small", weight=600))
+            end.textItem.document().setDocumentMargin(NAME_MARGIN)
             end.setVisible(False)
-        self.box.setXRange(-1.02 * span_s, 0.08 * span_s, padding=0)
-        self.show_ticks("bottom", [(-t, "0 s" if t == 0 else f"{MINUS}{t} s") for t in range(0, int(span_s) + 1, 2)])
-        self._show_reach(reach)
+        self.box.sigResized.connect(self._make_room)
+        self.show_ticks("bottom", time_ticks(span_s))
+        self._make_room()
         self.wear(LIGHT)
 
-    def _show_reach(self, reach: float) -> None:
-        step = next(step for step in (5, 10, 20, 25, 50, 100, 200, 500, 1000) if reach / step <= 3.01 or step == 1000)
-        rows = max(1, int(np.ceil(reach / step - 1e-9)))
+    def show_reach(self, reach: float) -> None:
+        """Show values from −reach to reach, and as much more as makes even ticks."""
+        if reach != self._asked:
+            self._asked = reach
+            self._make_room()
+
+    def _make_room(self) -> None:
+        """Keep room in px for the names at the right and for half a line above and below the outermost ticks."""
+        height, width = max(60.0, self.box.height()), max(120.0, self.box.width())
+        most = 3 if height > 130 else 2 if height > 84 else 1  # grid lines on either side of zero
+        step = step_for(self._asked, most)
+        rows = max(1, int(np.ceil(self._asked / step - 1e-9)))
         self._reach = rows * step
-        self.box.setYRange(-1.08 * self._reach, 1.08 * self._reach, padding=0)
-        self.show_ticks("left", [(k * step, number(k * step)) for k in range(-rows, rows + 1)])
+        self._name_height = 2 * self._reach * (LINE_PX + 1) / (height - LINE_PX)
+        beyond = self._reach * height / (height - LINE_PX)
+        self.box.setYRange(-beyond, beyond, padding=0)
+        named = max(end.textItem.boundingRect().width() for end in self.ends) + NAMES_AFTER_PX + 2
+        share = min(0.4, named / width)
+        self._names_after_s = 1.02 * self._span_s / (1 - share) * NAMES_AFTER_PX / width
+        self.box.setXRange(-1.02 * self._span_s, 1.02 * self._span_s * share / (1 - share), padding=0)
+        if (rows, step) != self._rows_and_step:
+            self._rows_and_step = (rows, step)
+            self.show_ticks("left", [(k * step, number(k * step)) for k in range(-rows, rows + 1)])
+        self._place_names()
 
     def show_traces(self, times_s: Floats, values: Floats) -> None:
-        """Draw ``values`` (n, 3) over ``times_s`` (n,), zero being now."""
+        """Draw ``values`` (n, curves) over ``times_s`` (n,), zero being now."""
         if len(values) and float(np.nanmax(np.abs(values))) > 1.08 * self._reach:
-            self._show_reach(float(np.nanmax(np.abs(values))))
+            self.show_reach(float(np.nanmax(np.abs(values))))
         for axis, curve in enumerate(self.curves):
             curve.setData(times_s, values[:, axis])
+        self._newest = [float(value) for value in values[-1]] if len(values) else []
         for end in self.ends:
             end.setVisible(len(values) > 0)
-        if len(values):
-            heights = _apart(values[-1], 0.17 * self._reach)
-            for end, height in zip(self.ends, heights, strict=True):
-                end.setPos(QPointF(0.01 * self._span_s, height))
+        self._place_names()
+
+    def _place_names(self) -> None:
+        """Put every name at its curve's newest end, or as near to it as the others and the plot's edges let it."""
+        if not self._newest:
+            return
+        for end, height in zip(self.ends, apart(self._newest, self._name_height, self._reach), strict=True):
+            end.setPos(QPointF(self._names_after_s, height))
 
     def wear(self, theme: Theme) -> None:
         """Take the colours of ``theme``."""
         super().wear(theme)
         colours = (theme.trace_x, theme.trace_y, theme.trace_z)
-        for curve, end, colour, dash in zip(self.curves, self.ends, colours, DASHES, strict=True):
+        for curve, end, colour, dash in zip(self.curves, self.ends, colours, DASHES, strict=False):
             curve.setPen(pen(colour, STROKE, dash))
             end.setColor(QColor(colour))
 
@@ -189,7 +222,6 @@ class LatenessPlot(Plot):
         if (across, up) == self._decades:
             return
         self._decades = (across, up)
-        self.box.setXRange(-0.02 * across, 1.08 * across, padding=0)
         self._make_room()
         self.show_ticks("bottom", [(k, number(10.0**k)) for k in range(across + 1)])
         self.show_ticks("left", [(k, number(10.0**k)) for k in range(up + 1)])
@@ -197,6 +229,8 @@ class LatenessPlot(Plot):
     def _make_room(self) -> None:
         """Keep two lines of text free above the bars: the limit's name stands above that of the 99th percentile."""
         across, up = self._decades
+        beside = min(0.2, HALF_TICK_PX / max(1.0, self.box.width()))  # half of the last tick's text
+        self.box.setXRange(-0.02 * across, across * (1 + beside / (1 - beside)), padding=0)
         line = self.limit_name.textItem.boundingRect().height() + NAME_MARGIN
         share = min(2 * line / max(1.0, self.box.height()), MOST_FOR_NAMES)
         top = (up + P99_ABOVE + 0.3 * share) / (1 - share)
@@ -232,16 +266,31 @@ class LatenessPlot(Plot):
         self.limit_name.setColor(QColor(theme.bad))
 
 
-def _apart(places: Floats, least: float) -> list[float]:
-    """Return ``places`` moved as little as their order allows so that names there do not touch."""
-    order = np.argsort(places)
-    moved = places[order].astype(float)
+def step_for(reach: float, most: int) -> float:
+    """Return the least even step between ticks (1, 2 or 5 times a power of ten) that ``reach`` holds ``most`` times."""
+    least = max(reach, 1e-9) / (most + 0.01)
+    power = 10.0 ** np.floor(np.log10(least))
+    return float(next(power * step for step in (1, 2, 5, 10) if power * step >= least))
+
+
+def time_ticks(span_s: float) -> list[tuple[float, str]]:
+    """Return a tick every two seconds before now."""
+    return [(-t, "0 s" if t == 0 else f"{MINUS}{t} s") for t in range(0, int(span_s) + 1, 2)]
+
+
+def apart(places: Sequence[float], least: float, reach: float) -> list[float]:
+    """Return ``places`` moved as little as their order allows so that names there do not touch, within ±reach."""
+    order = np.argsort(places, kind="stable")
+    moved = np.asarray(places, float)[order]
     for _ in range(8):
         for i in range(len(moved) - 1):
             lack = least - (moved[i + 1] - moved[i])
             if lack > 0:
                 moved[i] -= lack / 2
                 moved[i + 1] += lack / 2
+    rank = np.arange(len(moved))
+    moved = np.maximum(moved, -reach + least * rank)
+    moved = np.minimum(moved, reach - least * rank[::-1])
     back = np.empty_like(moved)
     back[order] = moved
     return [float(place) for place in back]

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING
 from study_app.devices import is_simulated, kind_of, moves_by_itself
 from study_app.devices.hand_orders import HandOrders, hand_of
 from study_app.devices.mouse import MouseDevice
-from study_app.gui.bridge import Parts, SessionBridge
+from study_app.gui.bridge import SessionBridge
 from study_app.gui.operator import OperatorWindow
 from study_app.gui.operator.progress import SessionProgress, progress_after, stages
 from study_app.gui.operator.view import Session
 from study_app.gui.operator.watch import WatchedJournal
 from study_app.gui.participant import ParticipantWindow
 from study_app.gui.screens import choose_screens, place
+from study_app.gui.session_parts import Parts
 from study_app.protocol.describe import expected_duration_s
 from study_app.protocol.model import Protocol, Reach
 from study_app.protocol.schedule import Schedule, stream
@@ -63,6 +64,7 @@ def open_windows(
         lateness_limit_s=protocol.limits.lateness_ms / 1000,
         reach_m=max(device.workspace_m),
         pointer=by_mouse,
+        force_limit_n=protocol.device.force_limit_n if protocol.study.blinding == "single" else None,
         theme=theme,
     )
     participant = ParticipantWindow(
@@ -114,7 +116,7 @@ def _excluder(chosen: NewSession) -> Callable[[int | None, str], None]:
 
 
 def _facts(chosen: NewSession, protocol: Protocol, schedule: Schedule, machine: Machine) -> Session:
-    """Return what the operator's window says throughout; the force's share of its limit stays hidden."""
+    """Return what the operator's window says throughout."""
     seen_alone, nobody = chosen.device in {"mouse", "spacemouse"}, is_simulated(chosen.device)
     return Session(
         protocol=protocol,
@@ -128,7 +130,6 @@ def _facts(chosen: NewSession, protocol: Protocol, schedule: Schedule, machine: 
         device_rows=(
             ("Priority", str(machine.servo.describe()["priority"]).partition(" (")[0]),
             *_calibration(machine.device),
-            (f"Force sent, share of {protocol.device.force_limit_n:g} N limit", "hidden"),
         ),
     )
 

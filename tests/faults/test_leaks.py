@@ -1,4 +1,4 @@
-"""A double-blind session to its end: nothing that can be seen or read tells a condition."""
+"""A session to its end: nothing that can be read tells a condition, nor, while it is double-blind, can be seen."""
 
 from __future__ import annotations
 
@@ -13,9 +13,13 @@ from PySide6.QtWidgets import QApplication, QLabel, QWidget
 from study_app import app
 from study_app.gui import beginning
 from study_app.gui.operator import OperatorWindow
+from study_app.gui.operator.force_plots import ForceCard
+from study_app.gui.operator.plots import HiddenForceCard
 from study_app.gui.participant import ParticipantWindow
 from study_app.protocol.load import load, source_bytes
 from study_app.session.pages import TaskPage
+from study_app.store import receipt
+from study_app.store.layout import StudyFolder
 from study_app.store.leaks import leaks, telltales
 from tests.compiled import needs_servo
 from tests.faults import short
@@ -44,11 +48,16 @@ CONCEALED = (
 )
 
 
+@pytest.fixture(params=["double", "single"])
+def blinding(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
 @pytest.fixture
-def concealed(tmp_path: Path) -> Path:
+def concealed(tmp_path: Path, blinding: str) -> Path:
     path = short.write(tmp_path)
     text = path.read_text(encoding="utf-8")
-    for pattern, word in CONCEALED:
+    for pattern, word in (*CONCEALED, (r'blinding = "double"', f'blinding = "{blinding}"')):
         text, found = re.subn(pattern, word, text)
         assert found, pattern
     path.write_text(text, encoding="utf-8")
@@ -70,14 +79,17 @@ def words_of(top: QWidget) -> set[str]:
 def traces_of(operator: OperatorWindow) -> set[str]:
     """Return names and labels of all that is plotted, and what stands where the force would be."""
     named = set()
-    for card in (operator.lateness, operator.position):
-        for item in card.plot.items():
+    plots = [operator.lateness.plot, operator.position.plot]
+    if isinstance(operator.force, ForceCard):
+        plots += [operator.force.plot, operator.force.wake]
+    for plot in plots:
+        for item in plot.items():
             named |= {str(getattr(item, "toPlainText", str)()), str(getattr(item, "labelText", ""))}
     return named | {label.text() for label in operator.force.findChildren(QLabel)}
 
 
 def test_nothing_seen_written_or_logged_tells_a_condition(
-    concealed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+    concealed: Path, blinding: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr(beginning, "MEASURED_S", 0.1)
     caplog.set_level(logging.DEBUG)
@@ -93,7 +105,7 @@ def test_nothing_seen_written_or_logged_tells_a_condition(
         if isinstance(participant.page, TaskPage):
             tasks.add(participant.page.trial)
             operator.mark_set.emit()
-        forces.append(operator.force.isVisible())
+        forces.append(type(operator.force))
         return False
 
     told: list[str] = []
@@ -120,4 +132,8 @@ def test_nothing_seen_written_or_logged_tells_a_condition(
     for text in (*said, *told, *logged):
         assert words.in_text(text) == [], text
     assert leaks(results, protocol) == []
+    assert set(forces) == {HiddenForceCard if blinding == "double" else ForceCard}
+    assert [receipt.read(one.receipt)["protocol"]["study"]["blinding"] for one in StudyFolder(results).sessions()] == [
+        blinding
+    ]
     assert len(said) > 100

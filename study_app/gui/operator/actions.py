@@ -33,6 +33,7 @@ class Actions(Card):
         self.end = ActionButton("cross", "End session …", role="danger")
         self.close_session = ActionButton("check", "Close session", role="primary")
         self._resumes = False
+        self._signs = True
         row = QHBoxLayout()
         row.setSpacing(14)
         row.addWidget(self.pause)
@@ -50,10 +51,21 @@ class Actions(Card):
         self.end.clicked.connect(self.end_asked)
         self.close_session.clicked.connect(self.close_asked)
 
+    def narrow(self, yes: bool) -> None:
+        """Do without the buttons' signs where there is no room for them."""
+        self._signs = not yes
+        for button, sign in ((self.repeat, "repeat"), (self.exclude, "flag"), (self.end, "cross")):
+            button.show_action("" if yes else sign, button.text())
+        self._show_pause()
+
+    def _show_pause(self) -> None:
+        sign, words = ("play", "Resume") if self._resumes else ("pause", "Pause")
+        self.pause.show_action(sign if self._signs else "", words)
+
     def show_view(self, view: OperatorView) -> None:
         """Offer what is possible now and say what it does."""
         self._resumes = view.may_resume
-        self.pause.show_action(*(("play", "Resume") if self._resumes else ("pause", "Pause")))
+        self._show_pause()
         self.pause.setEnabled(view.may_pause or view.may_resume)
         self.repeat.setEnabled(view.may_repeat)
         for button in (self.pause, self.repeat, self.end):

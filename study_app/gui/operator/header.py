@@ -8,8 +8,9 @@ from PySide6.QtWidgets import QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
 from study_app.gui.cards import Chip, Logo, Tone
 from study_app.gui.icons import draw_icon
-from study_app.gui.labels import figures, label
+from study_app.gui.labels import Elided, figures
 from study_app.gui.operator.view import OperatorView, State, minutes
+from study_app.gui.theme import font
 from study_app.gui.themed import Themed
 
 STATES: dict[State, tuple[Tone, str]] = {
@@ -20,6 +21,7 @@ STATES: dict[State, tuple[Tone, str]] = {
     "trouble": ("bad", "warning"),
     "ended": ("ok", "check"),
 }
+BLINDINGS = {"double": ("lock", "Double-blind"), "single": ("eye", "Single-blind")}
 SAVED_RECENTLY_S = 2.0
 PARTS_WIDTH = 120
 PARTS_GAP = 4
@@ -79,8 +81,9 @@ class Header(Themed, QWidget):
     def __init__(self) -> None:
         super().__init__()
         self.setFixedHeight(64)
-        self.study = label("", "card")
-        self.who = figures("", "label", "text2")
+        self.study = Elided("card")
+        self.who = Elided("label", "text2")
+        self.who.setFont(font("label", tabular=True))
         self.state = Chip("neutral", "clock", "Preparing")
         self.blind = Chip("neutral", "lock", "Double-blind")
         self.saved = Chip("neutral", "ring", "Nothing to save yet")
@@ -103,7 +106,7 @@ class Header(Themed, QWidget):
         row.addSpacing(28)
         for chip in (self.state, self.blind, self.saved):
             row.addWidget(chip)
-        row.addStretch()
+        row.addStretch(1)
         row.addLayout(_column(self.clock, self.expected))
         row.addLayout(_column(self.bar, self.trials))
         row.addSpacing(8)
@@ -111,8 +114,9 @@ class Header(Themed, QWidget):
 
     def show_view(self, view: OperatorView) -> None:
         """Show the session's head."""
-        self.study.setText(view.study)
-        self.who.setText(view.who)
+        self.study.show_text(view.study)
+        self.who.show_text(view.who)
+        self.blind.show_state("neutral", *BLINDINGS[view.blinding])
         tone, icon = STATES[view.state]
         if view.state == "ended" and view.state_word != "Complete":
             tone, icon = "neutral", "cross"

@@ -1,55 +1,16 @@
-"""Device card, and the operator's notes and marks, which go into the journal with their time."""
+"""The operator's notes and marks, which go into the journal with their time."""
 
 from __future__ import annotations
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QPlainTextEdit, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QPlainTextEdit, QVBoxLayout, QWidget
 
-from study_app.gui.cards import Card, Chip, Icon
+from study_app.gui.cards import Card, Icon
 from study_app.gui.controls import ActionButton
 from study_app.gui.labels import Elided, figures, label
-from study_app.gui.operator.view import NOTES_SHOWN, DeviceView, OperatorView, minutes
+from study_app.gui.operator.view import NOTES_SHOWN, OperatorView, minutes
 from study_app.gui.theme import font
-
-ICONS = {"falcon": "device", "mouse": "mouse", "simulated": "fast_forward"}
-
-
-class DeviceCard(Card):
-    """What the participant feels with, and whether it answers."""
-
-    def __init__(self) -> None:
-        super().__init__(padding=16, gap=10)
-        self.icon = Icon("device", "text2", 22)
-        self.name = label("", "card")
-        self.chip = Chip("neutral", "ring", "Waiting", small=True)
-        row = QHBoxLayout()
-        row.setSpacing(10)
-        row.addWidget(self.icon)
-        row.addWidget(self.name)
-        row.addStretch()
-        row.addWidget(self.chip)
-        self.column.addLayout(row)
-        self._grid = QGridLayout()
-        self._grid.setVerticalSpacing(8)
-        self.column.addLayout(self._grid)
-        self.rows: list[tuple[Elided, QLabel]] = []
-
-    def show_device(self, device: DeviceView) -> None:
-        """Show the device's name, state and rows."""
-        self.icon.show_icon(ICONS[device.kind], "text2")
-        self.name.setText(device.name)
-        self.chip.show_state(*(("ok", "check", "Ready") if device.ready else ("bad", "warning", "Fault")))
-        while len(self.rows) < len(device.rows):
-            name, value = Elided("label", "text2"), figures("", "label")
-            value.setFont(font("label", weight=600, tabular=True))
-            value.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-            self._grid.addWidget(name, len(self.rows), 0)
-            self._grid.addWidget(value, len(self.rows), 1)
-            self.rows.append((name, value))
-        for (name, value), (word, said) in zip(self.rows, device.rows, strict=True):
-            name.show_text(word)
-            value.setText(said)
 
 
 class NoteField(QPlainTextEdit):
@@ -84,7 +45,15 @@ class NotesCard(Card):
     mark_set = Signal()
 
     def __init__(self) -> None:
-        super().__init__("Notes and marks", label("kept in the journal", "small", "text2"), padding=16, gap=10)
+        super().__init__(padding=16, gap=10)
+        self._shown = NOTES_SHOWN
+        self._view: OperatorView | None = None
+        self._head = QWidget()
+        head = QHBoxLayout(self._head)
+        head.setContentsMargins(0, 0, 0, 0)
+        head.addWidget(label("Notes and marks", "card"))
+        head.addStretch()
+        head.addWidget(label("kept in the journal", "small", "text2"))
         self.lines = [_NoteRow() for _ in range(NOTES_SHOWN)]
         self.none = label("Nothing noted yet.", "label", "text2")
         self._list = QWidget()
@@ -95,11 +64,13 @@ class NotesCard(Card):
             rows.addWidget(widget)
         rows.addStretch()
         self.field = NoteField()
+        self.hint = label("Enter keeps it with the time", "small", "text3")
         self.add = ActionButton("pen", "Add note", key="N")
         self.mark = ActionButton("flag", "Mark", key="M")
+        self.column.addWidget(self._head)
         self.column.addWidget(self._list)
         self.column.addWidget(self.field, 1)
-        self.column.addWidget(label("Enter keeps it with the time", "small", "text3"))
+        self.column.addWidget(self.hint)
         buttons = QHBoxLayout()
         buttons.setSpacing(12)
         buttons.addWidget(self.add, 1)
@@ -109,12 +80,24 @@ class NotesCard(Card):
         self.add.clicked.connect(self._add)
         self.mark.clicked.connect(self.mark_set)
 
+    def show_lines(self, most: int) -> None:
+        """Show so many notes at most; the hint goes before the first of them, the heading with the last."""
+        self._shown = most
+        self._head.setVisible(most > 0)
+        self._list.setVisible(most > 0)
+        self.hint.setVisible(most == NOTES_SHOWN)
+        self.field.setToolTip("" if most == NOTES_SHOWN else self.hint.text())
+        if self._view is not None:
+            self.show_view(self._view)
+
     def show_view(self, view: OperatorView) -> None:
         """Show the newest notes, newest first."""
+        self._view = view
         self.none.setVisible(not view.notes)
         for index, row in enumerate(self.lines):
-            row.setVisible(index < len(view.notes))
-            if index < len(view.notes):
+            shown = index < min(len(view.notes), self._shown)
+            row.setVisible(shown)
+            if shown:
                 row.show_note(view.notes[index].kind, minutes(view.notes[index].at_s), view.notes[index].text)
         for button in (self.add, self.mark):
             button.setEnabled(not view.over)

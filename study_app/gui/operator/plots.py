@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QSize, Qt
 
 from study_app.gui.cards import Card, Chip
 from study_app.gui.hidden import Hidden
 from study_app.gui.labels import label
+from study_app.gui.operator.force_plots import FIELD
 from study_app.gui.operator.health import TRACE_WINDOW_S, ServoHealth
 from study_app.gui.plots import LatenessPlot, TracePlot
 
@@ -53,3 +54,11 @@ class HiddenForceCard(Card):
     def __init__(self) -> None:
         super().__init__("Force", Chip("neutral", "eye_off", "Hidden", small=True), padding=16, gap=8)
         self.column.addWidget(Hidden(self.TITLE, self.WHY), 1)
+
+    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+        """Return what the plots of the force ask for where they are shown."""
+        return FIELD
+
+    def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+        """Return what the plots of the force ask for where they are shown."""
+        return FIELD

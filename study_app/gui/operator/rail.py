@@ -1,21 +1,22 @@
-"""Where we are: part, trial, time in the trial, and all steps of the session with their states."""
+"""The card at the left: where we are, all steps of the session with their states, and what has been counted."""
 
 from __future__ import annotations
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QResizeEvent
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QScrollArea, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QScrollArea, QSizePolicy, QVBoxLayout, QWidget
 
-from study_app.gui.cards import Bar, Card, Rule
+from study_app.gui.cards import Card, Rule
 from study_app.gui.icons import draw_icon
-from study_app.gui.labels import Elided, figures, label, set_ink
-from study_app.gui.operator.view import OperatorView, StepRow, minutes
-from study_app.gui.theme import TypeRole, font
+from study_app.gui.labels import Elided, figures, set_ink
+from study_app.gui.operator.now import Now, Tally
+from study_app.gui.operator.view import OperatorView, StepRow
+from study_app.gui.theme import font
 from study_app.gui.themed import Themed
 
-WIDTH, NARROW = 318, 248
+WIDTH, NARROW, SLIM = 318, 248, 72
 ROW_HEIGHT = 44
-LEAST_ROW_HEIGHT = 32
+LEAST_ROW_HEIGHT = 26
 DOT = 11
 
 
@@ -32,12 +33,19 @@ class StepLine(Themed, QWidget):
         layout.setContentsMargins(37, 0, 0, 0)
         layout.addWidget(self.name, 1)
         layout.addWidget(self.note)
+        self._layout = layout
         self.setMinimumHeight(LEAST_ROW_HEIGHT)
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Preferred)
 
     def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
         """Return the room that a row likes; where there are many, each takes less."""
         return QSize(super().sizeHint().width(), ROW_HEIGHT)
+
+    def slim(self, yes: bool) -> None:
+        """Show the dot alone; the rest is in its tip."""
+        self._layout.setContentsMargins(0 if yes else 37, 0, 0, 0)
+        for part in (self.name, self.note):
+            part.setVisible(not yes)
 
     def show_row(self, row: StepRow, *, first: bool, last: bool) -> None:
         """Show a step's state."""
@@ -50,6 +58,7 @@ class StepLine(Themed, QWidget):
         set_ink(self.name, "text2" if row.state == "open" else "text")
         set_ink(self.note, "accent" if row.state == "now" else "text2")
         self.setAccessibleName(f"{row.label}, {row.state} {row.note}".strip())
+        self.setToolTip(f"{row.label}  ·  {row.note}" if row.note else row.label)
         self.update()
 
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
@@ -84,27 +93,16 @@ class StepLine(Themed, QWidget):
 
 
 class Rail(Card):
-    """The card at the left."""
+    """Now, steps and counts; slim, the steps' dots alone."""
 
     def __init__(self) -> None:
-        super().__init__(gap=6)
-        self.narrow(False)
-        self.part = Elided("label", "text2")
-        self.heading = label("", "display")
-        self.heading.setMinimumWidth(1)
-        self.setting = label("", "body", "text2", wraps=True)
-        self.elapsed_word = label("Elapsed", "label", "text2")
-        self.elapsed = figures("", "label")
-        self.bar = Bar()
-        keep = self.bar.sizePolicy()
-        keep.setRetainSizeWhenHidden(True)
-        self.bar.setSizePolicy(keep)
-        self.least = figures("", "small", "text2")
+        super().__init__(gap=10)
+        self.now, self.tally = Now(), Tally()
+        self.heading = self.now.heading
         self.lines: list[StepLine] = []
-        self.counts: list[tuple[QLabel, QLabel]] = []
+        self._slim = False
         self._steps = QWidget()
         self._steps_column = QVBoxLayout(self._steps)
-        self._steps_column.setContentsMargins(0, 0, 8, 0)
         self._steps_column.setSpacing(0)
         self._steps_column.addStretch(1)
         self._scroll = QScrollArea()
@@ -112,83 +110,58 @@ class Rail(Card):
         self._scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self._scroll.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self._scroll.setWidget(self._steps)
-        self._counts_column = QVBoxLayout()
-        self._counts_column.setSpacing(8)
-        self.beyond = label("", "small", "warn", wraps=True)
-        self._lay_out()
-
-    def _lay_out(self) -> None:
-        for widget in (self.part, self.heading, self.setting):
-            self.column.addWidget(widget)
-        self.column.addSpacing(6)
-        row = QHBoxLayout()
-        row.addWidget(self.elapsed_word)
-        row.addStretch()
-        row.addWidget(self.elapsed)
-        self.column.addLayout(row)
-        self.column.addWidget(self.bar)
-        self.column.addWidget(self.least)
-        self.column.addSpacing(4)
-        self.column.addWidget(Rule())
-        self.column.addSpacing(6)
+        self._rules = Rule(), Rule()
+        self.column.addWidget(self._rules[0])
         self.column.addWidget(self._scroll, 1)
-        self.column.addSpacing(6)
-        self.column.addWidget(Rule())
-        self.column.addSpacing(6)
-        self.column.addLayout(self._counts_column)
-        self.column.addWidget(self.beyond)
+        self.column.addWidget(self._rules[1])
+        self.take_back()
+
+    def take_back(self) -> None:
+        """Hold now and counts, above and below the steps."""
+        for part in (self.now, self.tally):
+            part.lie_flat(False)
+        self.column.insertWidget(0, self.now)
+        self.column.addWidget(self.tally)
+        self._be(slim=False)
+
+    def give_away(self) -> None:
+        """Show the steps' dots alone: now and counts stand elsewhere."""
+        for part in (self.now, self.tally):
+            part.lie_flat(True)
+        self._be(slim=True)
 
     def narrow(self, yes: bool) -> None:
-        """Take less room in a small window."""
-        self.setFixedWidth(NARROW if yes else WIDTH)
+        """Take less room in a smaller window."""
+        self.setFixedWidth(SLIM if self._slim else NARROW if yes else WIDTH)
+
+    def _be(self, *, slim: bool) -> None:
+        self._slim = slim
+        for part in self._rules:
+            part.setVisible(not slim)
+        self._steps_column.setContentsMargins(0, 0, 0 if slim else 8, 0)
+        bars = Qt.ScrollBarPolicy
+        self._scroll.setVerticalScrollBarPolicy(bars.ScrollBarAlwaysOff if slim else bars.ScrollBarAsNeeded)
+        for line in self.lines:
+            line.slim(slim)
 
     def show_view(self, view: OperatorView) -> None:
         """Show where the session is."""
-        self.part.show_text(view.part_line)
-        self._show_heading(view.heading)
-        self.setting.setText(view.setting_line)
-        self._show_time(view)
+        self.now.show_view(view)
+        self.tally.show_view(view)
         self._show_steps(view.steps)
-        self._show_counts(view.counts)
-        self._show_beyond(view.beyond)
-
-    def _show_heading(self, text: str) -> None:
-        if text == self.heading.text():
-            return
-        self.heading.setText(text)
-        self._fit_heading()
-
-    def _fit_heading(self) -> None:
-        room = self.width() - 50
-        roles: tuple[TypeRole, ...] = ("display", "title", "title_dense", "card")
-        for role in roles:
-            self.heading.setFont(font(role, tabular=True))
-            if self.heading.fontMetrics().horizontalAdvance(self.heading.text()) <= room:
-                break
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
-        """Let the heading be as large as it fits, and keep the present step in sight."""
+        """Keep the present step in sight."""
         super().resizeEvent(event)
-        self._fit_heading()
         for line in self.lines:
             if line.row.state == "now":
                 self._scroll.ensureWidgetVisible(line, 0, LEAST_ROW_HEIGHT)
-
-    def _show_time(self, view: OperatorView) -> None:
-        time = view.trial_time
-        self.elapsed_word.setText("Elapsed" if time else "")
-        self.elapsed.setText(time.words if time else "")
-        self.bar.setVisible(time is not None and bool(time.most_s))
-        if time is None or not time.most_s:
-            self.least.setText("")
-            return
-        self.bar.show_share(time.elapsed_s / time.most_s, time.least_s / time.most_s if time.least_s else None)
-        self.least.setText(f"at least {minutes(time.least_s)}" if time.least_s else "")
 
     def _show_steps(self, rows: tuple[StepRow, ...]) -> None:
         while len(self.lines) < len(rows):
             line = StepLine()
             line.wear(self.theme)
+            line.slim(self._slim)
             self.lines.append(line)
             self._steps_column.insertWidget(len(self.lines) - 1, line)
         for index, (line, row) in enumerate(zip(self.lines, rows, strict=True)):
@@ -196,23 +169,3 @@ class Rail(Card):
             line.show_row(row, first=index == 0, last=index == len(rows) - 1)
             if arrived:
                 self._scroll.ensureWidgetVisible(line, 0, 2 * LEAST_ROW_HEIGHT)
-
-    def _show_counts(self, counts: tuple[tuple[str, str], ...]) -> None:
-        while len(self.counts) < len(counts):
-            name, value = label("", "label", "text2"), figures("", "label")
-            value.setFont(font("label", weight=600, tabular=True))
-            row = QHBoxLayout()
-            row.addWidget(name)
-            row.addStretch()
-            row.addWidget(value)
-            self._counts_column.addLayout(row)
-            self.counts.append((name, value))
-        for (name, value), (word, number) in zip(self.counts, counts, strict=True):
-            name.setText(word)
-            value.setText(number)
-
-    def _show_beyond(self, beyond: tuple[str, ...]) -> None:
-        """Show which limit the newest trial out of limits broke; the tip tells all of them."""
-        self.beyond.setVisible(bool(beyond))
-        self.beyond.setText(f"{beyond[0]}." if beyond else "")
-        self.beyond.setToolTip("\n".join(beyond) if len(beyond) > 1 else "")

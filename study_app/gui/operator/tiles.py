@@ -62,7 +62,7 @@ class Tiles(QWidget):
 
     def narrow(self, yes: bool) -> None:
         """Stand two by two in a small window."""
-        across = 2 if yes else 4
+        self.across = across = 2 if yes else 4
         for index, card in enumerate(self.cards):
             self._grid.addWidget(card, index // across, index % across)
         for column in range(4):

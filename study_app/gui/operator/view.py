@@ -1,6 +1,6 @@
 """What the operator's window shows, as one frozen value: widgets only draw it. No Qt here.
 
-Sessions are double-blind: nothing here says a liquid, a parameter, a delay, a force or what a limiter did.
+Nothing here says a liquid, a parameter or a delay; nor, in a double-blind study, a force or what a limiter did.
 """
 
 from __future__ import annotations
@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from study_app.gui.operator.forces import ForceFigures
 from study_app.gui.operator.health import Vitals
 from study_app.gui.operator.progress import NoteLine, SessionProgress, Stage, operator_language
 from study_app.protocol.model import Explore, Protocol
@@ -66,7 +67,7 @@ class TrialTime:
 
 @dataclass(frozen=True, slots=True)
 class DeviceView:
-    """The device's card: its name, whether it answers, and rows of (label, value)."""
+    """The device's card: its name, whether it answers, and rows of (label, value), the most important ones first."""
 
     name: str
     kind: Literal["falcon", "mouse", "simulated"]
@@ -111,6 +112,7 @@ class OperatorView:
     trial: int | None = None
     waits: bool = False
     beyond: tuple[str, ...] = ()
+    blinding: Literal["double", "single"] = "double"
 
     @property
     def trials_line(self) -> str:
@@ -151,11 +153,13 @@ def operator_view(
     device_ready: bool = True,
     faults: int = 0,
     rate_hz: float = 1000.0,
+    forces: ForceFigures | None = None,
 ) -> OperatorView:
     """Return what the operator sees at ``now_s`` on the session's clock.
 
     ``trouble`` is what no journal could say; ``device_ready`` and ``faults`` (how many there were since the program
-    was started) are the servo's own, whatever other trouble there is.
+    was started) are the servo's own, whatever other trouble there is; ``forces`` are shown where a study is
+    single-blind.
     """
     trouble = progress.broke or trouble
     state = _state(progress, force_on=force_on, trouble=trouble)
@@ -183,7 +187,7 @@ def operator_view(
             session.device_name,
             session.device_kind,
             device_ready,
-            (*session.device_rows, ("Safety faults", str(faults))),
+            (*_force_rows(session, forces), ("Safety faults", str(faults)), *session.device_rows),
         ),
         notes=progress.notes[-NOTES_SHOWN:][::-1],
         force_on=force_on,
@@ -194,6 +198,7 @@ def operator_view(
         trial=None if trial is None else trial.number,
         waits=waits,
         beyond=_beyond(session, progress),
+        blinding=session.protocol.study.blinding,
     )
 
 
@@ -328,6 +333,20 @@ def _beyond(session: Session, progress: SessionProgress) -> tuple[str, ...]:
         + "; ".join(f"{MEASURES[measure]} {value:.3g} ms, limit {limit:g} ms" for measure, value, limit in beyond)
         for number, beyond in reversed(tuple(progress.trials_done.items()))
         if beyond
+    )
+
+
+def _force_rows(session: Session, forces: ForceFigures | None) -> tuple[tuple[str, str], ...]:
+    """Return share of the limit and limiters, or that they are hidden; as many rows in either case."""
+    share, limiters = f"Force, share of {session.protocol.device.force_limit_n:g} N", "Limiters acted"
+    if session.protocol.study.blinding == "double":
+        return (share, "hidden"), (limiters, "hidden")
+    if forces is None:
+        return (share, "–"), (limiters, "–")
+    most_first = sorted(forces.limiters, key=lambda counted: -counted[1])
+    return (
+        (share, f"{forces.share:.0%}, most {forces.most:.0%}".replace("%", f"{THIN_SPACE}%")),
+        (limiters, ", ".join(f"{name} {grouped(ticks)}" for name, ticks in most_first) or "none"),
     )
 
 

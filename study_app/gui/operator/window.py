@@ -5,17 +5,21 @@ It draws an ``OperatorView`` and two plots, and says what the operator asks for;
 
 from __future__ import annotations
 
-from PySide6.QtCore import QSize, Qt, Signal
-from PySide6.QtGui import QCloseEvent, QResizeEvent, QShowEvent
-from PySide6.QtWidgets import QGridLayout, QLayout, QMainWindow, QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtCore import QSize, Signal
+from PySide6.QtGui import QCloseEvent
+from PySide6.QtWidgets import QMainWindow
 
 from study_app.gui.dialogs import Notice
-from study_app.gui.escape import EscapeHold
+from study_app.gui.escape import EscapeAnywhere
 from study_app.gui.operator.actions import Actions, EndQuestion, ExcludeQuestion, RepeatQuestion
+from study_app.gui.operator.arrangement import Arrangement, Pieces
 from study_app.gui.operator.banner import Banner
+from study_app.gui.operator.device import DeviceCard
+from study_app.gui.operator.force_plots import ForceCard
+from study_app.gui.operator.forces import Forces
 from study_app.gui.operator.header import Header
 from study_app.gui.operator.health import ServoHealth
-from study_app.gui.operator.notes import DeviceCard, NotesCard
+from study_app.gui.operator.notes import NotesCard
 from study_app.gui.operator.plots import HiddenForceCard, LatenessCard, PositionCard
 from study_app.gui.operator.rail import Rail
 from study_app.gui.operator.stop import StopPanel
@@ -26,8 +30,6 @@ from study_app.gui.themed import wear
 
 FULL = QSize(1600, 900)
 LEAST = QSize(1024, 640)
-WIDE = 1320
-SIDE_WIDTH, STOP_HEIGHT = 350, 250
 
 
 class OperatorWindow(QMainWindow):
@@ -43,6 +45,8 @@ class OperatorWindow(QMainWindow):
         Half of the longest edge of the tank [m], for the scale of the position plot.
     pointer
         Whether positions are of the mouse pointer.
+    force_limit_n
+        Largest force on the hand [N] in a single-blind study; None where the force is hidden.
     """
 
     stop_asked = Signal()
@@ -54,102 +58,65 @@ class OperatorWindow(QMainWindow):
     end_asked = Signal(str, str)
     note_written = Signal(str)
     mark_set = Signal()
+    diagnose_asked = Signal()
     close_asked = Signal()
     theme_changed = Signal(object)
 
     def __init__(
-        self, study: str, *, lateness_limit_s: float, reach_m: float, pointer: bool, theme: Theme = LIGHT
+        self,
+        study: str,
+        *,
+        lateness_limit_s: float,
+        reach_m: float,
+        pointer: bool,
+        force_limit_n: float | None = None,
+        theme: Theme = LIGHT,
     ) -> None:
         super().__init__()
         self.setWindowTitle(f"{study} – operator")
         self.setMinimumSize(LEAST)
         self.theme = theme
         self.may_close = False
-        self._narrow: bool | None = None
         self._view: OperatorView | None = None
         self.header = Header()
         self.banner = Banner()
         self.rail = Rail()
         self.tiles = Tiles()
         self.lateness = LatenessCard(lateness_limit_s)
-        self.force = HiddenForceCard()
+        self.force = HiddenForceCard() if force_limit_n is None else ForceCard(force_limit_n)
         self.position = PositionCard(reach_m, pointer=pointer)
         self.device = DeviceCard()
         self.notes = NotesCard()
         self.stop = StopPanel()
         self.buttons = Actions()
         self.question: RepeatQuestion | ExcludeQuestion | EndQuestion | None = None
-        self._escape = EscapeHold(self)
-        self._lay_out()
-        self._arrange(narrow=False)
+        self.escape = EscapeAnywhere(self)
+        self.arrangement = Arrangement(
+            Pieces(
+                header=self.header,
+                banner=self.banner,
+                rail=self.rail,
+                tiles=self.tiles,
+                lateness=self.lateness,
+                force=self.force,
+                position=self.position,
+                device=self.device,
+                notes=self.notes,
+                stop=self.stop,
+                buttons=self.buttons,
+            )
+        )
+        self.setCentralWidget(self.arrangement)
+        self.arrangement.setFocus()
         self._connect()
         self.resize(FULL)
         wear(self, theme)
-
-    def _lay_out(self) -> None:
-        for card, least in ((self.lateness, 240), (self.force, 240), (self.position, 200)):
-            card.setMinimumHeight(least)
-        self._middle = QGridLayout()
-        self._middle.setContentsMargins(0, 0, 0, 0)
-        self._middle.setSpacing(10)
-        self._middle.setColumnStretch(0, 1)
-        self._middle.setColumnStretch(1, 1)
-        side = QVBoxLayout()
-        side.setContentsMargins(0, 0, 0, 0)
-        side.setSpacing(10)
-        side.addWidget(self.device)
-        side.addWidget(self.notes, 1)
-        self.stop.setFixedSize(SIDE_WIDTH, STOP_HEIGHT)
-        self._middle_area = _scrolled(self._middle)
-        self._side_area = _scrolled(side)
-        self._side_area.setFixedWidth(SIDE_WIDTH)
-        self._body = QGridLayout()
-        self._body.setContentsMargins(21, 21, 21, 17)
-        self._body.setHorizontalSpacing(18)
-        self._body.setVerticalSpacing(10)
-        right = QVBoxLayout()
-        right.setSpacing(10)
-        right.addWidget(self._side_area, 1)
-        right.addWidget(self.stop)
-        self._body.addLayout(right, 0, 2, 2, 1)
-        self._body.setColumnStretch(1, 1)
-        self._body.setRowStretch(0, 1)
-        whole = QWidget()
-        whole.setProperty("role", "window")
-        layout = QVBoxLayout(whole)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(0)
-        layout.addWidget(self.header)
-        layout.addLayout(self._body, 1)
-        self.setCentralWidget(whole)
-        whole.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
-        whole.setFocus()
-
-    def _arrange(self, *, narrow: bool) -> None:
-        """Place the parts for a wide or a narrow window; the force stop stays where it is in both."""
-        if narrow == self._narrow:
-            return
-        self._narrow = narrow
-        self.rail.narrow(narrow)
-        self.tiles.narrow(narrow)
-        self.buttons.hint.setVisible(not narrow)
-        self._body.addWidget(self.rail, 0, 0, 1 if narrow else 2, 1)
-        self._body.addWidget(self._middle_area, 0, 1)
-        self._body.addWidget(self.buttons, 1, 0 if narrow else 1, 1, 2 if narrow else 1)
-        across = 2 if narrow else 1
-        self._middle.addWidget(self.banner, 0, 0, 1, 2)
-        self._middle.addWidget(self.tiles, 1, 0, 1, 2)
-        self._middle.addWidget(self.lateness, 2, 0, 1, across)
-        self._middle.addWidget(self.force, *((4, 0) if narrow else (2, 1)), 1, across)
-        self._middle.addWidget(self.position, 3, 0, 1, 2)
-        self._middle.setRowStretch(2, 30)
-        self._middle.setRowStretch(3, 26)
 
     def _connect(self) -> None:
         self.header.theme_asked.connect(self._change_theme)
         self.stop.stop_asked.connect(self.stop_asked)
         self.stop.fade_in_asked.connect(self.fade_in_asked)
-        self._escape.held.connect(self.stop_asked)
+        self.escape.held.connect(self.stop_asked)
         self.buttons.pause_asked.connect(self.pause_asked)
         self.buttons.resume_asked.connect(self.resume_asked)
         self.buttons.repeat_asked.connect(self.ask_to_repeat)
@@ -158,23 +125,30 @@ class OperatorWindow(QMainWindow):
         self.buttons.close_asked.connect(self.close)
         self.notes.note_written.connect(self.note_written)
         self.notes.mark_set.connect(self.mark_set)
+        self.device.diagnose_asked.connect(self.diagnose_asked)
 
     def show_view(self, view: OperatorView) -> None:
-        """Show everything but the plots."""
+        """Show everything but the plots; trouble first, for it may be that one of the parts cannot be shown."""
         if view == self._view:
             return
-        self._view = view
-        if isinstance(self.question, RepeatQuestion) and not self._asks_about(view, self.question):
-            self.question.reject()  # the trial it was about is over: its answer would hit the next one
-        for part in (self.header, self.rail, self.tiles, self.notes, self.stop, self.buttons):
-            part.show_view(view)
-        self.device.show_device(view.device)
         self.banner.show_trouble(view.trouble, over=view.over, waits=view.waits)
         self.may_close = view.over
+        asked = self.question
+        if isinstance(asked, RepeatQuestion) and not self._asks_about(view, asked):
+            asked.reject()  # the trial it was about is over: its answer would hit the next one
+        for part in (self.stop, self.header, self.rail, self.tiles, self.notes, self.buttons):
+            part.show_view(view)
+        self.device.show_device(view.device)
+        self._view = view
 
     def show_traces(self, health: ServoHealth, now_s: float) -> None:
         """Draw the hand's position (30 times a second)."""
         self.position.show_health(health, now_s)
+
+    def show_forces(self, forces: Forces, now_ns: int) -> None:
+        """Draw force and wake (30 times a second), where they are not hidden."""
+        if isinstance(self.force, ForceCard):
+            self.force.show_forces(forces, now_ns)
 
     def show_lateness(self, health: ServoHealth) -> None:
         """Draw the histogram (twice a second)."""
@@ -217,7 +191,6 @@ class OperatorWindow(QMainWindow):
     def _open(self, question: RepeatQuestion | ExcludeQuestion | EndQuestion) -> None:
         self.question = question
         question.finished.connect(self._question_answered)
-        question.installEventFilter(self._escape)
         question.show()
 
     def come_forward(self) -> None:
@@ -243,18 +216,6 @@ class OperatorWindow(QMainWindow):
         wear(self, self.theme)
         self.theme_changed.emit(self.theme)
 
-    def showEvent(self, event: QShowEvent) -> None:  # noqa: N802 - Qt's name
-        """Watch for Esc held, whichever part has the focus."""
-        super().showEvent(event)
-        handle = self.windowHandle()
-        handle.removeEventFilter(self._escape)
-        handle.installEventFilter(self._escape)
-
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
-        """Give way in a small window; only the middle and the notes ever scroll."""
-        super().resizeEvent(event)
-        self._arrange(narrow=self.width() < WIDE)
-
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802 - Qt's name
         """Close at once when the session is over; else leave it to who listens, with the window open."""
         if self.may_close:
@@ -267,15 +228,3 @@ class OperatorWindow(QMainWindow):
 def _setting(view: OperatorView) -> str:
     """Return the neutral name of the trial under way, with its place so that it names one trial alone."""
     return f"{view.setting_line.split('  ·  ')[0]} ({view.heading.lower()})"
-
-
-def _scrolled(layout: QLayout) -> QScrollArea:
-    """Return ``layout`` in a frame that scrolls only where the window is too low for it."""
-    inside = QWidget()
-    inside.setLayout(layout)
-    area = QScrollArea()
-    area.setWidgetResizable(True)
-    area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-    area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-    area.setWidget(inside)
-    return area

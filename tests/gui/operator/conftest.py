@@ -66,7 +66,7 @@ def told() -> Told:
         lateness_limit_s=protocol.limits.lateness_ms / 1000,
         device_name="Mouse",
         device_kind="mouse",
-        device_rows=(("Force sent, share of 6 N limit", "hidden"),),
+        device_rows=(("Priority", "normal"),),
     )
     return Told(protocol, schedule, session)
 

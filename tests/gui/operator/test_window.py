@@ -8,7 +8,7 @@ from itertools import pairwise
 import pyqtgraph as pg
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QColor
+from PySide6.QtGui import QColor, QGuiApplication
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
@@ -43,7 +43,7 @@ def test_a_view_becomes_texts(running):
     assert running.header.state.word == "Running"
     assert running.header.trials.text() == "0 of 4 trials"
     assert running.rail.heading.text() == "Trial 1 of 4"
-    assert running.rail.elapsed.text() == "0:00 of 0:30"
+    assert running.rail.now.elapsed.text() == "0:00 of 0:30"
     assert [card.value.text() for card in running.tiles.cards[:2]] == ["1000.0", "15"]
     assert len(running.rail.lines) == len(running._view.steps)
     assert running.stop.word.text() == "Force is on"
@@ -77,17 +77,17 @@ def test_the_limit_a_trial_broke_can_be_read_in_the_smallest_window(window, told
     told.welcome()
     told.start(1)
     window.show_view(told.view(health))
-    assert window.rail.beyond.isHidden()
+    assert window.rail.tally.beyond.isHidden()
     told.end(1, worst_gap_ms=31.0)
     told.start(2)
     told.end(2, delay_error_p95_ms=27.2)
     window.resize(window.minimumSize())
     window.show_view(told.view(health))
-    line = window.rail.beyond
+    line = window.rail.tally.beyond
     assert line.text() == "Liquid setting 2 out of limits: delay error, p95, 27.2 ms, limit 25 ms."
     assert "longest gap of the servo 31 ms" in line.toolTip()
     qtbot.waitUntil(lambda: line.height() >= line.heightForWidth(line.width()))
-    qtbot.waitUntil(lambda: window.rail.rect().contains(line.geometry()))
+    qtbot.waitUntil(lambda: window.rail.tally.rect().contains(line.geometry()))
 
 
 def test_stop_force_speaks_at_the_press_not_at_the_release(running, qtbot):
@@ -142,7 +142,7 @@ def test_escape_held_stops_the_force_and_a_tap_does_not(running, qtbot):
     running.stop_asked.connect(lambda: asked.append(True))
     QTest.keyPress(handle, Qt.Key.Key_Escape)
     QTest.keyRelease(handle, Qt.Key.Key_Escape)
-    assert not running._escape._timer.isActive()
+    assert not running.escape._timer.isActive()
     assert asked == []
     with qtbot.waitSignal(running.stop_asked, timeout=HOLD_MS * 5):
         QTest.keyPress(handle, Qt.Key.Key_Escape)
@@ -235,8 +235,10 @@ def test_no_question_keeps_a_hand_from_the_force_stop(running, qtbot):
 
 def test_escape_held_over_a_question_stops_the_force_too(running, qtbot):
     running.ask_to_end()
+    handle = running.question.windowHandle()
+    qtbot.waitUntil(lambda: QGuiApplication.focusWindow() is handle)
     with qtbot.waitSignal(running.stop_asked, timeout=HOLD_MS * 5):
-        QTest.keyPress(running.question, Qt.Key.Key_Escape)
+        QTest.keyPress(handle, Qt.Key.Key_Escape)
 
 
 def test_enter_keeps_a_note_and_empties_the_field(running, qtbot):
@@ -284,7 +286,7 @@ def test_trouble_stands_above_everything_and_leaves_the_end(running, told, healt
     assert running.banner.isVisible()
     assert "stopped answering" in running.banner.what.text()
     QApplication.processEvents()
-    assert running._middle_area.verticalScrollBar().maximum() == 0
+    assert running.arrangement.middle_area.verticalScrollBar().maximum() == 0
     assert running.buttons.end.isEnabled()
 
 

@@ -1,0 +1,74 @@
+"""What the operator is to see of a session under way: telemetry in; views, traces and figures out."""
+
+from __future__ import annotations
+
+from study_app.gui.operator.forces import Forces
+from study_app.gui.operator.health import ServoHealth
+from study_app.gui.operator.view import OperatorView, operator_view
+from study_app.gui.operator.window import OperatorWindow
+from study_app.gui.session_parts import Parts
+
+
+class Lookout:
+    """Looks at servo and hand once a frame; ``forces`` is None, and no force is looked at, in a double-blind study.
+
+    Parameters
+    ----------
+    parts
+        The session's machinery.
+    refresh_hz
+        Frames a second of the participant's screen.
+    """
+
+    def __init__(self, parts: Parts, refresh_hz: float) -> None:
+        self._parts = parts
+        self._reader = parts.servo.telemetry.reader()
+        self._faulty = False
+        self._faults = 0
+        self.health = ServoHealth(parts.servo.rate_hz, refresh_hz)
+        study = parts.session.protocol
+        self.forces = Forces(study.device.force_limit_n) if study.study.blinding == "single" else None
+
+    def look(self) -> None:
+        """Take what the servo did since the last look, and where the hand is."""
+        self._count_faults()
+        samples = self._reader.read()
+        self.health.take(samples)
+        if self.forces is not None:
+            self.forces.take(samples)
+        self.health.hand(self._parts.clock(), self._parts.aim_m())
+
+    def show_traces(self, operator: OperatorWindow) -> None:
+        """Draw the hand's place and, where it is seen, the force."""
+        operator.show_traces(self.health, self._parts.clock())
+        if self.forces is not None:
+            operator.show_forces(self.forces, self._parts.servo.now_ns())
+
+    def show_lateness(self, operator: OperatorWindow) -> None:
+        """Draw how late ticks were."""
+        self.health.overruns = self._parts.servo.overruns
+        operator.show_lateness(self.health)
+
+    def view(self, trouble: str, stalled: str | None) -> OperatorView:
+        """Return what the operator is to see now; ``stalled`` is why the disk takes nothing, None while it does."""
+        parts = self._parts
+        self._count_faults()
+        return operator_view(
+            parts.session,
+            parts.journal.progress,
+            self.health.vitals(),
+            now_s=parts.clock(),
+            force_on=parts.servo.force_is_on,
+            trouble=trouble or parts.servo.fault or stalled or "",
+            waits=stalled is not None and not trouble,
+            device_ready=not self._faulty,
+            faults=self._faults,
+            rate_hz=parts.servo.rate_hz,
+            forces=None if self.forces is None else self.forces.figures(),
+        )
+
+    def _count_faults(self) -> None:
+        """Count the servo going from well to faulty."""
+        faulty = self._parts.servo.fault is not None
+        self._faults += faulty and not self._faulty
+        self._faulty = faulty

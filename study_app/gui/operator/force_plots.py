@@ -1,0 +1,174 @@
+"""Force and wake of the last ten seconds, for the operator of a single-blind study, where they are hidden otherwise."""
+
+from __future__ import annotations
+
+import numpy as np
+import pyqtgraph as pg
+from PySide6.QtCore import QPointF, QSize
+from PySide6.QtGui import QColor
+
+from study_app.gui.cards import Card
+from study_app.gui.labels import label
+from study_app.gui.operator.forces import Forces
+from study_app.gui.operator.health import TRACE_WINDOW_S
+from study_app.gui.plots import (
+    LINE_PX,
+    NAME_MARGIN,
+    NAMES,
+    NOTHING,
+    STROKE,
+    Floats,
+    Plot,
+    TracePlot,
+    number,
+    pen,
+    step_for,
+    time_ticks,
+)
+from study_app.gui.theme import LIGHT, Theme, font
+
+FIELD = QSize(320, 210)
+"""What the card asks for, whether it shows the force or hides it."""
+LEAST_SHARE = 1 / 16  # of the limit: a plot of less would show noise as large as force
+NARROWS_BELOW = 0.8  # of the reach that would do, so that a force at its edge does not make the scale come and go
+LEAST_WAKE_MPS = 0.1
+FILL_ALPHA = 46
+
+
+class ForcePlot(TracePlot):
+    """Force on the hand along x, y, z, its size as a field behind them, and the limit.
+
+    The scale follows the force of the last ten seconds, up to the limit: most liquids stay far below it.
+    """
+
+    limits: tuple[pg.InfiniteLine, ...] = ()
+    limit_name: pg.TextItem | None = None
+    size_field: pg.PlotCurveItem | None = None
+
+    def __init__(self, limit_n: float) -> None:
+        super().__init__(TRACE_WINDOW_S, limit_n, (*NAMES, "size"))
+        self.limit_n = limit_n
+        self._least = limit_n * LEAST_SHARE
+        self.size_field = pg.PlotCurveItem(fillLevel=0.0)  # the last curve's field, without its line
+        self.size_field.setZValue(-5)
+        self.limits = tuple(pg.InfiniteLine(sign * limit_n, angle=0) for sign in (1, -1))
+        self.limit_name = pg.TextItem(f"limit {number(limit_n)} N", anchor=(0, 0))
+        self.limit_name.textItem.setFont(font("small", weight=600, tabular=True))
+        self.limit_name.textItem.document().setDocumentMargin(NAME_MARGIN)
+        for item in (self.size_field, *self.limits, self.limit_name):
+            self.box.addItem(item)
+        self.axes["bottom"].setHeight(6)
+        self.show_ticks("bottom", [])
+        self._make_room()
+        self.wear(LIGHT)
+
+    def show_forces(self, times_s: Floats, forces_n: Floats) -> None:
+        """Draw forces (n, 4: x, y, z, size) [N]."""
+        peak = float(forces_n[:, 3].max(initial=0.0))
+        wanted = min(max(peak, self._least), self.limit_n)
+        if wanted < NARROWS_BELOW * self._reach:
+            self.show_reach(wanted / NARROWS_BELOW if wanted < self.limit_n else self.limit_n)
+        self.show_traces(times_s, forces_n)
+        if self.size_field is not None:
+            self.size_field.setData(times_s, forces_n[:, 3])
+
+    def _make_room(self) -> None:
+        super()._make_room()
+        for line in self.limits:
+            line.setVisible(self.limit_n <= self._reach)
+        if self.limit_name is not None:
+            self.limit_name.setVisible(self.limit_n <= self._reach)
+            self.limit_name.setPos(QPointF(-1.01 * self._span_s, self.limit_n))
+
+    def wear(self, theme: Theme) -> None:
+        """Take the colours of ``theme``."""
+        super().wear(theme)
+        self.curves[3].setPen(pen(theme.text3, 1.4))
+        self.ends[3].setColor(QColor(theme.text3))
+        for line in self.limits:
+            line.setPen(pen(theme.bad, 1.4, (4.0, 3.0)))
+        if self.limit_name is not None:
+            self.limit_name.setColor(QColor(theme.bad))
+        if self.size_field is not None:
+            field = QColor(theme.text3)
+            field.setAlpha(FILL_ALPHA)
+            self.size_field.setPen(NOTHING)
+            self.size_field.setBrush(field)
+
+
+class WakePlot(Plot):
+    """How fast the liquid at the ball moves by itself, from zero up."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._asked = self._reach = LEAST_WAKE_MPS
+        self._ticks: tuple[int, float] = (0, 0.0)
+        self.curve = pg.PlotCurveItem(antialias=True)
+        self.box.addItem(self.curve)
+        self.box.sigResized.connect(self._make_room)
+        self.show_ticks("bottom", time_ticks(TRACE_WINDOW_S))
+        self._right = 0.0
+        self._make_room()
+        self.wear(LIGHT)
+
+    def keep_right(self, seconds: float) -> None:
+        """Leave as much room right of now as the plot above, so that both share their times."""
+        if seconds != self._right:
+            self._right = seconds
+            self._make_room()
+
+    def show_wake(self, times_s: Floats, speeds_mps: Floats) -> None:
+        """Draw speeds (n,) [m/s] over ``times_s`` (n,)."""
+        peak = max(float(speeds_mps.max(initial=0.0)), LEAST_WAKE_MPS)
+        if peak > self._reach or peak < 0.4 * self._reach:
+            self._asked = peak
+            self._make_room()
+        self.curve.setData(times_s, speeds_mps)
+
+    def _make_room(self) -> None:
+        height = max(2.0 * LINE_PX, self.box.height())
+        step = step_for(self._asked, max(1, int(height / LINE_PX / 1.5) - 1))
+        rows = max(1, int(np.ceil(self._asked / step - 1e-9)))
+        self._reach = rows * step
+        if (rows, step) != self._ticks:
+            self._ticks = (rows, step)
+            self.show_ticks("left", [(k * step, number(k * step)) for k in range(rows + 1)])
+        half = 0.5 * self._reach * LINE_PX / (height - LINE_PX)
+        self.box.setYRange(-half, self._reach + half, padding=0)
+        self.box.setXRange(-1.02 * TRACE_WINDOW_S, self._right or 0.08 * TRACE_WINDOW_S, padding=0)
+
+    def wear(self, theme: Theme) -> None:
+        """Take the colours of ``theme``."""
+        super().wear(theme)
+        self.curve.setPen(pen(theme.accent, STROKE))
+
+
+class ForceCard(Card):
+    """Force and wake, one above the other over the same ten seconds."""
+
+    def __init__(self, limit_n: float) -> None:
+        aside = label(f"last {TRACE_WINDOW_S:.0f} s, N; limit {limit_n:g}", "small", "text2")
+        super().__init__("Force", aside, padding=16, gap=2)
+        self.plot = ForcePlot(limit_n)
+        self.wake = WakePlot()
+        self.column.addWidget(self.plot, 5)
+        self.column.addWidget(label("Wake speed, m/s in the scene", "small", "text2"))
+        self.column.addWidget(self.wake, 3)
+        for plot in (self.plot, self.wake):
+            plot.setMinimumHeight(48)
+        self.setAccessibleName("Force on the hand and speed of the wake, live")
+
+    def show_forces(self, forces: Forces, now_ns: int) -> None:
+        """Draw force and wake as of now, on the servo's clock."""
+        times_s, forces_n, wakes_mps = forces.trace(now_ns)
+        self.plot.show_forces(times_s, forces_n)
+        self.wake.keep_right(float(self.plot.box.viewRange()[0][1]))
+        self.wake.show_wake(times_s, wakes_mps)
+
+    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+        """Return what the hidden field asks for too."""
+        return FIELD
+
+    def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+        """Return what the hidden field asks for too."""
+        return FIELD

@@ -1,0 +1,182 @@
+"""Whatever fails ends in zero force, is written down once and told to the operator in words."""
+
+from __future__ import annotations
+
+import pkgutil
+import sys
+
+import pytest
+from PySide6.QtCore import QEvent, Qt, QTimer
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QApplication
+
+from study_app.errors import StoreError
+from study_app.session.events import Submitted
+from study_app.session.pages import TroublePage
+from tests.gui.bridge.world import begin_trial
+
+
+def test_an_exception_in_a_slot_ends_in_zero_force(bridge, world, caplog):
+    begin_trial(bridge, world)
+    world.broken_clock = True
+    bridge._frame()
+    assert "stop_force" in world.done
+    assert not world.force_is_on
+    assert "the clock fell off the wall" in caplog.text
+    caplog.clear()
+    world.broken_clock = False
+    bridge._tiles()
+    assert "the clock fell off the wall" in bridge.operator.banner.what.text()
+
+
+def test_what_breaks_again_and_again_is_written_once(bridge, world, caplog):
+    begin_trial(bridge, world)
+    bridge.participant.show_view = None  # not callable: every frame fails
+    for _ in range(5):
+        world.now_s += 0.1
+        bridge._frame()
+    assert world.events().count("broke") == 1
+    assert len(caplog.records) == 1
+    caplog.clear()
+    assert isinstance(bridge.participant.page, TroublePage)
+    assert isinstance(bridge.failure, TypeError)
+
+
+def test_an_exception_in_painting_ends_in_zero_force_too(bridge, world, caplog, monkeypatch):
+    begin_trial(bridge, world)
+    heard = []
+    monkeypatch.setattr(bridge, "_hook_before", lambda *error: heard.append(error))
+    error = ValueError("no such colour")
+    sys.excepthook(ValueError, error, None)
+    assert not world.force_is_on
+    assert isinstance(bridge.participant.page, TroublePage)
+    assert heard == [(ValueError, error, None)]
+    monkeypatch.undo()
+    assert "no such colour" in caplog.text
+    caplog.clear()
+
+
+def test_an_event_that_comes_too_late_changes_nothing(bridge, world):
+    before = list(world.done)
+    bridge.participant.event.emit(Submitted(world.now_s))
+    assert world.done == before
+    assert bridge.trouble == ""
+    assert world.force_is_on
+
+
+def test_a_servo_fault_calls_the_operator(bridge, world):
+    begin_trial(bridge, world)
+    world.fault = "the device 'mouse' stopped answering; plug it in again and start anew"
+    bridge._frame()
+    assert isinstance(bridge.participant.page, TroublePage)
+    assert "stopped answering" in bridge.operator.banner.what.text()
+    assert "stopped answering" not in bridge.participant.page.paragraph
+    assert bridge.operator.device.chip.word == "Fault"
+    bridge._frame()
+    assert dict(bridge.view().device.rows)["Safety faults"] == "1"
+    world.fault = None
+    bridge._frame()
+    world.fault = "the device 'mouse' stopped answering again"
+    assert dict(bridge.view().device.rows)["Safety faults"] == "2"
+
+
+def test_what_fails_in_the_program_is_no_fault_of_the_device(bridge, world, caplog):
+    begin_trial(bridge, world)
+    bridge.fail(StoreError("the sealed key is gone"))
+    view = bridge.view()
+    assert view.state == "trouble"
+    assert view.device.ready
+    assert dict(view.device.rows)["Safety faults"] == "0"
+    caplog.clear()
+
+
+BROKEN = "no such colour"
+
+
+def breaks(*_arguments, **_named):
+    raise ValueError(BROKEN)
+
+
+def scribble(bridge):
+    """Emit what the operator's own slot listens to."""
+    bridge.operator.notes.field.setPlainText("left-handed")
+    bridge.operator.notes.field.entered.emit()
+
+
+def show_position(bridge):
+    bridge._traces()
+
+
+def choose_theme(bridge):
+    bridge.operator.header.theme_button.click()
+
+
+def paint_rail(bridge):
+    bridge.operator.rail.update()
+
+
+def paint_plot(bridge):
+    bridge.operator.position.plot.viewport().update()
+
+
+def paint_tank(bridge):
+    bridge.participant.tank.update()
+
+
+def tap(bridge):
+    """Press a key that the participant's window hears itself."""
+    key = QKeyEvent(QEvent.Type.KeyPress, Qt.Key.Key_Space, Qt.KeyboardModifier.NoModifier)
+    QApplication.postEvent(bridge.participant, key)
+
+
+def show_notes(bridge):
+    bridge.operator.mark_set.emit()
+
+
+def hold(bridge):
+    bridge.participant._escape.tapped.emit()
+
+
+@pytest.mark.parametrize(
+    ("owner", "method", "do"),
+    [
+        ("study_app.gui.operator.notes.NotesCard", "show_view", show_notes),
+        ("study_app.gui.operator.plots.PositionCard", "show_health", show_position),
+        ("study_app.gui.operator.notes.NoteField", "toPlainText", scribble),
+        ("study_app.gui.operator.window.OperatorWindow", "_change_theme", choose_theme),
+        ("study_app.gui.operator.rail.Rail", "paintEvent", paint_rail),
+        ("study_app.gui.plots.Plot", "paintEvent", paint_plot),
+        ("study_app.gui.scene_view.TankWidget", "paintEvent", paint_tank),
+        ("study_app.gui.participant.ParticipantWindow", "keyPressEvent", tap),
+        ("study_app.gui.participant.ParticipantWindow", "_pause", hold),
+    ],
+)
+def test_whatever_window_it_happens_in_a_failure_is_zero_force_and_told(
+    make, world, qtbot, monkeypatch, caplog, owner, method, do
+):
+    """Qt calls these itself: the exception is raised in a slot or an event of the window, not in the bridge."""
+    breaks_here = []
+
+    def broken(*arguments, **named):
+        if breaks_here:
+            breaks(*arguments, **named)
+        return whole(*arguments, **named)
+
+    kind = pkgutil.resolve_name(owner)
+    whole = getattr(kind, method)
+    monkeypatch.setattr(kind, method, broken, raising=False)
+    bridge = make()
+    heard = []
+    monkeypatch.setattr(bridge, "_hook_before", lambda *error: heard.append(error))
+    begin_trial(bridge, world)
+    QApplication.processEvents()
+    assert world.force_is_on
+    breaks_here.append(True)
+    QTimer.singleShot(0, lambda: do(bridge))  # from Qt's loop, as it is in the program
+    qtbot.waitUntil(lambda: not world.force_is_on)
+    assert world.events().count("broke") == 1
+    assert isinstance(bridge.participant.page, TroublePage)
+    assert BROKEN in bridge.operator.banner.what.text()
+    assert BROKEN in caplog.text
+    breaks_here.clear()
+    caplog.clear()

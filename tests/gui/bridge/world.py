@@ -1,0 +1,87 @@
+"""A servo, a store and a clock that do as they are told."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from study_app.errors import StoreError
+from study_app.haptics.layout import SAMPLE, records
+from study_app.session.events import Continue
+from study_app.session.pages import TaskPage
+
+
+class World:
+    """Servo, store and clock of a session, with everything they were asked in ``done``."""
+
+    def __init__(self):
+        self.done = []
+        self.now_s = 0.0
+        self.fault = None
+        self.force_is_on = True
+        self.overruns = 0
+        self.rate_hz = 1000.0
+        self.full = False
+        self.broken_clock = False
+        self.samples = records(SAMPLE, 0)
+        self.telemetry = SimpleNamespace(reader=self._reader, position_at=lambda time_ns: (np.zeros(3), time_ns))
+        self._serial = 0
+
+    def _reader(self):
+        return SimpleNamespace(read=lambda: self.samples, dropped=0)
+
+    def load(self, _scene):
+        self._serial += 1
+        self.done.append("load")
+        return self._serial
+
+    def rest(self):
+        self.done.append("rest")
+
+    def stop_force(self):
+        self.done.append("stop_force")
+        self.force_is_on = False
+
+    def fade_in(self):
+        self.done.append("fade_in")
+        self.force_is_on = True
+
+    def now_ns(self):
+        if self.broken_clock:
+            raise RuntimeError("the clock fell off the wall")
+        return round(self.now_s * 1e9)
+
+    def seconds(self):
+        return self.now_s
+
+    def append(self, event, *, t_s=None, **fields):
+        if self.full:
+            raise StoreError("no space left on the disk: free some")
+        self.done.append((event, fields))
+
+    def write_tables(self):
+        pass
+
+    def finish(self, status, reason=""):
+        self.append("session_ended", status=status, reason=reason)
+
+    def events(self):
+        return [done[0] for done in self.done if isinstance(done, tuple)]
+
+
+def begin_trial(bridge, world):
+    world.now_s += 1.0
+    bridge.participant.event.emit(Continue(world.now_s))
+    assert isinstance(bridge.participant.page, TaskPage)
+
+
+def tick(world, at_s):
+    """Return one sample of the scene now loaded, at a new time."""
+    world.now_s = at_s
+    sample = records(SAMPLE, 1)
+    sample.time_ns = round(at_s * 1e9)
+    sample.tick = round(at_s * 1000)
+    sample.scene = world._serial
+    sample.fresh = 1
+    return sample
