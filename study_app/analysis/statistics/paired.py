@@ -85,7 +85,7 @@ def paired(x: ArrayLike, y: ArrayLike, *, zeros: Zeros = "wilcox", alternative: 
         effect=effect,
         interval=interval,
         no_interval=reason,
-        note=_note(n, len(ranks), smallest),
+        note=_note(n, len(ranks), smallest, effect),
         zeros=int((differences == 0.0).sum()),
         superiority=float(np.sign(differences).mean()) if n else None,
         median_difference=float(np.median(differences)) if n else None,
@@ -143,14 +143,14 @@ def _fisher(effect: float | None, n: int) -> tuple[Interval | None, str]:
     if n < INTERVAL_FROM:
         return None, f"no interval below {INTERVAL_FROM} pairs that differ: it would cover far less than it claims"
     if abs(effect) == 1.0:
-        return None, "no interval: all pairs differ in the same direction"
+        return None, f"no interval: all {n} pairs that differ went one way"
     deviation = math.sqrt((2 * n**3 + 3 * n**2 + n) / 6) / (n * (n + 1) / 2)
     reach = float(norm.ppf(0.975)) * deviation
     low, high = math.tanh(math.atanh(effect) - reach), math.tanh(math.atanh(effect) + reach)
     return Interval(low, high, 0.95, "Fisher z, approximate: covers about 90 % up to two dozen pairs"), ""
 
 
-def _note(n: int, different: int, smallest: float | None) -> str:
+def _note(n: int, different: int, smallest: float | None, effect: float | None) -> str:
     if n == 0:
         return "no participant answered under both settings"
     if smallest is None:
@@ -159,4 +159,4 @@ def _note(n: int, different: int, smallest: float | None) -> str:
         return (
             f"cannot reach p < .05: the smallest p that {different} pairs with a difference can give is {smallest:.4g}"
         )
-    return ""
+    return f"all {different} pairs that differ went one way" if effect is not None and abs(effect) == 1.0 else ""

@@ -23,6 +23,9 @@ GUESSES: Final[Bounds] = (0.0, 0.5)
 LAPSES: Final[Bounds] = (0.0, 0.06)
 """Where a free rate may lie (lapses: Wichmann & Hill)."""
 
+NEAR: Final = 1e-4
+"""What is so near to a bound lies on it."""
+
 LOGISTIC: Final = 2 * float(np.log(19.0))
 NORMAL: Final = 2 * float(ndtri(0.95))
 """From 5 % to 95 % of the standard distributions."""
@@ -80,9 +83,8 @@ def fit(
     ``threshold`` holds the threshold fixed, for profiles; ``near`` is a curve to begin from.
     """
     low, span = float(counts.levels.min()), counts.span
-    gap = float(np.diff(np.unique(counts.levels)).min())
     middle = (-1.0, 2.0) if threshold is None else ((threshold - low) / span,) * 2
-    bounds = [middle, (np.log(gap / span / 10), np.log(10.0)), guess, lapse]
+    bounds = [middle, _log_widths(counts), guess, lapse]
     lows, highs = ([bound[end] for bound in bounds] for end in (0, 1))
     results = [
         minimize(
@@ -99,6 +101,28 @@ def fit(
     best = min(results, key=lambda result: float(result.fun))
     place, log_width, guessed, lapsed = (float(value) for value in best.x)
     return Curve(low + place * span, float(np.exp(log_width)) * span, guessed, lapsed, -float(best.fun))
+
+
+def at_bounds(counts: Counts, curve: Curve, guess: Bounds, lapse: Bounds) -> tuple[str, ...]:
+    """Return what of a fitted curve lies where the fit ends, so that the answers alone do not tell it."""
+    narrow, wide = (counts.span * float(np.exp(end)) for end in _log_widths(counts))
+    told = []
+    for what, found, (least, most) in (("guesses", curve.guess, guess), ("lapses", curve.lapse, lapse)):
+        if least < most and found > most - NEAR:
+            told.append(f"{what} are at the most that the fit allows ({most:g}) and may be more")
+    if curve.width < narrow * (1 + NEAR):
+        told.append("the curve is as steep as the fit allows: the levels lie too far apart to tell how steep it is")
+    if curve.width > wide * (1 - NEAR):
+        told.append("the curve is as flat as the fit allows")
+    if not counts.levels.min() <= curve.threshold <= counts.levels.max():
+        told.append("the threshold lies outside the levels that were asked about")
+    return tuple(told)
+
+
+def _log_widths(counts: Counts) -> Bounds:
+    """Return where the logarithm of the width may lie, in spans."""
+    gap = float(np.diff(np.unique(counts.levels)).min())
+    return float(np.log(gap / counts.span / 10)), float(np.log(10.0))
 
 
 def _starts(counts: Counts, guess: Bounds, lapse: Bounds, near: Curve | None, low: float) -> list[list[float]]:

@@ -16,7 +16,17 @@ from scipy.optimize import brentq
 from scipy.stats import chi2 as chi_square
 
 from study_app.analysis.statistics.outcome import Interval, Outcome, checked
-from study_app.analysis.statistics.psychometric import GUESSES, LAPSES, Bounds, Counts, Curve, Shape, fit, share
+from study_app.analysis.statistics.psychometric import (
+    GUESSES,
+    LAPSES,
+    Bounds,
+    Counts,
+    Curve,
+    Shape,
+    at_bounds,
+    fit,
+    share,
+)
 from study_app.errors import AnalysisError
 
 NOTICED_FROM: Final = 5.0
@@ -34,7 +44,8 @@ class Threshold(Outcome):
 
     ``statistic`` is the deviance; there is no p. ``yes`` of ``asked`` answers noticed something at each of ``levels``,
     where the curve expects ``expected``. ``lower`` and ``upper`` are the ends of the profile that exist: where one is
-    None there is no interval, and ``no_interval`` says which end is open.
+    None there is no interval, and ``no_interval`` says which end is open. ``note`` says what lies at an end
+    of the fit.
     """
 
     levels: tuple[float, ...]
@@ -98,7 +109,8 @@ def threshold(
     lapses: Bounds = LAPSES if lapse is None else (lapse, lapse)
     best = fit(counts, shape, guesses, lapses)
     ends = tuple(_end(counts, shape, guesses, lapses, best, side) for side in (-1.0, 1.0))
-    return _outcome(counts, best, (ends[0], ends[1]), shape, people, dropped, "" if n is None else POOLED)
+    told = (*at_bounds(counts, best, guesses, lapses), *([] if n is None else [POOLED]))
+    return _outcome(counts, best, (ends[0], ends[1]), shape, people, dropped, "; ".join(told))
 
 
 def _counts(levels: ArrayLike, yes: ArrayLike, asked: ArrayLike) -> Counts:

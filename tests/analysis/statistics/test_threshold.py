@@ -147,6 +147,23 @@ def test_answers_without_a_threshold_are_told(yes: list[int], note: str) -> None
     assert note in result.no_interval
 
 
+def test_rates_and_widths_at_the_end_of_the_fit_are_told() -> None:
+    # Three of twenty miss what everybody else notices: more lapses than the fit allows.
+    lapsing = threshold(DELAYS, [0, 0, 1, 4, 14, 17, 17], [20] * 7, n=20)
+    assert lapsing.lapse == pytest.approx(0.06)
+    assert "lapses are at the most that the fit allows (0.06) and may be more" in lapsing.note
+    assert "pooled" in lapsing.note
+    guessing = threshold(DELAYS, [13, 12, 13, 14, 15, 19, 20], [20] * 7)
+    assert "guesses are at the most that the fit allows (0.5)" in guessing.note
+    step = threshold(DELAYS, [0, 0, 0, 20, 20, 20, 20], [20] * 7)
+    assert "as steep as the fit allows" in step.note
+    above = threshold(DELAYS, [0, 0, 0, 0, 0, 1, 2], [20] * 7)
+    assert "outside the levels" in above.note
+    plain = threshold(DELAYS, [0, 1, 5, 9, 15, 20, 20], [20] * 7)
+    assert plain.note == ""
+    assert threshold(DELAYS, [0, 0, 1, 4, 14, 17, 17], [20] * 7, lapse=0.06).note == ""  # fixed, not found
+
+
 def test_an_open_interval_says_which_end_is_open() -> None:
     result = threshold(DELAYS, [0, 0, 0, 0, 0, 1, 1], [5] * 7)
     assert result.interval is None
