@@ -29,18 +29,30 @@ def title(block: Block) -> str:
 
 
 def counts(study: Study, block: Block) -> list[str]:
-    """Return what a figure says about n, the longest wording first."""
+    """Return what a figure says about n and about answers that are missing, the longest wording first."""
     people = people_a_setting(study, block)
     n = len(set(study.answers(block)["participant"]))
+    gaps, missing = _missing(study, block)
     if set(people.values()) != {n}:
         low, high = min(people.values()), max(people.values())
-        few = f"n = {low} to {high} of {n} participants" if low < high else f"n = {low} of {n} participants"
-        return [f"{few} in a {_noun(block)}", few, f"n = {low}–{high}"]
-    short = f"n = {n} participant" + ("s" if n != 1 else "")
-    presented = set(study.presented(block).values())
-    if presented == {n}:
-        return [f"{short}, every {_noun(block)} rated by all" if n > 1 else short, short, f"n = {n}"]
-    return [f"{short}, {_listed(presented)} presentations of a {_noun(block)}", short, f"n = {n}"]
+        short = f"n = {low} to {high} of {n} participants" if low < high else f"n = {low} of {n} participants"
+        whole, least = f"{short} in a {_noun(block)}", f"n = {low}–{high}"
+    else:
+        short, least = f"n = {n} participant" + ("s" if n != 1 else ""), f"n = {n}"
+        presented = set(study.presented(block).values())
+        whole = f"{short}, {_listed(presented)} presentations of a {_noun(block)}"
+        if presented == {n}:
+            whole = f"{short}, every {_noun(block)} {'presented to' if gaps else 'rated by'} all" if n > 1 else short
+    return [f"{whole}{gaps}", *([f"{whole}{missing}"] if gaps else []), f"{short}{missing}", f"{least}{missing}"]
+
+
+def _missing(study: Study, block: Block) -> tuple[str, str]:
+    """Return how many of the ratings that were asked for are not there, in more and in fewer words; empty if none."""
+    table = study.aggregate(block)
+    there, asked = int(table["n"].sum()), int(table["presented"].sum())
+    if there == asked:
+        return "", ""
+    return f", {asked - there} of {asked} ratings missing", f", {asked - there} missing"
 
 
 def people_a_setting(study: Study, block: Block) -> dict[str, int]:

@@ -64,19 +64,26 @@ class Reached:
 
 @dataclass(frozen=True, slots=True)
 class Performance:
-    """All measures. ``trials`` of reaching count, of which ``recorded`` have a recording that was read.
+    """All measures. ``reaching`` are the blocks whose task is one of reaching: only there are there reaches.
+
+    ``trials`` of reaching count, of which ``recorded`` have a recording that was read.
 
     ``unread`` says of the others why, a line each kind. Of ``judged`` trials it is known whether they kept to the
     protocol's limits of timing; ``invalid`` ones did not, and are in the measures all the same.
     """
 
     moved: tuple[Moved, ...]
+    reaching: tuple[str, ...]
     reached: tuple[Reached, ...]
     trials: int
     recorded: int
     judged: int
     invalid: int
     unread: tuple[str, ...]
+
+    def recorded_in(self, block: str) -> bool:
+        """Return whether there is any reach of a block."""
+        return any(trial.block == block for trial in self.reached)
 
     def by_participant(self, people: Sequence[str], block: Block, measure: str) -> Array:
         """Return the medians of a measure of reaches (participants, settings), NaN where there is none."""
@@ -102,7 +109,8 @@ def performance(study: Study, each: Callable[[int, int], object] = lambda _done,
     """
     rows = study.trials[study.trials["counted"]]
     tasks = {block.id: _targets(study.protocol, block) for block in study.blocks}
-    reaching = rows[rows["block"].isin([name for name, targets in tasks.items() if targets is not None])]
+    where = tuple(name for name, targets in tasks.items() if targets is not None)
+    reaching = rows[rows["block"].isin(where)]
     found: list[Reached] = []
     unread: dict[str, int] = {}
     for number, row in enumerate(reaching.to_dict("records")):
@@ -114,13 +122,14 @@ def performance(study: Study, each: Callable[[int, int], object] = lambda _done,
         else:
             found.append(one)
     moved = [*_of_trials(study, rows)]
-    whole = Performance((), tuple(found), 0, 0, 0, 0, ())
+    whole = Performance((), where, tuple(found), 0, 0, 0, 0, ())
     for block in study.blocks:
-        if tasks[block.id] is not None and found:
+        if block.id in where and found:
             for measure in OF_REACHES:
                 moved += _summarised(block, measure, whole.by_participant(study.people, block, measure))
     return Performance(
         moved=tuple(moved),
+        reaching=where,
         reached=tuple(found),
         trials=len(reaching),
         recorded=len(found),

@@ -130,9 +130,13 @@ def test_one_participant_is_one_participant(rek: Results) -> None:
 def test_a_row_with_missing_answers_tells_its_own_n(small: Results) -> None:
     small.add("A", lambda condition, item: 3 if item == "smooth" else CANNOT_JUDGE)
     small.add("B", lambda condition, item: 5)
-    figure = figures.liquids(load_study(small.folder))
+    study = load_study(small.folder)
+    figure = figures.liquids(study)
     assert words(figure).count("n 2") == 2
-    assert any("4 presentations" in word for word in words(figure))
+    assert "n = 2 participants, 4 missing" in words(figure)
+    told = captions.caption(study, study.blocks[0])
+    assert "n = 2 participants, 4 presentations of a setting, 4 of 16 ratings missing" in told
+    assert "Cannot judge: 4; not answered: 0." in told
 
 
 def test_delays_lie_on_a_true_scale_with_a_line_per_participant_and_the_median(rek: Results) -> None:

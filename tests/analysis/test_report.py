@@ -7,6 +7,7 @@ import io
 import json
 import re
 import shutil
+import subprocess
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -313,6 +314,83 @@ def test_the_script_in_r_has_every_number_of_the_report(of_twelve: Path) -> None
         assert repr(one["outcome"]["statistic"]) in script
     for one in found[1]["against"]:
         assert repr(one["found"]["p"]) in script
+
+
+def run_in_r(folder: Path) -> subprocess.CompletedProcess[str]:
+    if shutil.which("Rscript") is None:
+        pytest.skip("no Rscript here: the script of the report is not run")
+    return subprocess.run(["Rscript", "report.R"], cwd=folder, capture_output=True, text=True, check=False)
+
+
+def test_r_computes_the_same_numbers(of_twelve: Path) -> None:
+    done = run_in_r(of_twelve)
+    assert (done.returncode, done.stderr) == (0, "")
+    lines = done.stdout.splitlines()
+    assert lines[-1] == "every number that R computes is the report's"
+    told = re.compile(r"(.+?) +report +(\S+) +R +(\S+)")
+    computed = {found[1]: float(found[3]) for line in lines if (found := told.match(line))}
+    liquids, delays = numbers(of_twelve)["results"]["blocks"]
+    for one in liquids["omnibus"]:
+        assert computed[f"{one['item']} Friedman chi2"] == pytest.approx(one["outcome"]["statistic"], rel=1e-5)
+    for pair in liquids["pairs"]:
+        outcome, codes = pair["tested"]["outcome"], f"{pair['first']} and {pair['second']}"
+        assert computed[f"{pair['tested']['item']}, {codes} exact p"] == pytest.approx(outcome["p"], rel=1e-5)
+    for one in delays["trends"]:
+        assert computed[f"{one['item']} Page's L"] == pytest.approx(one["outcome"]["statistic"], rel=1e-5)
+        assert computed[f"{one['item']} exact p"] == pytest.approx(one["outcome"]["p"], rel=1e-5)
+    for one in delays["against"]:
+        what = f"{one['item']}, {one['delay_ms']:g} ms"
+        assert computed[f"{what} equivalence p"] == pytest.approx(one["found"]["p"], rel=1e-5)
+        assert computed[f"{what} difference p by t"] == pytest.approx(one["found"]["p_different"], rel=1e-5)
+    assert computed["liquids right names"] == liquids["named"]["found"]["statistic"]
+
+
+def test_r_finds_a_number_that_was_changed(of_twelve: Path, tmp_path: Path) -> None:
+    for name in ("report.R", "study-rek2024_description-responses_data.csv"):
+        shutil.copy(of_twelve / name, tmp_path)
+    one = numbers(of_twelve)["results"]["blocks"][1]["trends"][0]["outcome"]
+    script = (tmp_path / "report.R").read_text(encoding="utf-8")
+    (tmp_path / "report.R").write_text(script.replace(repr(one["statistic"]), repr(one["statistic"] + 1)))
+    done = run_in_r(tmp_path)
+    assert done.returncode == 1
+    assert done.stdout.count("DIFFERS") == 1
+    assert done.stdout.rstrip().endswith("numbers that differ: 1")
+
+
+def test_missing_answers_are_counted_where_they_are_and_what_is_one_way_is_said_so(
+    rek: Results, tmp_path: Path
+) -> None:
+    def gaps(condition: str, item: str) -> Answer:
+        if (condition, item) in (("honey", "immersive"), ("honey", "like_tar"), ("delay_50", "harder")):
+            return None
+        return {"water": 1, "honey": 6}.get(condition, 1 + (len(condition) * len(item)) % 7)
+
+    for number_ in range(1, 9):
+        rek.add(f"P{number_:03d}", gaps)
+    rek.open()
+    report(rek.folder, tmp_path / "report")
+    told = read(tmp_path / "report")
+    assert "n = 8 participants, every liquid presented to all, 16 of 216 ratings missing" in told
+    assert "n = 8 participants, every delay presented to all, 8 of 280 ratings missing" in told
+    assert "−1.00 – (all 8 one way)" in told
+    pairs = [row for row in rows(tmp_path / "report", "tests.csv") if row["question"] == "two settings differ"]
+    assert {row["note"] for row in pairs if row["effect"] != "n/a"} == {"all 8 pairs that differ went one way"}
+    done = run_in_r(tmp_path / "report")
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_what_a_block_cannot_have_is_said_and_validity_stands_beside_what_was_measured(of_twelve: Path) -> None:
+    told = read(of_twelve)
+    sections = re.search(r"Motion and force (.*?) Delay effect (.*?) Reaches:", told)
+    assert sections is not None
+    assert "No reaching task in this block" in sections[1]
+    assert "No reaching task in this block" not in sections[2]
+    assert "none of its recordings could be read" in sections[2]
+    for section in sections.groups():
+        assert "trials within limits" in section
+        assert "12 of 12" in section
+    for row in rows(of_twelve, "motion.csv"):
+        assert (row["trials"], row["judged"], row["valid"]) == ("12", "12", "12")
 
 
 def test_the_command_writes_it_and_tells_errors_in_one_line(small: Results, tmp_path: Path) -> None:

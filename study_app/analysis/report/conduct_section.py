@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Final
 
 from study_app.analysis.performance import DEFINITIONS as TRIAL_DEFINITIONS
@@ -63,7 +63,7 @@ def _delivered(study: Study, results: Results) -> Iterator[str]:
                 _ms(one.error_mean_ms),
                 _ms(one.error_worst_ms),
                 _trials(one),
-                f"{one.valid} of {one.judged}" if one.judged else "not measured",
+                _within(one),
             ]
             for one in results.delivered
         ],
@@ -79,6 +79,10 @@ def _delivered(study: Study, results: Results) -> Iterator[str]:
         + ". Trials beyond them are counted all the same, unless they are excluded above.",
         "soft",
     )
+
+
+def _within(one: Delivered) -> str:
+    return f"{one.valid} of {one.judged}" if one.judged else "not measured"
 
 
 def _ms(value: float | None) -> str:
@@ -132,23 +136,32 @@ def motion(results: Results) -> Iterator[str]:
         yield paragraph("After unblinding: a thick liquid is known by its force, and a delay by the motion.")
         return
     for found in results.blocks:
-        rows = _motion_rows(found, measured)
+        rows = _motion_rows(found, measured, results.delivered)
         if rows:
             yield heading(3, found.title)
-            measures = _measures(found, measured)
-            yield table((settings_noun(found).capitalize(), "n", *(_label(one) for one in measures)), rows)
+            measures = (*(_label(one) for one in _measures(found, measured)), "trials within limits")
+            yield table((settings_noun(found).capitalize(), "n", *measures), rows)
+            if found.id not in measured.reaching:
+                yield paragraph(
+                    "No reaching task in this block: movement time, overshoot and submovements do not exist here.",
+                    "soft",
+                )
+            elif not measured.recorded_in(found.id):
+                yield paragraph("No measures of reaches in this block: none of its recordings could be read.", "soft")
     yield paragraph(_recordings(measured))
     yield bullets(
         f"{_label(measure)}: {words}." for measure, words in {**TRIAL_DEFINITIONS, **REACH_DEFINITIONS}.items()
     )
     yield paragraph(
-        "Median over participants (quartiles); each participant counts by his or her own median. These measures are "
-        "described and not tested.",
+        "Median over participants (quartiles); each participant counts by his or her own median. Within limits: trials "
+        "that kept to the protocol's limits of timing, of those of which it is known; the others are in these numbers "
+        "too. These measures are described and not tested.",
         "soft",
     )
 
 
-def _motion_rows(found: BlockFound, measured: Performance) -> list[list[str]]:
+def _motion_rows(found: BlockFound, measured: Performance, delivered: Sequence[Delivered]) -> list[list[str]]:
+    kept = {one.code: _within(one) for one in delivered if one.block == found.id}
     cells: dict[str, dict[str, str]] = {}
     people: dict[str, int] = {}
     for one in measured.moved:
@@ -160,7 +173,7 @@ def _motion_rows(found: BlockFound, measured: Performance) -> list[list[str]]:
             people[one.code] = max(people.get(one.code, 0), one.n)
     measures = _measures(found, measured)
     return [
-        [name(found, code), str(people[code]), *(cells[code].get(measure, "–") for measure in measures)]
+        [name(found, code), str(people[code]), *(cells[code].get(measure, "–") for measure in measures), kept[code]]
         for code in [setting.code for setting in found.settings]
         if code in cells
     ]

@@ -61,6 +61,9 @@ MOTION: Final = (
     Column("median", "number", "Median over participants.", may_miss=True),
     Column("q1", "number", "Lower quartile over participants.", may_miss=True),
     Column("q3", "number", "Upper quartile over participants.", may_miss=True),
+    Column("trials", "integer", "Trials that count under the setting.", minimum=0),
+    Column("judged", "integer", "Of these: those of which it is known whether they kept to the limits.", minimum=0),
+    Column("valid", "integer", "Of these: those that kept to the protocol's limits of timing.", minimum=0),
 )
 
 
@@ -73,7 +76,18 @@ def motion_csv(results: Results) -> bytes:
     """Return a table with a row for every measure of motion and force under every setting."""
     moved = () if results.performance is None else results.performance.moved
     blocks = {found.id: found for found in results.blocks}
-    return csv_bytes(MOTION, [{**plain(one), "setting": name(blocks[one.block], one.code)} for one in moved])
+    kept = {(one.block, one.code): one for one in results.delivered}
+    return csv_bytes(
+        MOTION,
+        [
+            {
+                **plain(one),
+                "setting": name(blocks[one.block], one.code),
+                **{field: getattr(kept[one.block, one.code], field) for field in ("trials", "judged", "valid")},
+            }
+            for one in moved
+        ],
+    )
 
 
 def _tests(found: BlockFound) -> Iterator[dict[str, Any]]:

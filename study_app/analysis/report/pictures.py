@@ -39,7 +39,7 @@ def pictures(study: Study, results: Results) -> Iterator[Picture]:
         yield _answers(study, block, found, f"{block.kind}-{block.id}" if several else block.kind)
         if found.named is not None:
             yield _recognition(study, block, found, f"recognition-{block.id}" if several else "recognition")
-        if found.delays_ms and results.performance is not None and results.performance.recorded:
+        if found.delays_ms and results.performance is not None and results.performance.recorded_in(block.id):
             yield _movement(study, block, results, f"movement-{block.id}" if several else "movement")
 
 
@@ -125,6 +125,15 @@ def _movement(study: Study, block: Block, results: Results, name: str) -> Pictur
     caption = (
         f"How participants reached, over the delay that was asked for ({simulated}{n} with recordings). Thin lines: "
         "participants; thick line: median; band: the middle half. Movement time: from the lighting of a target to the "
-        "entry that was held. Scales do not begin at zero."
+        f"entry that was held. Scales do not begin at zero. {_kept(block, results)}"
     )
     return Picture(block.id, name, caption, files)
+
+
+def _kept(block: Block, results: Results) -> str:
+    """Say how many trials kept to the limits of timing."""
+    here = [one for one in results.delivered if one.block == block.id]
+    judged, valid = sum(one.judged for one in here), sum(one.valid for one in here)
+    if not judged:
+        return "Whether trials kept to the protocol's limits of timing was not measured."
+    return f"Trials that kept to the protocol's limits of timing: {valid} of {judged}; all are included."

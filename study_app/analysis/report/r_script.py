@@ -7,12 +7,14 @@ from typing import Final
 
 from study_app.analysis.results import BlockFound, Results
 from study_app.analysis.statistics.friedman import Friedman
+from study_app.analysis.statistics.trend import EXACT_UP_TO
 from study_app.analysis.tables import Study
 
 START: Final = """\
 # Computes the main numbers of report.html again, in base R (4.0 or newer, no packages), from the table of responses
-# beside this file, and says where they differ:  Rscript report.R
-# p: exact in the report, approximate here where base R has no exact test; such p are printed and not compared.
+# beside this file, and says where they differ:  Rscript report.R   (exit code 1 if any does)
+# The exact p of trends and of pairs come from all rearrangements, up to {exact} participants; beyond that, and for
+# Friedman's test, the approximate p are compared.
 
 answers <- read.csv("{table}", colClasses = "character", na.strings = "n/a", encoding = "UTF-8")
 answers <- answers[answers$counted == "true", ]
@@ -24,8 +26,20 @@ same <- function(what, reported, computed) {{
   if (!ok) differing <<- differing + 1
   cat(sprintf("%-64s report %12.6g   R %12.6g   %s\\n", what, reported, computed, if (ok) "" else "DIFFERS"))
 }}
-about <- function(what, reported, computed)
-  cat(sprintf("%-64s report %12.6g   R %12.6g   (approximate)\\n", what, reported, computed))
+
+# Sums of independent whole numbers: chances[i] is that of the sum i - 1.
+add <- function(chances, values, each = rep(1 / length(values), length(values))) {{
+  sums <- numeric(length(chances) + max(values))
+  for (place in seq_along(values)) {{
+    at <- seq_along(chances) + values[place]; sums[at] <- sums[at] + each[place] * chances
+  }}
+  sums
+}}
+at_least <- function(chances, value) sum(chances[(value + 1):length(chances)])
+orders <- function(k) if (k == 1) matrix(1) else {{
+  less <- orders(k - 1)
+  do.call(rbind, lapply(seq_len(k), function(place) cbind(place, ifelse(less >= place, less + 1, less))))
+}}
 
 # One row a participant, one column a setting; a participant's repeated answers count by their median.
 wide <- function(block, item, codes) {{
@@ -43,14 +57,26 @@ page <- function(what, table, falling, L, p) {{
   x <- whole(table); if (falling) x <- -x
   ranks <- t(apply(x, 1, rank)); n <- nrow(x); k <- ncol(x)
   found <- sum(ranks %*% seq_len(k))
-  spread <- sum((ranks - (k + 1) / 2)^2) / (k - 1) * k * (k^2 - 1) / 12
   same(paste(what, "Page's L"), L, found)
-  about(paste(what, "p"), p, pnorm((found - n * k * (k + 1)^2 / 4) / sqrt(spread), lower.tail = FALSE))
+  if (n > {exact}) {{
+    spread <- sum((ranks - (k + 1) / 2)^2) / (k - 1) * k * (k^2 - 1) / 12
+    same(paste(what, "p"), p, pnorm((found - n * k * (k + 1)^2 / 4) / sqrt(spread), lower.tail = FALSE))
+  }} else if (k <= 8) {{
+    every <- orders(k); chances <- 1
+    for (person in seq_len(n)) {{
+      counts <- table(matrix(2 * ranks[person, ][every], nrow(every)) %*% seq_len(k))
+      chances <- add(chances, as.numeric(names(counts)), counts / nrow(every))
+    }}
+    same(paste(what, "exact p"), p, at_least(chances, 2 * found))
+  }}
 }}
 pair <- function(what, table, first, second, V, p) {{
   found <- suppressWarnings(wilcox.test(table[, first], table[, second], paired = TRUE, exact = FALSE, correct = FALSE))
   same(paste(what, "Wilcoxon V"), V, unname(found$statistic))
-  about(paste(what, "p"), p, found$p.value)
+  d <- table[, first] - table[, second]; d <- d[!is.na(d) & d != 0]; chances <- 1
+  if (length(d) > {exact}) return(same(paste(what, "p"), p, found$p.value))
+  for (rank in 2 * rank(abs(d))) chances <- add(chances, c(0, rank))
+  same(paste(what, "exact p"), p, min(1, 2 * at_least(chances, 2 * max(V, sum(rank(abs(d))) - V))))
 }}
 equivalent <- function(what, table, first, second, bound, p, low, high, level, different) {{
   d <- table[, second] - table[, first]; d <- d[!is.na(d)]
@@ -76,7 +102,10 @@ hits <- function(what, block, items, codes, right, hits) {{
 """
 
 END: Final = """
-cat(if (differing == 0) "every number that R computes is the report's\\n" else paste(differing, "numbers differ\\n"))
+if (differing == 0) cat("every number that R computes is the report's\\n") else {
+  cat("numbers that differ:", differing, "\\n")
+  quit(status = 1)
+}
 """
 
 
@@ -84,7 +113,7 @@ def r_script(study: Study, results: Results) -> str:
     """Return the script."""
     table = f"study-{study.name}_description-responses_data.csv"
     calls = [line for found in results.blocks if found.n for line in _calls(found)]
-    return START.format(table=table) + "\n".join(calls) + "\n" + END
+    return START.format(table=table, exact=EXACT_UP_TO) + "\n".join(calls) + "\n" + END
 
 
 def _calls(found: BlockFound) -> Iterator[str]:

@@ -9,6 +9,7 @@ from study_app.analysis.report.page import box, bullets, heading, paragraph, pic
 from study_app.analysis.report.pictures import Picture
 from study_app.analysis.report.words import (
     VERDICTS_MEAN,
+    counted,
     interval,
     lead,
     missing,
@@ -24,7 +25,6 @@ from study_app.analysis.report.words import (
 )
 from study_app.analysis.results import Against, BlockFound, Pair, Results, Tested
 from study_app.analysis.statistics.ordinal import Ordinal
-from study_app.analysis.statistics.outcome import told
 from study_app.analysis.statistics.paired import Paired
 
 AGAINST = (
@@ -133,7 +133,7 @@ def _pairs(found: BlockFound) -> Iterator[str]:
                 p_value(one.tested.p_adjusted),
                 p_value(one.tested.outcome.smallest_p),
                 number(one.tested.outcome.effect),
-                interval(one.tested.outcome.interval),
+                _pair_interval(one),
                 one.tested.verdict,
             ]
             for one in found.pairs
@@ -144,9 +144,18 @@ def _pairs(found: BlockFound) -> Iterator[str]:
     yield paragraph(
         "Wilcoxon's signed ranks, exact, only in statements that differ as a whole; above 0 the first of a pair was "
         f"rated higher. p adjusted by Holm within each statement. {found.pairs[0].tested.outcome.method}. "
-        "Intervals: 95 %, Fisher z, which cover about 90 % up to two dozen pairs.",
+        "Intervals: 95 %, Fisher z, which cover about 90 % up to two dozen pairs; none where all pairs that differ "
+        "went one way, since −1 and 1 are the ends of the scale, nor below six pairs that differ.",
         "soft",
     )
+
+
+def _pair_interval(pair: Pair) -> str:
+    """Return the interval of a pair's effect, or in its place how many went one way, where all did."""
+    outcome = pair.tested.outcome
+    if outcome.effect is not None and abs(outcome.effect) == 1.0 and isinstance(outcome, Paired):
+        return f"– (all {outcome.n - outcome.zeros} one way)"
+    return interval(outcome.interval)
 
 
 def _pairs_used(pair: Pair) -> str:
@@ -268,9 +277,9 @@ def _about_against(against: Sequence[Against]) -> Iterator[str]:
     differing = 0.5 ** (first.n - 1) if first.n else 1.0
     if differing * len(against) > first.alpha:
         yield (
-            f"For a difference the signed ranks of {told(first.n, 'pair')} give {p_value(differing)} at least, so that "
-            "after the correction a single comparison cannot be called different, however clear it is; a trend over "
-            "all delays can."
+            f"For a difference the signed ranks of {counted(first.n, 'pair')} give {p_value(differing)} at least, so "
+            "that after the correction no comparison here can be called different, however clear it is; a trend over "
+            "all delays can be shown."
         )
     disagree = sum(one.found.checks_agree is False for one in against)
     if disagree:

@@ -40,8 +40,8 @@ def limits(study: Study, results: Results) -> tuple[str, ...]:
         ]
         if out:
             lines.append(
-                f"{lead(found)}: so few participants, with the ties in their answers, could not have shown anything "
-                f"in {listed(out)}, even had they all agreed."
+                f"{lead(found)}: so few participants, with the ties in their answers and the other p of the family as "
+                f"they came out, could not have shown anything in {listed(out)}, even had they all agreed."
             )
         lines += _mixed_up(found, results)
         lines += _of_equivalence(found)
@@ -176,7 +176,7 @@ def _delays(found: BlockFound) -> Iterator[str]:
         yield (
             f"{lead(found)}: the detection threshold is {threshold.effect:.0f} ms (95 % interval "
             f"{interval(threshold.interval, 0)} ms, n = {threshold.n}), if agreeing counts as noticing; "
-            f"{threshold.no_interval or threshold.note}."
+            f"{'; '.join(words for words in (threshold.no_interval, threshold.note) if words)}."
         )
     yield from _equivalent(found)
 
