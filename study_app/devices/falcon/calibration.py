@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
-import sys
 from dataclasses import asdict, dataclass
 from datetime import date
 from pathlib import Path
@@ -20,12 +18,12 @@ import numpy as np
 
 from study_app.devices.falcon.geometry import Geometry, geometry_named
 from study_app.devices.falcon.kinematics import REACHED, START_M, angles, forward, jacobian, new_mechanism
+from study_app.devices.user_folder import FOLDER_VARIABLE, user_folder
 from study_app.errors import DeviceError
 
 UNCALIBRATED_UNITS_PER_NM: Final = 6616.0
 """Martin & Hillier 2009, at second hand; libnifalcon's 10 000 would be felt half as strong again."""
 
-FOLDER_VARIABLE: Final = "LIQUID_STUDY_CONFIG"
 LEAST_POSES: Final = 5
 MOST_RESIDUAL_N: Final = 0.5
 """Weights that leave more unexplained do not fit together."""
@@ -129,21 +127,10 @@ def _solve(geometry: Geometry, offset_rad: float, counts: Any, pulled_n: Any, he
     return best, design @ best + pulled_n.ravel()
 
 
-def config_folder() -> Path:
-    """Return where the user's settings of this program are; it need not exist yet."""
-    if own := os.environ.get(FOLDER_VARIABLE):
-        return Path(own)
-    if sys.platform == "win32":
-        return Path(os.environ.get("APPDATA", Path.home() / "AppData" / "Roaming")) / "liquid-study"
-    if sys.platform == "darwin":
-        return Path.home() / "Library" / "Application Support" / "liquid-study"
-    return Path(os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config") / "liquid-study"
-
-
 def calibration_file(serial: str) -> Path:
     """Return where the calibration of the Falcon with this serial number is, or would be."""
     name = "".join(letter if letter.isalnum() and letter.isascii() else "-" for letter in serial)
-    return config_folder() / f"falcon-{name or 'unnamed'}.json"
+    return user_folder() / f"falcon-{name or 'unnamed'}.json"
 
 
 def save(serial: str, calibration: Calibration) -> Path:

@@ -9,7 +9,6 @@ import pytest
 from study_app.devices.falcon.calibration import (
     Calibration,
     calibration_file,
-    config_folder,
     fit,
     load,
     save,
@@ -144,18 +143,3 @@ class TestKeeping:
         described = self.CALIBRATION.describe()
         assert json.loads(json.dumps(described)) == described
         assert described["units_per_nm"] == 7000.0
-
-
-@pytest.mark.parametrize(
-    ("platform", "variable", "inside"),
-    [
-        ("linux", "XDG_CONFIG_HOME", "liquid-study"),
-        ("win32", "APPDATA", "liquid-study"),
-        ("darwin", "HOME", "Library/Application Support/liquid-study"),
-    ],
-)
-def test_settings_are_where_the_system_keeps_them(monkeypatch, tmp_path, platform, variable, inside):
-    monkeypatch.delenv("LIQUID_STUDY_CONFIG", raising=False)
-    monkeypatch.setattr("sys.platform", platform)
-    monkeypatch.setenv(variable, str(tmp_path))
-    assert config_folder() == tmp_path / inside

@@ -1,0 +1,18 @@
+"""Where the user's settings of this program are: calibrations, and what this machine is like; apart from results."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Final
+
+from platformdirs import user_config_path
+
+FOLDER_VARIABLE: Final = "LIQUID_STUDY_CONFIG"
+
+
+def user_folder() -> Path:
+    """Return where the user's settings of this program are; it need not exist yet."""
+    if own := os.environ.get(FOLDER_VARIABLE):
+        return Path(own)
+    return user_config_path("liquid-study", appauthor=False, roaming=True)
