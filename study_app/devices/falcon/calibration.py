@@ -18,8 +18,8 @@ import numpy as np
 
 from study_app.devices.falcon.geometry import Geometry, geometry_named
 from study_app.devices.falcon.kinematics import REACHED, START_M, angles, forward, jacobian, new_mechanism
-from study_app.devices.user_folder import FOLDER_VARIABLE, user_folder
 from study_app.errors import DeviceError
+from study_app.user_folder import FOLDER_VARIABLE, user_folder
 
 UNCALIBRATED_UNITS_PER_NM: Final = 6616.0
 """Martin & Hillier 2009, at second hand; libnifalcon's 10 000 would be felt half as strong again."""

@@ -9,7 +9,7 @@ import pytest
 from platformdirs.macos import MacOS
 from platformdirs.unix import Unix
 
-from study_app.devices.user_folder import user_folder
+from study_app.user_folder import user_folder
 
 
 def test_a_variable_points_elsewhere(monkeypatch, tmp_path):
