@@ -1,5 +1,6 @@
 """What all tests share: no screen, no Qt where its libraries are missing, and no warning that nobody expected."""
 
+import itertools
 import logging
 import os
 from collections.abc import Iterator
@@ -25,6 +26,15 @@ def pytest_plugin_registered(plugin: object, manager: pytest.PytestPluginManager
     """Without Qt the plugin that tests it cannot start, and must not keep the other tests from running."""
     if not QT_IS_HERE and manager.get_name(plugin) == "pytest-qt":
         manager.unregister(plugin)
+
+
+_settings = itertools.count()
+
+
+@pytest.fixture(autouse=True)
+def settings_of_nobody(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let no test meet, or change, the settings of this machine's user; the folder is not there until one is kept."""
+    monkeypatch.setenv("LIQUID_STUDY_CONFIG", str(tmp_path_factory.getbasetemp() / f"settings-{next(_settings)}"))
 
 
 @pytest.fixture(autouse=True)

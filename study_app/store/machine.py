@@ -1,0 +1,196 @@
+"""What this machine is like, apart from every study: its screens, its display's offset, its device, its folders.
+
+Kept as one JSON file in the user's folder, so that a protocol never says it and a study can move to another machine.
+Nothing here knows a window: sizes of screens come as numbers, in logical pixels and millimetres.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Annotated, Any, Final, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from study_app.errors import StoreError
+from study_app.protocol.problems import faults_of
+from study_app.store.atomic import cannot_read, cannot_write, write_file
+from study_app.user_folder import FOLDER_VARIABLE, user_folder
+
+NAME: Final = "machine.json"
+ASIDE: Final = "machine.damaged.json"
+LEAST_X_HEIGHT_DEG: Final = 0.4
+STATEMENT_X_HEIGHT_PX: Final = 16 * 1118 / 2048
+"""Height of an x of Inter in a statement as designed [logical px]: its size times the font's own ratio."""
+
+DISTANCE_MM: Final = (200.0, 3000.0)
+WIDTH_MM: Final = (80.0, 5000.0)
+OFFSET_MS: Final = (0.0, 500.0)
+SPREAD_MS: Final = (0.0, 200.0)
+How = Literal["photodiode", "high-speed camera", "data sheet"]
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+
+class DisplayOffset(_Strict):
+    """How much later than it is painted something lights up on a screen [ms]: ``mean_ms``, give or take ``spread_ms``.
+
+    ``measured`` is the day, ``screen`` the name of the screen it was measured on: it holds for no other.
+    """
+
+    mean_ms: Annotated[float, Field(ge=OFFSET_MS[0], le=OFFSET_MS[1])]
+    spread_ms: Annotated[float, Field(ge=SPREAD_MS[0], le=SPREAD_MS[1])] = 0.0
+    how: How = "photodiode"
+    measured: str = ""
+    screen: str = ""
+
+
+class MachineSettings(_Strict):
+    """What this machine is like.
+
+    ``screen`` is the participant's by its name, ``screen_number`` tells screens of one name apart and counts from 1;
+    ``viewing_distance_mm`` and ``screen_width_mm`` are None until somebody measured them. ``firmware`` is the file of a
+    Falcon's program, ``results`` the folder of the studies' folders; None is ``./results``. Whether ``device`` is known
+    is for those to say who open it.
+    """
+
+    screen: str = ""
+    screen_number: Annotated[int, Field(ge=1)] | None = None
+    viewing_distance_mm: Annotated[float, Field(ge=DISTANCE_MM[0], le=DISTANCE_MM[1])] | None = None
+    screen_width_mm: Annotated[float, Field(ge=WIDTH_MM[0], le=WIDTH_MM[1])] | None = None
+    display_offset: DisplayOffset | None = None
+    device: Annotated[str, Field(pattern=r"^[a-z][a-z-]*(:.+)?$")] = "mouse"
+    firmware: str | None = None
+    results: str | None = None
+    theme: Literal["light", "dark"] = "light"
+    sound: bool = False
+
+    @property
+    def firmware_file(self) -> Path | None:
+        """The file of a Falcon's program, if one was chosen."""
+        return None if self.firmware is None else Path(self.firmware)
+
+    @property
+    def results_folder(self) -> Path:
+        """The folder that holds the studies' folders."""
+        return Path("results" if self.results is None else self.results)
+
+    def screen_among(self, names: Sequence[str]) -> int:
+        """Return which of the screens with these names is the participant's, from 1; the last where it is not there."""
+        alike = [number for number, name in enumerate(names, start=1) if name == self.screen]
+        if not self.screen or not alike:
+            return len(names)
+        return self.screen_number if self.screen_number in alike else alike[0]
+
+    def offset_on(self, screen: str) -> DisplayOffset | None:
+        """Return the display offset that was measured on a screen; None where none was."""
+        offset = self.display_offset
+        return offset if offset is not None and offset.screen == screen else None
+
+    def text_scale(self, width_px: float, system_mm: float) -> float:
+        """Return how much larger than designed words must be for an x of 0.4° at the viewing distance.
+
+        ``width_px`` is the screen's width in logical pixels, ``system_mm`` the width that the system tells, used until
+        it is corrected. 1 where distance or width is not known; never smaller.
+        """
+        height_deg = self.x_height_deg(width_px, system_mm)
+        return 1.0 if height_deg is None else max(1.0, LEAST_X_HEIGHT_DEG / height_deg)
+
+    def x_height_deg(self, width_px: float, system_mm: float) -> float | None:
+        """Return under which angle an x of a statement is seen as designed; None where it cannot be known."""
+        width_mm = self.screen_width_mm if self.screen_width_mm is not None else system_mm
+        if self.viewing_distance_mm is None or width_mm <= 0 or width_px <= 0:
+            return None
+        height_mm = STATEMENT_X_HEIGHT_PX * width_mm / width_px
+        return math.degrees(2 * math.atan(height_mm / (2 * self.viewing_distance_mm)))
+
+    def describe(self, screen: str, width_px: float, system_mm: float) -> dict[str, Any]:
+        """Return what the receipt says of the participant's screen beside what the system tells of it."""
+        offset = self.offset_on(screen)
+        return {
+            "viewing_distance_mm": self.viewing_distance_mm,
+            "width_mm": self.screen_width_mm if self.screen_width_mm is not None else round(system_mm, 1),
+            "width_measured": self.screen_width_mm is not None,
+            "text_scale": round(self.text_scale(width_px, system_mm), 3),
+            "display_offset": None if offset is None else offset.model_dump(exclude={"screen"}),
+        }
+
+
+DEFAULTS: Final = MachineSettings()
+
+
+def settings_file() -> Path:
+    """Return where the settings are, or would be."""
+    return user_folder() / NAME
+
+
+def load() -> MachineSettings:
+    """Return the settings as they were kept; the defaults where none were.
+
+    Raises
+    ------
+    StoreError
+        There is a file, and it cannot be understood; one line says what is wrong with it.
+    """
+    path = settings_file()
+    try:
+        document = json.loads(path.read_bytes())
+    except FileNotFoundError:
+        return DEFAULTS
+    except OSError as error:
+        raise cannot_read(path, error) from error
+    except ValueError as error:
+        raise _unusable(path, f"it is no JSON ({error})") from error
+    if not isinstance(document, dict):
+        raise _unusable(path, "it is no table of settings")
+    try:
+        return MachineSettings.model_validate(document)
+    except ValidationError as error:
+        raise _unusable(path, _first(error, document)) from error
+
+
+def load_or_default() -> tuple[MachineSettings, str]:
+    """Return the settings, and why they are the defaults where a file cannot be understood ("" where it can)."""
+    try:
+        return load(), ""
+    except StoreError as error:
+        return DEFAULTS, str(error)
+
+
+def save(settings: MachineSettings) -> None:
+    """Keep the settings, whole or not at all; a file that could not be understood is put aside first.
+
+    Raises
+    ------
+    StoreError
+        They cannot be written.
+    """
+    path = settings_file()
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if load_or_default()[1]:
+            with suppress(FileNotFoundError):
+                path.replace(path.with_name(ASIDE))
+    except OSError as error:
+        raise cannot_write(path, error) from error
+    text = json.dumps(settings.model_dump(mode="json"), indent=2, ensure_ascii=False)
+    write_file(path, f"{text}\n".encode())
+
+
+def _first(error: ValidationError, document: dict[str, Any]) -> str:
+    """Return what is wrong with a file, in a line: first what can be hinted at."""
+    fault = min(faults_of(error, document, MachineSettings.model_json_schema()), key=lambda found: not found.hint)
+    hint = f" ({fault.hint})" if fault.hint else ""
+    return f"{'.'.join(str(step) for step in fault.path)}: {fault.message}{hint}"
+
+
+def _unusable(path: Path, why: str) -> StoreError:
+    return StoreError(
+        f"this machine's settings in {path} cannot be used, {why}: mend or delete the file, or set {FOLDER_VARIABLE} "
+        "to another folder"
+    )
