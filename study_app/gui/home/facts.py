@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
-from study_app.errors import ProtocolError, StoreError, StudyError
+from study_app.errors import ProtocolError, StudyError
+from study_app.gui.sessions.facts import SessionFacts, counted, started_words
 from study_app.protocol.describe import expected_duration_s
 from study_app.protocol.load import load, shipped
 from study_app.protocol.model import Protocol
 from study_app.protocol.schedule import PageStep, Schedule, build_schedule
 from study_app.session.resume import find_protocol, is_rehearsal, resume_at
 from study_app.store import journal, receipt
-from study_app.store.exclusions import exclusions
-from study_app.store.layout import StudyFolder, locate
+from study_app.store.layout import locate
 from study_app.store.opening import is_open
-from study_app.store.participants import participants
 from study_app.store.progress import progress_of
 
 LANGUAGES = {"en": "English", "nl": "Dutch", "de": "German", "fr": "French", "es": "Spanish", "it": "Italian"}
@@ -44,34 +42,6 @@ class BrokenFacts:
 
     source: str
     problem: str
-
-
-@dataclass(frozen=True, slots=True)
-class SessionFacts:
-    """A session as a row shows it; ``excluded`` is why all of it is left out of the analysis, None where it is not."""
-
-    participant: str
-    session: int
-    study: str
-    started: datetime
-    status: str
-    validity: str | None
-    answers: int
-    answers_of: int | None
-    simulated: bool
-    pilot: bool
-    folder: Path
-    excluded: str | None = None
-
-    @property
-    def kind(self) -> str:
-        """What it is where it is not a participant's: "simulated", "pilot", else nothing."""
-        return "simulated" if self.simulated else "pilot" if self.pilot else ""
-
-    @property
-    def needs_care(self) -> bool:
-        """Whether it was begun and never ended."""
-        return self.status in {"unfinished", "damaged"}
 
 
 def sources() -> tuple[str, ...]:
@@ -106,45 +76,6 @@ def study_facts(source: str) -> StudyFacts | BrokenFacts:
         duration=f"about {max(1, round(expected_duration_s(protocol) / 60))} min",
         needs=f"Falcon or mouse; at most {protocol.device.force_limit_n:g} N",
     )
-
-
-def sessions(results: Path, answers_of: dict[str, int]) -> tuple[SessionFacts, ...]:
-    """Return the sessions in all study folders under ``results``: those that need care first, then the newest.
-
-    ``answers_of`` says how many answers a whole session of a study has. Folders that hold no study are passed over.
-    """
-    found: list[SessionFacts] = []
-    for data in sorted(results.glob("*/data")):
-        try:
-            rows = participants(StudyFolder(data.parent))
-        except StoreError:
-            continue  # not ours, or not readable: the commands say why when asked about that folder
-        excluded = _excluded(data.parent)
-        found += [
-            SessionFacts(
-                participant=row["participant"],
-                session=int(row["session"]),
-                study=row["study"],
-                started=datetime.fromisoformat(row["session_started_at"]),
-                status=row["status"],
-                validity=row["validity"],
-                answers=int(row["responses"]),
-                answers_of=answers_of.get(row["study"]),
-                simulated=bool(row["simulated"]),
-                pilot=bool(row["pilot"]),
-                folder=StudyFolder(data.parent).session(row["participant"], int(row["session"])).path,
-                excluded=excluded.get((row["participant"], int(row["session"]))),
-            )
-            for row in rows
-        ]
-    return tuple(sorted(found, key=lambda session: (not session.needs_care, -session.started.timestamp())))
-
-
-def _excluded(study: Path) -> dict[tuple[str, int], str]:
-    """Return why whole sessions are left out; nothing where the list cannot be read, which the commands complain of."""
-    with contextlib.suppress(StoreError):
-        return {(one.participant, one.session): one.reason for one in exclusions(study) if one.trial is None}
-    return {}
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,16 +143,3 @@ def held(found: Iterable[SessionFacts], study: str) -> str:
     complete = sum(session.status == "completed" for session in own)
     excluded = sum(session.excluded is not None for session in own)
     return f"{counted(len(own), 'session')}, {complete} complete" + (f", {excluded} excluded" if excluded else "")
-
-
-def counted(number: int, word: str) -> str:
-    """Return "1 part", "2 parts"."""
-    return f"{number} {word}" if number == 1 else f"{number} {word}s"
-
-
-def started_words(started: datetime, now: datetime) -> str:
-    """Return when a session began as people say it: "Today 09:31", "Yesterday 16:11", "18 Nov 15:20"."""
-    days = (now.date() - started.date()).days
-    day = {0: "Today", 1: "Yesterday"}.get(days, f"{started.day} {started:%b}")
-    year = "" if started.year == now.year else f" {started.year}"
-    return f"{day}{year} {started:%H:%M}"

@@ -22,7 +22,6 @@ from study_app.gui.home.facts import (
     StudyFacts,
     held,
     interrupted,
-    sessions,
     sources,
     study_facts,
 )
@@ -31,6 +30,7 @@ from study_app.gui.home.table import SessionsCard
 from study_app.gui.labels import label
 from study_app.gui.new_session import NewSessionDialog
 from study_app.gui.place import Place
+from study_app.gui.sessions.facts import sessions
 from study_app.gui.themed import dress
 
 STACKED_BELOW = 1080

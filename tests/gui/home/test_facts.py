@@ -11,11 +11,10 @@ from study_app.gui.home.facts import (
     StudyFacts,
     held,
     interrupted,
-    sessions,
     sources,
-    started_words,
     study_facts,
 )
+from study_app.gui.sessions.facts import sessions, started_words
 from study_app.protocol.load import load, source_bytes
 from study_app.protocol.schedule import PageStep, build_schedule
 from study_app.session.resume import REHEARSED_SCREENS
@@ -188,3 +187,14 @@ def test_times_are_said_as_people_say_them():
     assert started_words(now - timedelta(hours=20), now) == "Yesterday 19:00"
     assert started_words(datetime(2024, 11, 18, 9, 5).astimezone(), now) == "18 Nov 09:05"
     assert started_words(datetime(2023, 3, 1, 9, 5).astimezone(), now) == "1 Mar 2023 09:05"
+
+
+def test_a_session_whose_journal_tells_nothing_is_still_listed(tmp_path):
+    start(tmp_path, "P001", "completed")
+    start(tmp_path, "P002", "completed")
+    journal = tmp_path / "demo" / "data" / "sub-P001" / "ses-01" / "journal.jsonl"
+    first = journal.read_text().splitlines()[0]
+    journal.write_text(first.replace('"at":', '"once":').replace('"event":"session_started"', '"event":"tired"') + "\n")
+    found = sessions(tmp_path, {})
+    assert [(one.participant, one.status) for one in found] == [("P001", "damaged"), ("P002", "completed")]
+    assert found[0].answers == 0

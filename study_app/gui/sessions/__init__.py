@@ -1,0 +1,1 @@
+"""Sessions as rows of a table, wherever a window lists them."""

@@ -1,0 +1,120 @@
+"""What a row says of a session, as values. No Qt here."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from study_app.errors import StoreError
+from study_app.store.exclusions import Exclusion, exclusions
+from study_app.store.layout import StudyFolder
+from study_app.store.participants import participants
+
+
+@dataclass(frozen=True, slots=True)
+class SessionFacts:
+    """A session as a row shows it; ``excluded`` is why all of it is left out of the analysis, None where it is not."""
+
+    participant: str
+    session: int
+    study: str
+    started: datetime
+    status: str
+    validity: str | None
+    answers: int
+    answers_of: int | None
+    simulated: bool
+    pilot: bool
+    folder: Path
+    excluded: str | None = None
+
+    @property
+    def kind(self) -> str:
+        """What it is where it is not a participant's: "simulated", "pilot", else nothing."""
+        return "simulated" if self.simulated else "pilot" if self.pilot else ""
+
+    @property
+    def needs_care(self) -> bool:
+        """Whether it was begun and never ended."""
+        return self.status in {"unfinished", "damaged"}
+
+    @property
+    def counts(self) -> bool:
+        """Whether its answers enter measures and figures."""
+        return self.status == "completed" and self.excluded is None
+
+    @property
+    def name(self) -> str:
+        """The participant, and which session it is where it is not the first."""
+        return self.participant if self.session == 1 else f"{self.participant}, session {self.session}"
+
+
+def sessions(results: Path, answers_of: Mapping[str, int]) -> tuple[SessionFacts, ...]:
+    """Return the sessions in all study folders under ``results``: those that need care first, then the newest.
+
+    ``answers_of`` says how many answers a whole session of a study has. Folders that hold no study are passed over.
+    """
+    found: list[SessionFacts] = []
+    for data in sorted(results.glob("*/data")):
+        with contextlib.suppress(StoreError):  # not ours, or not readable: the commands say why when asked about it
+            rows = participants(StudyFolder(data.parent))
+            found += session_facts(data.parent, rows, _exclusions(data.parent), answers_of)
+    return tuple(sorted(found, key=lambda session: (not session.needs_care, -session.started.timestamp())))
+
+
+def session_facts(
+    study: Path, rows: Iterable[Mapping[str, Any]], listed: Iterable[Exclusion], answers_of: Mapping[str, int]
+) -> list[SessionFacts]:
+    """Return the rows of a study's participants as facts; ``listed`` is what is left out of the analysis."""
+    reasons = {(one.participant, one.session): one.reason for one in listed if one.trial is None}
+    placed = [(row, StudyFolder(study).session(row["participant"], int(row["session"])).path) for row in rows]
+    return [
+        SessionFacts(
+            participant=row["participant"],
+            session=int(row["session"]),
+            study=str(row["study"]),
+            started=_started(row["session_started_at"], folder),
+            status=row["status"],
+            validity=row["validity"],
+            answers=int(row["responses"] or 0),
+            answers_of=answers_of.get(row["study"]),
+            simulated=bool(row["simulated"]),
+            pilot=bool(row["pilot"]),
+            folder=folder,
+            excluded=reasons.get((row["participant"], int(row["session"]))),
+        )
+        for row, folder in placed
+    ]
+
+
+def _started(told: object, folder: Path) -> datetime:
+    """Return when a session began; where its journal is too damaged to tell, when its folder last changed."""
+    with contextlib.suppress(ValueError):
+        return datetime.fromisoformat(str(told))
+    with contextlib.suppress(OSError):
+        return datetime.fromtimestamp(folder.stat().st_mtime).astimezone()
+    return datetime.fromtimestamp(0).astimezone()
+
+
+def _exclusions(study: Path) -> tuple[Exclusion, ...]:
+    """Return what is left out; nothing where the list cannot be read, which the commands complain of."""
+    with contextlib.suppress(StoreError):
+        return exclusions(study)
+    return ()
+
+
+def counted(number: int, word: str) -> str:
+    """Return "1 part", "2 parts"."""
+    return f"{number} {word}" if number == 1 else f"{number} {word}s"
+
+
+def started_words(started: datetime, now: datetime) -> str:
+    """Return when a session began as people say it: "Today 09:31", "Yesterday 16:11", "18 Nov 15:20"."""
+    days = (now.date() - started.date()).days
+    day = {0: "Today", 1: "Yesterday"}.get(days, f"{started.day} {started:%b}")
+    year = "" if started.year == now.year else f" {started.year}"
+    return f"{day}{year} {started:%H:%M}"
