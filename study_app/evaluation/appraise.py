@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
 from study_app.evaluation import references
+from study_app.evaluation.appraiser import Costs, EffectCost, Errors
 from study_app.evaluation.cost import measure
 from study_app.haptics.gate import ORDER, calls_for, resolve
 from study_app.haptics.motion import Motion
@@ -23,39 +23,6 @@ _MOTIONS: Final = (
     ("reverse", {"revolutions": 1.0, "against_s": 0.7, "rest_s": 0.5}),
     ("zigzag", {"leg_s": 0.25, "legs": 8.0}),
 )
-
-
-@dataclass(frozen=True, slots=True)
-class EffectCost:
-    """What an effect takes of a tick [ns]; None where it is not there, and why."""
-
-    effect: str
-    ns: float | None
-    why: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class Costs:
-    """What a scene takes: a tick of it, one of a scene without liquids, and each effect [ns]."""
-
-    tick_ns: float
-    rest_ns: float
-    effects: tuple[EffectCost, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Errors:
-    """How far a scene is from the definition by the letter (``references``), along programmed paths.
-
-    ``wake`` is the largest difference as a share of Σ|e|/S, ``force_n`` that of the forces [N]; None where there is no
-    reference. ``lag_s`` is how late the velocity filter is on a motion that speeds up evenly. ``left_out`` are effects
-    that were not compared.
-    """
-
-    wake: float | None
-    force_n: float | None
-    lag_s: float
-    left_out: tuple[str, ...]
 
 
 def costs(scene: Scene, *, batches: int = BATCHES) -> Costs:

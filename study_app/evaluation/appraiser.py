@@ -1,95 +1,189 @@
 """The process that appraises scenes, from both its ends.
 
 It begins as the least important one of the machine, before it loads anything, so that it takes nothing from a servo.
+A question is a line of JSON, {"number": 3, "scene": {...}}; its answers are lines with the same number and "costs",
+then "errors", or with "why" nothing could be measured.
 """
 
 from __future__ import annotations
 
-import multiprocessing
+import json
 import os
 import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Iterable
 from contextlib import suppress
-from multiprocessing.connection import Connection
-from typing import TYPE_CHECKING, Final, TypeAlias
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from typing import Any, Final, TextIO, TypeAlias
 
 from study_app.errors import StudyError
-
-if TYPE_CHECKING:
-    from study_app.evaluation.appraise import Costs, Errors
-    from study_app.haptics.scene import Scene
-
-Told: TypeAlias = "tuple[int, Costs | Errors | str]"
+from study_app.haptics.scene import Scene
 
 NICEST: Final = 19
 PATIENCE_S: Final = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class EffectCost:
+    """What an effect takes of a tick [ns]; None where it is not there, and why."""
+
+    effect: str
+    ns: float | None
+    why: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Costs:
+    """What a scene takes: a tick of it, one of a scene without liquids, and each effect [ns]."""
+
+    tick_ns: float
+    rest_ns: float
+    effects: tuple[EffectCost, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Errors:
+    """How far a scene is from the definition by the letter (``evaluation.references``), along programmed paths.
+
+    ``wake`` is the largest difference as a share of Σ|e|/S, ``force_n`` that of the forces [N]; None where there is no
+    reference. ``lag_s`` is how late the velocity filter is on a motion that speeds up evenly. ``left_out`` are effects
+    that were not compared.
+    """
+
+    wake: float | None
+    force_n: float | None
+    lag_s: float
+    left_out: tuple[str, ...]
+
+
+Told: TypeAlias = tuple[int, Costs | Errors | str]
 
 
 class Appraiser:
     """Asks a process of its own what scenes cost and how true they are; never waits for it."""
 
     def __init__(self) -> None:
-        context = multiprocessing.get_context("spawn")
-        self._connection, far = context.Pipe()
-        self._process = context.Process(target=serve, args=(far,), name="appraiser", daemon=True)
-        self._process.start()
-        far.close()
+        root = str(Path(__file__).resolve().parents[2])
+        paths = [root, *filter(None, [os.environ.get("PYTHONPATH")])]
+        self._process = subprocess.Popen(
+            [sys.executable, "-P", "-m", "study_app.evaluation.appraiser"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            env=os.environ | {"PYTHONPATH": os.pathsep.join(paths)},
+            text=True,
+            encoding="utf-8",
+        )
         self._asked = 0
+        self._told: SimpleQueue[Told] = SimpleQueue()
+        self._listening = threading.Thread(target=self._listen, name="appraiser", daemon=True)
+        self._listening.start()
 
     @property
     def works(self) -> bool:
         """Whether there still is somebody to ask."""
-        return self._process.is_alive()
+        return self._process.poll() is None
 
     def ask(self, scene: Scene) -> int:
         """Ask about a scene; return the number that its answers have. Answers to earlier questions may still come."""
         self._asked += 1
-        with suppress(BrokenPipeError):
-            self._connection.send((self._asked, scene))
+        question = {"number": self._asked, "scene": scene.model_dump(mode="json")}
+        with suppress(OSError, ValueError):  # it ended, or was closed: `works` says so
+            assert self._process.stdin is not None  # noqa: S101 - made so
+            self._process.stdin.write(json.dumps(question) + "\n")
+            self._process.stdin.flush()
         return self._asked
 
-    def answers(self) -> list[Told]:
+    def answers(self, wait_s: float = 0.0) -> list[Told]:
         """Return what was answered since: (number, `Costs`), (number, `Errors`), or (number, a sentence why not)."""
         found: list[Told] = []
-        with suppress(EOFError, ConnectionResetError):
-            while self._connection.poll():
-                found.append(self._connection.recv())
+        with suppress(Empty):
+            while True:
+                found.append(self._told.get(timeout=wait_s) if wait_s and not found else self._told.get_nowait())
         return found
 
     def close(self) -> None:
         """End the process, whatever it is doing."""
-        self._connection.close()
         self._process.terminate()
-        self._process.join(PATIENCE_S)
-        if self._process.is_alive():
+        try:
+            self._process.wait(PATIENCE_S)
+        except subprocess.TimeoutExpired:
             self._process.kill()
-            self._process.join(PATIENCE_S)
-        self._process.close()
+            self._process.wait(PATIENCE_S)
+        self._listening.join(PATIENCE_S)
+        for pipe in (self._process.stdin, self._process.stdout):
+            if pipe is not None:
+                with suppress(OSError):
+                    pipe.close()
+
+    def _listen(self) -> None:
+        """Read answers until there are no more, in a thread of its own."""
+        assert self._process.stdout is not None  # noqa: S101 - made so
+        for line in self._process.stdout:
+            self._told.put(_read(json.loads(line)))
 
 
-def serve(connection: Connection) -> None:
-    """Answer (number, scene) with (number, `Costs`), then (number, `Errors`), until nobody is there any more.
+def _read(told: dict[str, Any]) -> Told:
+    """Return an answer as the other end meant it."""
+    number = int(told["number"])
+    if "costs" in told:
+        costs = told["costs"]
+        effects = tuple(EffectCost(**it) for it in costs["effects"])
+        return number, Costs(costs["tick_ns"], costs["rest_ns"], effects)
+    if "errors" in told:
+        return number, Errors(**(told["errors"] | {"left_out": tuple(told["errors"]["left_out"])}))
+    return number, str(told["why"])
 
-    Of several scenes that wait, the newest is measured; one that is followed by another gets no errors.
+
+def serve(questions: Iterable[str], answers: TextIO) -> None:
+    """Answer every question, the costs before the errors, until there are no more.
+
+    Of several that wait, the newest is answered; one that is followed by another is told no errors.
     """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the program; this ends with its connection
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the program; this ends when nobody asks any more
     if hasattr(os, "nice"):
         os.nice(NICEST)
     from study_app.evaluation.appraise import costs, errors  # noqa: PLC0415 - the compiler: only in this process
 
-    with suppress(EOFError, BrokenPipeError, ConnectionResetError):
-        while True:
-            number, scene = _newest(connection)
-            try:
-                connection.send((number, costs(scene)))
-                if not connection.poll():
-                    connection.send((number, errors(scene)))
-            except StudyError as error:
-                connection.send((number, str(error)))
+    waiting: SimpleQueue[str | None] = SimpleQueue()
+    threading.Thread(target=_queue, args=(questions, waiting), daemon=True).start()
+    while (question := _newest(waiting)) is not None:
+        asked = json.loads(question)
+        scene = Scene.model_validate_json(json.dumps(asked["scene"]))
+        try:
+            _tell(answers, asked["number"], costs=asdict(costs(scene)))
+            if waiting.empty():
+                _tell(answers, asked["number"], errors=asdict(errors(scene)))
+        except StudyError as error:
+            _tell(answers, asked["number"], why=str(error))
 
 
-def _newest(connection: Connection) -> tuple[int, Scene]:
-    """Wait for a scene, and return the last one that was asked for."""
-    asked: tuple[int, Scene] = connection.recv()
-    while connection.poll():
-        asked = connection.recv()
-    return asked
+def _tell(answers: TextIO, number: int, **what: object) -> None:
+    answers.write(json.dumps({"number": number} | what) + "\n")
+    answers.flush()
+
+
+def _queue(questions: Iterable[str], waiting: SimpleQueue[str | None]) -> None:
+    for question in questions:
+        waiting.put(question)
+    waiting.put(None)
+
+
+def _newest(waiting: SimpleQueue[str | None]) -> str | None:
+    """Wait for a question, and return the last one there is; None where nobody asks any more."""
+    question = waiting.get()
+    while question is not None and not waiting.empty():
+        following = waiting.get()
+        if following is None:
+            waiting.put(None)
+            return question
+        question = following
+    return question
+
+
+if __name__ == "__main__":
+    with suppress(BrokenPipeError):
+        serve(sys.stdin, sys.stdout)

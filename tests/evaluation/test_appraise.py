@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import io
+import json
+import os
+import signal
+
 import numba
 import pytest
 
@@ -9,8 +14,7 @@ if numba.config.DISABLE_JIT:
     pytest.skip("costs are those of compiled code", allow_module_level=True)
 
 from study_app.evaluation import appraise
-from study_app.evaluation.appraise import Costs, Errors
-from study_app.evaluation.appraiser import Appraiser
+from study_app.evaluation.appraiser import Appraiser, Costs, serve
 from study_app.haptics.scene import Ewma, Line, Raw
 from study_app.protocol.load import load_scenes
 
@@ -79,14 +83,32 @@ def test_the_process_answers_the_newest_question_and_ends_when_told() -> None:
         newest = appraiser.ask(THESIS["water"])
         answered: dict[int, list[object]] = {}
         while len(answered.get(newest, [])) < 2:
-            assert appraiser._connection.poll(120.0)  # the first time it compiles
-            for number, answer in appraiser.answers():
+            told = appraiser.answers(wait_s=120.0)  # the first time it compiles
+            assert told
+            for number, answer in told:
                 answered.setdefault(number, []).append(answer)
         first, second = answered[newest]
         assert isinstance(first, Costs)
-        assert isinstance(second, Errors)
-        process = appraiser._process
+        assert [it.effect for it in first.effects if it.ns is not None] == ["drag", "wake"]
+        assert second == appraise.errors(THESIS["water"])
+        assert appraiser.works
     finally:
         appraiser.close()
-    with pytest.raises(ValueError, match="closed"):
-        process.is_alive()
+    assert not appraiser.works
+    appraiser.ask(THESIS["honey"])
+    assert appraiser.answers() == []
+
+
+def test_what_cannot_be_measured_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "nice", lambda _by: 0)  # the tests go on in this process
+    wild = THESIS["water"].model_copy(update={"rate_hz": 100.0})  # slower than any loop that is known to be stable
+    question = json.dumps({"number": 7, "scene": wild.model_dump(mode="json")})
+    out = io.StringIO()
+    before = signal.getsignal(signal.SIGINT)
+    try:
+        serve([question], out)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    (told,) = (json.loads(line) for line in out.getvalue().splitlines())
+    assert told["number"] == 7
+    assert "no stable force is known" in told["why"]
