@@ -20,8 +20,8 @@ from study_app.cli.words import EXIT_FOUND
 if TYPE_CHECKING:
     from study_app.devices.falcon.calibration import Calibration
     from study_app.devices.falcon.device import FalconDevice
-    from study_app.devices.falcon.doctor import Examined
     from study_app.devices.falcon.emulator.face import Emulator
+    from study_app.devices.falcon.findings import Report
     from study_app.devices.falcon.weighing import Ask, Notes
 
 _WIDTH = 100
@@ -60,46 +60,32 @@ def doctor(name: str, firmware: Path | None, faults: tuple[str, ...]) -> None:
     NAME is falcon, falcon:SERIAL, falcon-emulated or falcon-socket:PATH. Exit code 3 where something is wrong.
     """
     click.echo(_PREPARING)  # what is imported and compiled next takes long the first time
-    from study_app.devices.falcon.diagnosis import diagnose
     from study_app.devices.falcon.doctor import examine
+    from study_app.devices.falcon.findings import report
 
-    examined = examine(name, firmware=firmware, faults=faults, tell=click.echo)
-    for line in report(examined):
+    found = report(examine(name, firmware=firmware, faults=faults, tell=click.echo))
+    for line in _reported(found):
         click.echo(line)
-    if diagnose(examined.facts) or examined.failure is not None:
+    if not found.well:
         click.get_current_context().exit(EXIT_FOUND)
 
 
-def report(examined: Examined) -> list[str]:
+def _reported(found: Report) -> list[str]:
     """Return what was found, mode for mode."""
-    from study_app.devices.falcon.diagnosis import MODES
-
-    facts = examined.facts
-    lines = ["", *(f"seen: {words}" for words in examined.seen), ""]
-    found, unseen = 0, []
-    for number, mode in enumerate(MODES, start=1):
-        shown = mode.shown_by(facts)
-        word = "not looked at" if shown is None else "FOUND" if shown else "ok"
-        lines.append(f"{number:>2}  {word:<13}  {mode.symptom}")
-        if shown is None:
-            unseen.append(mode.symptom)
-        if shown:
-            found += 1
-        if shown and not (mode.id == "firmware-file" and facts.program == "refused"):  # the refusal says it all
-            lines.append(_indented(f"cause: {mode.cause}", 19))
-            lines.append(_indented(f"cure: {mode.cure(facts.platform)}", 19))
-            lines.append(_indented(f"known by: {mode.detected}", 19))
-            if mode.paste and facts.platform == "linux":
-                lines += ["", mode.paste, ""]  # in one line, to be copied
+    lines = ["", *(f"seen: {words}" for words in found.seen), ""]
+    for finding in found.findings:
+        word = "FOUND" if finding.state == "found" else finding.state
+        lines.append(f"{finding.number:>2}  {word:<13}  {finding.symptom}")
+        if finding.state == "found" and not finding.says_itself:
+            lines.append(_indented(f"cause: {finding.cause}", 19))
+            lines.append(_indented(f"cure: {finding.cure}", 19))
+            lines.append(_indented(f"known by: {finding.known_by}", 19))
+            if finding.paste:
+                lines += ["", finding.paste, ""]  # in one line, to be copied
     lines.append("")
-    if examined.failure is not None:
-        lines.append(_indented(examined.failure, 0))
-    if found or examined.failure is not None:
-        lines.append(f"Found: {found}.")
-    elif unseen:
-        lines.append(_indented(f"Nothing wrong was found. Not looked at: {'; '.join(unseen)}.", 0))
-    else:
-        lines.append("Nothing is wrong with it.")
+    if found.failure is not None:
+        lines.append(_indented(found.failure, 0))
+    lines.append(_indented(found.conclusion, 0))
     return lines
 
 

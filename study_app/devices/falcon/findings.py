@@ -1,0 +1,91 @@
+"""What an examination of a Falcon shows, as values to be printed or drawn: every mode of failure, found or not.
+
+Loads neither the compiler nor a driver, and goes from one process to another as it is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final, Literal
+
+from study_app.devices.falcon.diagnosis import MODES, Mode
+
+if TYPE_CHECKING:
+    from study_app.devices.falcon.diagnosis import Facts
+    from study_app.devices.falcon.doctor import Examined
+
+State = Literal["ok", "found", "not looked at"]
+NOTHING_WRONG: Final = "Nothing is wrong with it."
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One mode of failure: ``number`` in the list, ``symptom`` as a user sees it, and whether it is there.
+
+    ``cause``, ``cure`` and ``known_by`` are of every mode; ``paste`` is what a terminal here takes, "" where nothing.
+    ``says_itself`` where the failure's own sentence says cause and cure better.
+    """
+
+    number: int
+    id: str
+    symptom: str
+    state: State
+    cause: str
+    cure: str
+    known_by: str
+    paste: str = ""
+    says_itself: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """What was ``seen``, in words; all ``findings`` in their order; the driver's own ``failure`` (None: it went on)."""
+
+    seen: tuple[str, ...]
+    findings: tuple[Finding, ...]
+    failure: str | None
+
+    @property
+    def found(self) -> tuple[Finding, ...]:
+        """What is wrong."""
+        return tuple(finding for finding in self.findings if finding.state == "found")
+
+    @property
+    def unseen(self) -> tuple[Finding, ...]:
+        """What could not be looked at."""
+        return tuple(finding for finding in self.findings if finding.state == "not looked at")
+
+    @property
+    def well(self) -> bool:
+        """Whether nothing wrong was found."""
+        return not self.found and self.failure is None
+
+    @property
+    def conclusion(self) -> str:
+        """What it comes to, in a sentence."""
+        if not self.well:
+            return f"Found: {len(self.found)}."
+        if self.unseen:
+            return f"Nothing wrong was found. Not looked at: {'; '.join(one.symptom for one in self.unseen)}."
+        return NOTHING_WRONG
+
+
+def report(examined: Examined) -> Report:
+    """Return what an examination shows, mode for mode."""
+    findings = tuple(_finding(number, mode, examined.facts) for number, mode in enumerate(MODES, start=1))
+    return Report(examined.seen, findings, examined.failure)
+
+
+def _finding(number: int, mode: Mode, facts: Facts) -> Finding:
+    shown = mode.shown_by(facts)
+    return Finding(
+        number,
+        mode.id,
+        mode.symptom,
+        "not looked at" if shown is None else "found" if shown else "ok",
+        mode.cause,
+        mode.cure(facts.platform),
+        mode.detected,
+        mode.paste if facts.platform == "linux" else "",
+        says_itself=mode.id == "firmware-file" and facts.program == "refused",  # the refusal says it all
+    )
