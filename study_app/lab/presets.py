@@ -38,13 +38,16 @@ class Choice:
         return Setting(spoken(self.liquid), scene, scene)
 
 
-def liquids_at_hand(folders: tuple[Path, ...] = (Path("protocols"),)) -> tuple[Choice, ...]:
-    """Return every liquid of the shipped protocols, then of the files in ``folders``; a broken file has none."""
-    sources = [*shipped(), *(str(path) for folder in folders for path in sorted(folder.glob("*.toml")))]
+def liquids_at_hand(
+    folders: tuple[Path, ...] = (Path("protocols"),), saved: tuple[str, ...] = ()
+) -> tuple[Choice, ...]:
+    """Return every liquid of the shipped protocols, of the files in ``folders``, and of those ``saved``.
+
+    A broken file has none; a file of a shipped one's name in ``folders`` is that one.
+    """
+    own = [str(path) for folder in folders for path in sorted(folder.glob("*.toml")) if path.stem not in shipped()]
     found: list[Choice] = []
-    for source in sources:
-        if source.endswith(".toml") and Path(source).stem in shipped():
-            continue
+    for source in dict.fromkeys([*shipped(), *own, *saved]):
         try:
             names = tuple(load_scenes(source))
         except ProtocolError:

@@ -1,0 +1,387 @@
+"""The liquid lab: where its place, a device's servo, the edits and their price meet.
+
+Nothing of it acts on the hand once the place is left: leaving it, closing the window, an exception in a slot or in
+painting, all end in zero force first, then the servo, then the device.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+import random
+import sys
+import threading
+from collections.abc import Callable
+from functools import wraps
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Concatenate, Final, ParamSpec
+
+from PySide6.QtCore import QObject, Qt, QTimer, Signal
+
+from study_app.app.lab_opening import LabOpening
+from study_app.app.lab_prices import AsksPrice, Prices
+from study_app.app.lab_rows import cost_rows, error_rows
+from study_app.devices import list_devices
+from study_app.errors import StudyError
+from study_app.evaluation.appraiser import Appraiser
+from study_app.gui.lab.place import LabPlace
+from study_app.gui.lab.view import DeviceShown, LabView, Now
+from study_app.gui.new_session import DEVICE_WORDS
+from study_app.lab.presets import Choice, liquids_at_hand, preset_text, save, spoken
+from study_app.lab.programmes import TITLES
+from study_app.lab.workbench import Side, Workbench
+
+if TYPE_CHECKING:
+    from study_app.lab.live import Live
+
+FRAME_MS: Final = 33
+APPRAISE_AFTER_MS: Final = 300
+FIRST_A: Final = Choice("rek2024", "water", "Water")
+FIRST_B: Final = Choice("rek2024", "light_oil", "Light oil")
+log = logging.getLogger(__name__)
+P = ParamSpec("P")
+
+
+def compose_lab(place: LabPlace) -> LabVisit:
+    """Give a lab's place its device, servo and prices: they come as it is entered and go as it is left."""
+    return LabVisit(place)
+
+
+def _guarded(slot: Callable[Concatenate[LabVisit, P], None]) -> Callable[Concatenate[LabVisit, P], None]:
+    """Let no exception leave a slot: whatever it is ends in zero force."""
+
+    @wraps(slot)
+    def run(self: LabVisit, /, *arguments: P.args, **named: P.kwargs) -> None:
+        try:
+            slot(self, *arguments, **named)
+        except Exception as error:  # noqa: BLE001 - whatever it is, the hand comes first
+            self.fail(error)
+
+    return run
+
+
+class LabVisit(QObject):
+    """The lab's stay at its place.
+
+    Parameters
+    ----------
+    place : the widgets; this ends with them
+    open_live, make_appraiser : what opens a device by its name, what begins the process that appraises
+    """
+
+    _saved = Signal(object)
+
+    def __init__(
+        self,
+        place: LabPlace,
+        *,
+        open_live: Callable[..., Live] | None = None,
+        make_appraiser: Callable[[], AsksPrice] = Appraiser,
+    ) -> None:
+        super().__init__(place)
+        self.place = place
+        self.live: Live | None = None
+        self.device = "mouse"
+        self.bench = Workbench(FIRST_A.setting(), FIRST_B.setting())
+        self.liquids = liquids_at_hand()
+        self.trouble = ""
+        self._refused: tuple[str, str] | None = None
+        self._entered = False
+        self._prices = Prices(make_appraiser)
+        self._opening = LabOpening(open_live)
+        self._said = ""
+        self._hook_before = sys.excepthook
+        self._frames = self._timer(FRAME_MS, self._frame)
+        self._due = self._timer(0, self._frame, once=True)
+        self._price_due = self._timer(APPRAISE_AFTER_MS, self._ask_price, once=True)
+        self._connect()
+
+    def _timer(self, interval_ms: int, slot: Callable[[], None], *, once: bool = False) -> QTimer:
+        timer = QTimer(self)
+        timer.setInterval(interval_ms)
+        timer.setSingleShot(once)
+        timer.setTimerType(Qt.TimerType.PreciseTimer)
+        timer.timeout.connect(slot)
+        return timer
+
+    def _connect(self) -> None:
+        place, opening = self.place, self._opening
+        for signal, slot in (
+            (place.entered, self._enter),
+            (place.left, self.leave),
+            (place.changed, self._change),
+            (place.liquid_chosen, self._choose),
+            (place.copied, self._copy),
+            (place.switched, self._switch),
+            (place.blind_asked, self._blind),
+            (place.undo_asked, self._undo),
+            (place.redo_asked, self._redo),
+            (place.device_chosen, self._open),
+            (place.cancel_asked, self._cancel),
+            (place.path_chosen, self._play),
+            (place.stop_asked, self._stop_force),
+            (place.fade_in_asked, self._fade_in),
+            (place.hand_moved, self._point),
+            (place.hand_pressed, self._press),
+            (place.save_asked, self._save),
+            (opening.opened, self._begin),
+            (opening.failed, self._could_not_open),
+            (opening.said, self._say),
+        ):
+            signal.connect(slot)
+        self._saved.connect(self._hear_of_saving, Qt.ConnectionType.QueuedConnection)
+
+    def leave(self) -> None:
+        """Let go of the hand: zero force, the servo's end, the device; then of everything else."""
+        if not self._entered:
+            return
+        self._entered = False
+        for timer in (self._frames, self._due, self._price_due):
+            timer.stop()
+        self._opening.cancel()
+        try:
+            self._let_go()
+        finally:
+            self._prices.close()
+            sys.excepthook = self._hook_before
+
+    def end(self) -> None:
+        """Leave, and wait for a device that is still being opened, so that it is let go of, too."""
+        self.leave()
+        self._opening.wait()
+
+    def fail(self, error: BaseException) -> None:
+        """Zero force, then say what failed; the force can be faded in again, through a device opened anew."""
+        try:
+            self._let_go()
+        except StudyError as second:
+            log.warning("the servo did not end as it should: %s", second)
+        known = isinstance(error, StudyError)
+        before, self.trouble = (
+            self.trouble,
+            f"{error}" if known else f"{type(error).__name__}: {error}; the force is off",
+        )
+        if not known and self.trouble != before:  # once, though it may come with every frame
+            log.error("the lab broke: %s", error, exc_info=error)
+
+    def view(self) -> LabView:
+        """Return what is to be seen now."""
+        live, bench, price = self.live, self.bench, self._prices
+        reading = None if live is None else live.reading()
+        fault = "" if reading is None else reading.fault
+        busy = self._opening.busy_with
+        scene = bench.in_hand.scene
+        shown: dict[str, Any] = {}
+        if live is not None:
+            half_x, half_y, half_z = live.device.workspace_m
+            shown["workspace_m"] = (2 * half_x, 2 * half_y, 2 * half_z)
+        if not bench.blind:  # the ball's size would tell one from the other
+            shown["body_radius_m"] = scene.body.diameter_m / 2 / scene.scale
+        return LabView(
+            workbench=bench,
+            liquids=self.liquids,
+            device=DeviceShown(_devices(), self.device, self._state(fault), live is not None and not fault),
+            paths=tuple(TITLES.items()),
+            path=None if live is None else live.path,
+            trace=None if live is None else live.trace(),
+            tail_a=None if live is None else live.tail("A"),
+            tail_b=None if live is None else live.tail("B"),
+            now=None if reading is None else Now(reading.position_m, reading.force_n, reading.wake_mps),
+            limiters=() if live is None else live.limiters(),
+            cost=() if price.costs is None else cost_rows(price.costs),
+            tick_ns=None if price.costs is None else price.costs.tick_ns,
+            errors=() if price.errors is None else error_rows(price.errors),
+            measuring=price.waits or self._price_due.isActive(),
+            force_on=reading is not None and reading.force_on,
+            busy="" if busy is None else self._said or f"Opening {_words(busy)}",
+            trouble=self.trouble or fault,
+            refused=self._refused,
+            **shown,
+        )
+
+    @_guarded
+    def _enter(self) -> None:
+        if self._entered:
+            return
+        self._entered = True
+        self._hook_before, sys.excepthook = sys.excepthook, self._uncaught
+        self._frames.start()
+        self._open(self.device)
+
+    @_guarded
+    def _frame(self) -> None:
+        """Look at the servo, load what waited, and show it all."""
+        if self.live is not None:
+            self.live.poll()
+        self._prices.take()
+        self._show()
+
+    def _show(self) -> None:
+        self.place.show_view(self.view())
+
+    @_guarded
+    def _open(self, name: str) -> None:
+        """Open a device in place of the one that is open."""
+        self._let_go()
+        self.device, self.trouble, self._said = name, "", ""
+        self._opening.want(name)
+
+    @_guarded
+    def _begin(self, live: Live) -> None:
+        """Feel with a device that was opened."""
+        if not self._entered:
+            live.close()
+            return
+        self.live = live
+        live.feel(self.bench)
+        self._price_due.start()
+
+    @_guarded
+    def _could_not_open(self, error: Exception) -> None:
+        raise error
+
+    @_guarded
+    def _cancel(self) -> None:
+        self._opening.cancel()
+        self.trouble = "No device is open"
+
+    @_guarded
+    def _say(self, line: str) -> None:
+        self._said = line
+
+    @_guarded
+    def _change(self, name: str, value: object, held: bool) -> None:
+        self._try(lambda: self.bench.change(name, value, held=held), name)  # type: ignore[arg-type]
+
+    @_guarded
+    def _choose(self, side: Side, choice: Choice) -> None:
+        self._try(lambda: self.bench.choose(side, spoken(choice.liquid), choice.scene), "")
+
+    @_guarded
+    def _copy(self) -> None:
+        self._try(self.bench.copy_felt_to_other, "")
+
+    def _try(self, edit: Callable[[], Workbench], name: str) -> None:
+        """Make an edit, or keep why it was refused beside its parameter."""
+        try:
+            bench = edit()
+        except StudyError as error:
+            if name:
+                self._refused = (name, str(error))
+            else:
+                self.trouble = str(error)
+            return
+        self._feel(bench)
+
+    @_guarded
+    def _switch(self) -> None:
+        self._feel(self.bench.switch())
+
+    @_guarded
+    def _blind(self, asked: bool) -> None:
+        if asked:
+            self._feel(self.bench.blinded(random.SystemRandom()), anew=True)
+        else:
+            self._feel(self.bench.revealed())
+
+    @_guarded
+    def _undo(self) -> None:
+        self._feel(self.bench.undo())
+
+    @_guarded
+    def _redo(self) -> None:
+        self._feel(self.bench.redo())
+
+    def _feel(self, bench: Workbench, *, anew: bool = False) -> None:
+        """Let a workbench be felt at once, and be appraised once it has rested for a while."""
+        before, self.bench, self._refused, self.trouble = self.bench, bench, None, ""
+        if bench.in_hand.scene != before.in_hand.scene:
+            self._prices.forget()
+            self._price_due.start()
+        if self.live is not None:
+            self.live.feel(bench, anew=anew)
+            waits_s = self.live.due_in_s
+            if waits_s is not None and not self._due.isActive():
+                self._due.start(math.ceil(1e3 * waits_s))
+
+    @_guarded
+    def _ask_price(self) -> None:
+        self._prices.ask(self.bench.in_hand.scene)
+
+    @_guarded
+    def _play(self, name: str | None) -> None:
+        if self.live is not None:
+            self.live.play(name)
+
+    @_guarded
+    def _stop_force(self) -> None:
+        if self.live is not None:
+            self.live.stop_force()
+
+    @_guarded
+    def _fade_in(self) -> None:
+        """Let the force return; where the servo stopped itself, by opening its device again."""
+        if self.live is None or self.live.servo.fault is not None:
+            self._open(self.device)
+        else:
+            self.live.fade_in()
+
+    @_guarded
+    def _point(self, x_m: float, y_m: float, z_m: float) -> None:
+        if self.live is not None:
+            self.live.point_to(x_m, y_m, z_m)
+
+    @_guarded
+    def _press(self, buttons: int) -> None:
+        if self.live is not None:
+            self.live.press(buttons)
+
+    @_guarded
+    def _save(self, path: Path) -> None:
+        """Write the felt setting as a preset, beside the windows: a disk may take its time."""
+        if self.bench.blind:
+            self.trouble = "while the comparison is blind no preset can be saved: end the blinding first"
+            return
+        text = preset_text(self.bench.in_hand)
+        threading.Thread(target=self._write, args=(path, text), name="preset", daemon=True).start()
+
+    def _write(self, path: Path, text: str) -> None:
+        try:
+            save(path, text)
+        except StudyError as error:
+            self._saved.emit(error)
+        else:
+            self._saved.emit(path)
+
+    @_guarded
+    def _hear_of_saving(self, what: Path | StudyError) -> None:
+        """Offer the new preset as a liquid, or say why it could not be written; the force goes on."""
+        if isinstance(what, StudyError):
+            self.trouble = str(what)
+            return
+        self.liquids = liquids_at_hand(saved=(*(it.source for it in self.liquids), str(what)))
+
+    def _let_go(self) -> None:
+        """End with the device in the order of safety."""
+        live, self.live = self.live, None
+        if live is not None:
+            live.close()
+
+    def _state(self, fault: str) -> str:
+        if fault or self.trouble:
+            return "stopped"
+        return "opening" if self._opening.busy_with is not None else "ready" if self.live is not None else "closed"
+
+    def _uncaught(self, kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+        """Hear of exceptions that Qt met outside our slots, such as in painting."""
+        self.fail(error)
+        self._hook_before(kind, error, trace)
+
+
+def _devices() -> tuple[tuple[str, str], ...]:
+    return tuple((name, _words(name)) for name in list_devices())
+
+
+def _words(name: str) -> str:
+    return DEVICE_WORDS.get(name, name)

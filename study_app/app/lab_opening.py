@@ -1,0 +1,96 @@
+"""A device for the lab, opened beside the windows: one at a time, cancelled when another is wanted."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QCoreApplication, QObject, Qt, Signal
+
+if TYPE_CHECKING:
+    from study_app.lab.live import Live
+
+PATIENCE_S = 20.0
+
+
+class LabOpening(QObject):
+    """Opens the device that is wanted, and lets go of one that is not any more.
+
+    ``opened`` carries a `Live` whose servo runs at rest; ``failed`` what was met instead; ``said`` a line that the
+    device asks for while it is opened.
+
+    Parameters
+    ----------
+    open_live : opens a device by its name, as ``lab.live.open_live`` does
+    """
+
+    opened = Signal(object)
+    failed = Signal(object)
+    said = Signal(str)
+    _done = Signal(object)
+
+    def __init__(self, open_live: Callable[..., Live] | None = None) -> None:
+        super().__init__()
+        self._open_live = open_live
+        self._wanted: str | None = None
+        self._opening: str | None = None
+        self._cancelled = threading.Event()
+        self._thread: threading.Thread | None = None
+        self._done.connect(self._end, Qt.ConnectionType.QueuedConnection)
+
+    @property
+    def busy_with(self) -> str | None:
+        """The device that is being opened and still wanted; None where none is."""
+        return self._wanted
+
+    def want(self, name: str) -> None:
+        """Open a device; one that is being opened is given up first."""
+        self.cancel()
+        self._wanted = name
+        if self._thread is None:
+            self._begin()
+
+    def cancel(self) -> None:
+        """Want nothing any more: what is being opened is closed as soon as it is open."""
+        self._wanted = None
+        self._cancelled.set()
+
+    def wait(self) -> None:
+        """Wait for what is being opened: it must be let go of in the windows' thread, not in its own."""
+        if self._thread is not None:
+            self._thread.join(PATIENCE_S)
+            QCoreApplication.sendPostedEvents(self)
+
+    def _begin(self) -> None:
+        assert self._wanted is not None  # noqa: S101 - begun only where something is wanted
+        self._opening, self._cancelled = self._wanted, threading.Event()
+        self._thread = threading.Thread(
+            target=self._open, args=(self._wanted, self._cancelled), name="lab opening", daemon=True
+        )
+        self._thread.start()
+
+    def _open(self, name: str, cancelled: threading.Event) -> None:
+        """Compile, open and start, in a thread of its own; whatever comes of it goes to ``_end``."""
+        try:
+            if self._open_live is None:
+                from study_app.lab.live import open_live  # noqa: PLC0415 - the compiler: only once it is needed
+
+                self._open_live = open_live
+            made: object = self._open_live(name, tell=self.said.emit, cancelled=cancelled.is_set)
+        except Exception as error:  # noqa: BLE001 - handed over, not swallowed: a thread has nobody to raise it to
+            made = error
+        self._done.emit((made, cancelled))
+
+    def _end(self, done: tuple[object, threading.Event]) -> None:
+        """Hand over what was opened, or let go of it where it is not wanted any more."""
+        made, cancelled = done
+        self._thread = None
+        if not cancelled.is_set():
+            self._wanted = None
+            (self.failed if isinstance(made, Exception) else self.opened).emit(made)
+            return
+        if not isinstance(made, Exception):
+            made.close()  # type: ignore[attr-defined]
+        if self._wanted is not None:
+            self._begin()

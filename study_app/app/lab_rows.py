@@ -1,0 +1,36 @@
+"""What a setting costs and how true it is, as the lab's cards say it."""
+
+from __future__ import annotations
+
+from study_app.evaluation.appraiser import Costs, Errors
+from study_app.gui.lab.view import CostRow, ErrorRow
+from study_app.lab.parameters import EFFECT_WORDS
+
+SMALLEST_N = 0.001
+
+
+def cost_rows(costs: Costs) -> tuple[CostRow, ...]:
+    """Return what each part of a tick takes, the dearest first, then what is not there, and why."""
+    there = [CostRow(EFFECT_WORDS[it.effect], it.ns) for it in costs.effects if it.ns is not None]
+    there.append(CostRow("Servo alone", costs.rest_ns))
+    absent = (CostRow(EFFECT_WORDS[it.effect], None, it.why) for it in costs.effects if it.ns is None)
+    return (*sorted(there, key=lambda row: -(row.ns or 0.0)), *absent)
+
+
+def error_rows(errors: Errors) -> tuple[ErrorRow, ...]:
+    """Return how far a setting is from the definition."""
+    without = ", ".join(EFFECT_WORDS[it].lower() for it in errors.left_out)
+    note = f"of drag and wake; no reference for {without}" if without else "along programmed paths"
+    return (
+        ErrorRow("Wake, of Σ|e|/S", "no wake" if errors.wake is None else _tiny(errors.wake), note),
+        ErrorRow("Force, largest", "no drag" if errors.force_n is None else _newtons(errors.force_n), note),
+        ErrorRow("Lag of the velocity filter", f"{1e3 * errors.lag_s:.1f} ms", "while the speed grows evenly"),
+    )
+
+
+def _tiny(share: float) -> str:
+    return f"{share:.0e}".replace("e-0", "e−").replace("e-", "e−") if share > 0 else "0"
+
+
+def _newtons(force_n: float) -> str:
+    return f"< {SMALLEST_N:g} N" if force_n < SMALLEST_N else f"{force_n:.3f} N"
