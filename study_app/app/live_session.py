@@ -11,7 +11,7 @@ import threading
 import traceback
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from PySide6.QtCore import QEventLoop, QObject, Qt, QTimer, Signal
 from PySide6.QtWidgets import QApplication
@@ -32,6 +32,7 @@ from study_app.session.preflight import Check, checks, refused
 from study_app.session.resume import FIRST, resume_at
 
 if TYPE_CHECKING:
+    from study_app.app.preflight import Preflight
     from study_app.gui.bridge import SessionBridge
     from study_app.store.open_session import SessionStore
 
@@ -58,17 +59,22 @@ def hold(chosen: NewSession, tell: Callable[[str], object] | None) -> int:
 class LiveSession(QObject):
     """One session from the operator's choices to the closed journal.
 
-    ``over`` comes once; then ``code`` is the exit code and ``error`` what could not be mended here, if anything.
+    ``over`` comes once; then ``code`` is the exit code and ``error`` what could not be mended here, if anything. With
+    ``asks`` the operator sees what the pre-flight found and decides whether to begin.
     """
 
     over = Signal()
     _ready = Signal(object)
     _said = Signal(str)
 
-    def __init__(self, chosen: NewSession, theme: Theme, tell: Callable[[str], object] | None = None) -> None:
+    def __init__(
+        self, chosen: NewSession, theme: Theme, tell: Callable[[str], object] | None = None, *, asks: bool = False
+    ) -> None:
         super().__init__()
         self.chosen = chosen
         self._tell = tell
+        self._asks = asks
+        self.preflight: Preflight | None = None
         self.theme = theme
         self.code = 0
         self.error: StudyError | None = None
@@ -122,7 +128,7 @@ class LiveSession(QObject):
         self._ready.emit(made)
 
     def _begin(self, made: object) -> None:
-        """Claim the session on the disk and open the two windows."""
+        """Ask the operator, or claim the session on the disk and open the two windows at once."""
         self._working = False
         if isinstance(made, Ready):
             self._machine = made.machine
@@ -130,8 +136,12 @@ class LiveSession(QObject):
             self._let_go()
             self.deleteLater()
             return
+        self._go_on(self._ask if self._asks and isinstance(made, Ready) else self._open_windows, made)
+
+    def _go_on(self, step: Callable[[Any], None], made: object) -> None:
+        """Take a step toward the first page; whatever it meets ends in order."""
         try:
-            self._open_windows(made)
+            step(made)
         except StudyError as error:
             self.error = error
             self._close()
@@ -139,6 +149,20 @@ class LiveSession(QObject):
             traceback.print_exc()
             self.code = BUG
             self._close()
+
+    def _ask(self, made: Ready) -> None:
+        """Show the operator what was found; the session begins when that is accepted."""
+        from study_app.app.preflight import Preflight  # noqa: PLC0415 - pyqtgraph: only once it is needed
+        from study_app.gui.session_windows import who  # noqa: PLC0415
+
+        shown_on, _ = choose_screens(self.chosen.screen)
+        asked = Preflight(self.chosen, load(self.chosen.source), made, shown_on, who(self.chosen), self.theme)
+        asked.started.connect(lambda ready: self._go_on(self._open_windows, ready))
+        asked.failed.connect(lambda error: self._go_on(self._open_windows, error))
+        asked.cancelled.connect(self._cancel)
+        self.preflight = asked
+        self._close_note()
+        asked.open()
 
     def _open_windows(self, made: object) -> None:
         """Go on with what the thread made ready, or raise what it met."""
@@ -151,13 +175,16 @@ class LiveSession(QObject):
         protocol = parse(source, chosen.source)
         schedule = build_schedule(protocol, chosen.participant, chosen.seed)
         shown_on, operated_on = choose_screens(chosen.screen)
-        self._pass_checks(checks(made.facts_with(shown_on), protocol))
+        found = checks(made.facts_with(shown_on), protocol)
+        self._pass_checks(found)
         screens = {"participant": describe_screen(shown_on), "operator": describe_screen(operated_on)}
         self._store = open_store(chosen, protocol, source, machine, screens)
+        self._store.append("preflight", checks=[check.entry for check in found])
         start = FIRST if chosen.resumes is None else resume_at(protocol, schedule, self._store.lines)
         self.bridge = open_windows(chosen, protocol, schedule, self._store, machine, self.theme, start)
         self.bridge.done.connect(self._finished)
         self._close_note()
+        self._close_preflight()
         self.bridge.start()
 
     def _say(self, line: str) -> None:
@@ -196,6 +223,7 @@ class LiveSession(QObject):
             return
         self._closed = True
         self._close_note()
+        self._close_preflight()
         self._let_go()
         self.over.emit()
         if not self._working:
@@ -206,6 +234,11 @@ class LiveSession(QObject):
         if note is not None:
             note.finish()
             note.deleteLater()
+
+    def _close_preflight(self) -> None:
+        asked, self.preflight = self.preflight, None
+        if asked is not None:
+            asked.close()
 
     def _let_go(self) -> None:
         machine, self._machine = self._machine, None

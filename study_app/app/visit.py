@@ -58,7 +58,7 @@ class Visit(QObject):
         self.loop.quit()
 
     def _start(self, chosen: NewSession) -> None:
-        self.live = LiveSession(chosen, self.window.theme)
+        self.live = LiveSession(chosen, self.window.theme, asks=True)
         self.live.over.connect(self._return)
         self.window.rest()
         self.live.open()

@@ -13,6 +13,7 @@ from study_app.haptics.telemetry import timing
 from study_app.session.ports import ServoPort
 from study_app.session.preflight import Facts, Screen
 from study_app.store.atomic import probe
+from study_app.store.blinding import sealed_hash
 
 LOOK_S = 1 / 60
 
@@ -49,6 +50,8 @@ def measure(
         free_bytes=free_bytes,
         participant=participant,
         recordings=recordings,
+        key_hash=sealed_hash(results),
+        lateness_ns=np.asarray(samples["lateness_ns"], np.int64),
     )
 
 

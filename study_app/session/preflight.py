@@ -6,8 +6,11 @@ A failure refuses the session; a warning is something that would make trials inv
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
 
 from study_app.haptics.limits import refuses
 from study_app.haptics.telemetry import Timing
@@ -23,6 +26,7 @@ LEAST_REFRESH_HZ = 50.0
 SLOW_PROBE_S = 0.1
 TABLES_BYTES = 20_000_000
 RECORDED_BYTES_PER_S = 60e6 / 1800
+DEAR = 0.2  # share of a turn that the force model may take
 SPARE = 3  # times what a session of the expected length takes
 
 
@@ -41,6 +45,8 @@ class Facts:
     ``fresh_share`` is the share of the servo's turns in which the device had a new sample, ``sample_age_s`` how old the
     newest sample was when somebody looked (95th percentile). ``probe_s`` is how long a file took to be on the disk of
     the results, None where it could not be written for the reason ``probe_fault``; ``free_bytes`` None where unknown.
+    ``tick_s`` is what the dearest scene of the study takes of a turn, None where nobody measured it; ``key_hash`` that
+    of the study's sealed key, None before its first session. ``lateness_ns`` (n,) is that of every turn [ns].
     """
 
     device: str
@@ -53,15 +59,35 @@ class Facts:
     free_bytes: int | None
     participant: str
     recordings: bool
+    tick_s: float | None = None
+    key_hash: str | None = None
+    lateness_ns: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64), compare=False, repr=False)
 
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """One thing looked at, and what to say of it."""
+    """One thing looked at: what was found, and of what it was found.
+
+    ``share`` is how much of its limit a measure takes, None where it has none. ``advice`` is what to do, in a sentence;
+    of a failure it is why there can be no session.
+    """
 
     name: str
     verdict: Verdict
-    said: str
+    value: str
+    about: str
+    advice: str = ""
+    share: float | None = None
+
+    @property
+    def said(self) -> str:
+        """All of it in one line."""
+        return "; ".join(filter(None, (self.value, self.about, self.advice)))
+
+    @property
+    def entry(self) -> dict[str, str]:
+        """What the journal keeps of it."""
+        return {"name": self.name, "verdict": self.verdict, "value": self.value, "about": self.about}
 
     def __str__(self) -> str:
         return f"{self.verdict:<8} {self.name:<15} {self.said}"
@@ -70,76 +96,107 @@ class Check:
 def checks(facts: Facts, protocol: Protocol) -> tuple[Check, ...]:
     """Return what is to be said of ``facts``, for a session of ``protocol``."""
     found = [_device(facts), _rate(facts, protocol), _lateness(facts, protocol), _delay(facts, protocol)]
-    found += [_screen(facts), _folder(facts), _space(facts, protocol)]
-    return (*found, *_balance(facts, protocol))
+    found += [_screen(facts), _folder(facts), _space(facts, protocol), _blinding(facts, protocol)]
+    return (*found, *_cost(facts, protocol), *_balance(facts, protocol))
 
 
 def refused(found: Iterable[Check]) -> str:
     """Return why the session may not begin, in one line; empty if it may."""
-    return "; ".join(f"{check.name.lower()}: {check.said}" for check in found if check.verdict == "failure")
+    return "; ".join(f"{check.name.lower()}: {check.advice}" for check in found if check.verdict == "failure")
 
 
 def _device(facts: Facts) -> Check:
+    share = f"{100 * facts.fresh_share:.0f} %"
+    about = f"{facts.device}, a new sample in {share} of the turns"
     if facts.timing.ticks == 0 or facts.fresh_share < LEAST_FRESH:
-        said = f"{facts.device} has a new sample in {facts.fresh_share:.0%} of the turns: check its cable and power"
-        return Check("Device", "failure", said)
-    return Check("Device", "ok", f"{facts.device} answers")
+        advice = f"{facts.device} has a new sample in {share} of the turns: check its cable and power"
+        return Check("Device", "failure", "silent", about, advice)
+    return Check("Device", "ok", "answers", about)
 
 
 def _rate(facts: Facts, protocol: Protocol) -> Check:
     asked, achieved = protocol.device.rate_hz, facts.timing.rate_hz
+    value, about = f"{achieved:.1f} Hz", f"asked for {asked:g} Hz"
     unfelt = refuses(asked)
     if unfelt is not None:
-        return Check("Servo rate", "failure", unfelt)
+        return Check("Servo rate", "failure", value, about, unfelt)
     error = abs(achieved / asked - 1)
-    verdict: Verdict = "failure" if error > RATE_FAILURE else "warning" if error > RATE_WARNING else "ok"
-    hint = "" if verdict == "ok" else ": close other programs"
-    return Check("Servo rate", verdict, f"{achieved:.1f} Hz, asked for {asked:g} Hz{hint}")
+    if error > RATE_FAILURE:
+        return Check("Servo rate", "failure", value, about, f"{value}, {about}: close other programs")
+    if error > RATE_WARNING:
+        return Check("Servo rate", "warning", value, about, "Close other programs.")
+    return Check("Servo rate", "ok", value, about)
 
 
 def _lateness(facts: Facts, protocol: Protocol) -> Check:
     limits, timed = protocol.limits, facts.timing
     late_ms, gap_ms = timed.lateness_p99_s * 1e3, timed.worst_gap_s * 1e3
-    within = late_ms <= limits.lateness_ms and gap_ms <= limits.worst_gap_ms
-    said = (
-        f"99 % of turns within {late_ms:.2f} ms (limit {limits.lateness_ms:g} ms), worst gap {gap_ms:.1f} ms "
-        f"(limit {limits.worst_gap_ms:g} ms), {timed.overruns} overruns"
+    share = max(late_ms / limits.lateness_ms, gap_ms / limits.worst_gap_ms)
+    about = (
+        f"99 % of turns, limit {limits.lateness_ms:g} ms; worst gap {gap_ms:.1f} of {limits.worst_gap_ms:g} ms, "
+        f"{timed.overruns} overruns"
     )
-    return Check("Servo lateness", "ok" if within else "warning", said if within else f"{said}: trials would not count")
+    advice = "" if share <= 1 else "Trials would not count: close other programs."
+    verdict: Verdict = "ok" if share <= 1 else "warning"
+    return Check("Servo lateness", verdict, f"{late_ms:.2f} ms", about, advice, share)
 
 
 def _delay(facts: Facts, protocol: Protocol) -> Check:
     """Judge the least delay that can be seen: the age of a sample, and a frame until it is on the screen."""
     limit_ms = protocol.limits.delay_error_ms
     seen_ms = (facts.sample_age_s + 1 / max(facts.screen.refresh_hz, 1.0)) * 1e3
-    verdict: Verdict = "ok" if seen_ms <= limit_ms else "warning"
-    return Check("Visual delay", verdict, f"up to {seen_ms:.1f} ms beyond the one asked for (limit {limit_ms:g} ms)")
+    within = seen_ms <= limit_ms
+    advice = "" if within else "Trials would not count: a screen with more frames a second shows the hand sooner."
+    about = f"beyond the one asked for, limit {limit_ms:g} ms"
+    verdict: Verdict = "ok" if within else "warning"
+    return Check("Visual delay", verdict, f"up to {seen_ms:.1f} ms", about, advice, seen_ms / limit_ms)
 
 
 def _screen(facts: Facts) -> Check:
     screen = facts.screen
     well = screen.refresh_hz >= LEAST_REFRESH_HZ and screen.scaling == 1
-    hint = "" if well else ": use 100 % and at least 50 Hz for the participant's screen"
-    return Check("Screen", "ok" if well else "warning", f"{screen.refresh_hz:.1f} Hz, {screen.scaling:.0%}{hint}")
+    advice = "" if well else "Use 100 % and at least 50 Hz for the participant's screen."
+    value = f"{screen.refresh_hz:.1f} Hz, {100 * screen.scaling:.0f} %"
+    return Check("Screen", "ok" if well else "warning", value, "the participant's, as the system says", advice)
 
 
 def _folder(facts: Facts) -> Check:
     if facts.probe_s is None:
-        return Check("Results folder", "failure", facts.probe_fault)
+        return Check("Results folder", "failure", "not usable", "a file was to be written", facts.probe_fault)
     slow = facts.probe_s > SLOW_PROBE_S
-    said = f"a file is on the disk in {facts.probe_s * 1e3:.1f} ms"
-    return Check("Results folder", "warning" if slow else "ok", f"{said}: use a local disk" if slow else said)
+    value, about = f"{facts.probe_s * 1e3:.1f} ms", "until a file is on the disk"
+    return Check("Results folder", "warning" if slow else "ok", value, about, "Use a local disk." if slow else "")
 
 
 def _space(facts: Facts, protocol: Protocol) -> Check:
-    if facts.free_bytes is None:
-        return Check("Free space", "warning", "not known")
     recorded = RECORDED_BYTES_PER_S * expected_duration_s(protocol) if facts.recordings else 0.0
     needed = SPARE * (TABLES_BYTES + recorded)
-    said = f"{_megabytes(facts.free_bytes)} MB free, a session is given {_megabytes(needed)} MB"
+    about = f"a session is given {_megabytes(needed)} MB"
+    if facts.free_bytes is None:
+        return Check("Free space", "warning", "not known", about, "The system does not say how much room there is.")
+    value = f"{_megabytes(facts.free_bytes)} MB free"
     if facts.free_bytes < needed:
-        return Check("Free space", "failure", f"{said}: make room")
-    return Check("Free space", "ok", said)
+        return Check("Free space", "failure", value, about, f"{value}, {about}: make room")
+    return Check("Free space", "ok", value, about)
+
+
+def _blinding(facts: Facts, protocol: Protocol) -> Check:
+    """Say whether the study's key is sealed already; a study without a hidden condition has none."""
+    blind = f"{protocol.study.blinding}-blind"
+    if facts.key_hash is None:
+        return Check("Blinding", "ok", blind, "the key is drawn and sealed when the first session begins")
+    return Check("Blinding", "ok", blind, f"the key is sealed, its hash begins with {facts.key_hash[:8]}")
+
+
+def _cost(facts: Facts, protocol: Protocol) -> tuple[Check, ...]:
+    """Say what the dearest scene takes of a turn, where somebody measured it."""
+    if facts.tick_s is None:
+        return ()
+    share = facts.tick_s * protocol.device.rate_hz
+    value, about = f"{facts.tick_s * 1e9:.0f} ns a tick", f"the dearest scene, {100 * share:.2g} % of the time there is"
+    if share > DEAR:
+        return (Check("Cost of the scenes", "warning", value, about, "Leave out an effect.", share),)
+    return (Check("Cost of the scenes", "ok", value, about, share=share),)
 
 
 def _balance(facts: Facts, protocol: Protocol) -> tuple[Check, ...]:
@@ -148,9 +205,9 @@ def _balance(facts: Facts, protocol: Protocol) -> tuple[Check, ...]:
         return ()
     number = enrolment(facts.participant)
     if number is None:
-        said = f"{facts.participant} has no number: its row is drawn, not dealt; use ids such as P007"
-        return (Check("Balance", "warning", said),)
-    return (Check("Balance", "ok", f"the order of participant number {number}"),)
+        advice = f"{facts.participant} has no number: its row is drawn, not dealt; use ids such as P007."
+        return (Check("Balance", "warning", "drawn", "the row of the square", advice),)
+    return (Check("Balance", "ok", f"participant number {number}", "takes its row of the square"),)
 
 
 def _megabytes(count: float) -> str:

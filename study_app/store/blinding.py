@@ -65,6 +65,14 @@ class Key:
         return tuple(condition["liquids"]) if condition["liquid"] is None else (str(condition["liquid"]),)
 
 
+def sealed_hash(folder: Path) -> str | None:
+    """Return the SHA-256 of a study's sealed key, as in its receipts; None where there is none, or none readable."""
+    try:
+        return hashlib.sha256(StudyFolder(folder).key.read_bytes()).hexdigest()
+    except OSError:
+        return None
+
+
 def open_or_draw_key(folder: Path, protocol: Protocol, random: Callable[[], float] | None = None) -> Key:
     """Return the study's key; draw and seal it where there is none.
 

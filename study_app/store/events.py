@@ -30,6 +30,7 @@ EVENTS: tuple[Event, ...] = (
         "It was taken up again after its program had ended, so long after the line before.",
         ("gap_s", "torn_bytes", "operator", "device", "version"),
     ),
+    Event("preflight", "What was found before the first page, and accepted by going on.", ("checks",)),
     Event("page_shown", "A page of text was shown.", ("page",)),
     Event("page_left", "The participant went on from it.", ("page",)),
     Event("language_chosen", "The participant reads in another of the study's languages from here on.", ("language",)),

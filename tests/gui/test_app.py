@@ -24,6 +24,7 @@ from study_app.gui.main_window import MainWindow
 from study_app.gui.opening import OpeningWindow
 from study_app.gui.operator import OperatorWindow
 from study_app.gui.participant import ParticipantWindow
+from study_app.gui.preflight import PreflightWindow
 from study_app.gui.theme import PARTICIPANT
 from study_app.protocol.load import source_bytes
 from study_app.session.pages import EndPage, PausePage, QuestionnairePage, TaskPage, TextPage
@@ -257,11 +258,15 @@ def test_from_home_into_a_session_and_home_again(tmp_path, monkeypatch):
             card.new.click()
             home.dialog.windowed.setChecked(True)
             home.dialog.begin.click()
-        elif steps == ["asked"] and operator is not None and operator.buttons.end.isEnabled():
+        elif steps == ["asked"] and window(PreflightWindow) is not None:
+            assert not (tmp_path / "results").exists()
+            steps.append("looked")
+            window(PreflightWindow).start.click()
+        elif steps == ["asked", "looked"] and operator is not None and operator.buttons.end.isEnabled():
             steps.append("ended")
             operator.end_asked.emit("withdrawn", "")
             operator.close()
-        elif steps == ["asked", "ended"] and home is not None and home.sessions.lines:
+        elif steps == ["asked", "looked", "ended"] and home is not None and home.sessions.lines:
             steps.append(home.sessions.lines[0].status.word)
             home.window().close()
 
@@ -270,8 +275,39 @@ def test_from_home_into_a_session_and_home_again(tmp_path, monkeypatch):
     timer.start(20)
     assert app.home(tmp_path / "results") == 0
     timer.stop()
-    assert steps == ["asked", "ended", "Withdrawn"]
+    assert steps == ["asked", "looked", "ended", "Withdrawn"]
     assert events(tmp_path / "results" / "demo")[-1]["status"] == "withdrawn"
+
+
+def test_going_back_before_the_session_leaves_nothing(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    steps = []
+
+    def step():
+        home, asked = place_at_home(), window(PreflightWindow)
+        if not steps and home is not None:
+            steps.append("asked")
+            card = next(card for card in home.grid.cards if card.facts.source == "demo")
+            card.new.click()
+            home.dialog.begin.click()
+        elif steps == ["asked"] and asked is not None:
+            steps.append("again")
+            asked.again.click()
+            assert not asked.start.isEnabled()
+        elif steps == ["asked", "again"] and asked is not None and asked.start.isEnabled():
+            steps.append("back")
+            asked.cancel.click()
+        elif steps == ["asked", "again", "back"] and home is not None:
+            steps.append("home")
+            home.window().close()
+
+    timer = QTimer()
+    timer.timeout.connect(step)
+    timer.start(20)
+    assert app.home(tmp_path / "results") == 0
+    timer.stop()
+    assert steps == ["asked", "again", "back", "home"]
+    assert list(tmp_path.iterdir()) == []
 
 
 def receipt_of(results: Path):
@@ -324,8 +360,9 @@ def test_a_session_that_stopped_goes_on_where_it_was_to_its_end(stopped, results
     (resumed,) = [line for line in told if line["event"] == "session_resumed"]
     assert resumed["operator"] == "BB"
     assert met == [PausePage(force_off=False)]
-    assert [line["event"] for line in told[len(before) :]][:4] == [
+    assert [line["event"] for line in told[len(before) :]][:5] == [
         "session_resumed",
+        "preflight",
         "paused",
         "resumed",
         "trial_started",
@@ -362,6 +399,8 @@ def test_home_offers_first_to_go_on_with_a_session_that_stopped(stopped, results
             steps.append(home.banner.heading.text())
             steps.append(home.banner.line.text())
             home.banner.resume.click()
+        elif len(steps) == 2 and window(PreflightWindow) is not None:
+            window(PreflightWindow).start.click()
         elif len(steps) == 2 and operator is not None and operator.buttons.end.isEnabled():
             steps.append(operator.rail.heading.text())
             operator.end_asked.emit("withdrawn", "")
@@ -413,7 +452,7 @@ def test_the_preflight_is_told_before_anything_is_created(short_demo, results):
     person.deleteLater()
     names = [line[9:25].strip() for line, _ in told]
     assert names == [
-        "Device", "Servo rate", "Servo lateness", "Visual delay", "Screen", "Results folder", "Free space"
+        "Device", "Servo rate", "Servo lateness", "Visual delay", "Screen", "Results folder", "Free space", "Blinding"
     ]  # fmt: skip
     assert not any(there for _, there in told)
 

@@ -1,0 +1,175 @@
+"""The question before a session: what was found of device, servo, disk and scenes, and whether to begin."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterable
+from dataclasses import replace
+from datetime import datetime
+
+from PySide6.QtCore import QObject, QTimer, Signal
+from PySide6.QtGui import QScreen
+
+from study_app.errors import StudyError
+from study_app.evaluation.appraiser import Appraiser, Costs, Errors
+from study_app.gui.beginning import Ready, measured
+from study_app.gui.choices import NewSession
+from study_app.gui.preflight.view import preflight_view
+from study_app.gui.preflight.window import PreflightWindow
+from study_app.gui.screens import place
+from study_app.gui.theme import Theme
+from study_app.haptics.scene import Scene
+from study_app.protocol.model import Protocol
+from study_app.session.preflight import Facts, checks
+
+LOOK_MS = 100
+PATIENCE_S = 10.0
+
+
+class Appraisal:
+    """What the dearest scene of a study costs, and how far the least true is off; asked one scene after another."""
+
+    def __init__(self, scenes: Iterable[Scene]) -> None:
+        self._waiting = list(scenes)
+        self._asked = 0
+        self._appraiser = Appraiser()
+        self.tick_s: float | None = None
+        self.error_n: float | None = None
+        self._error_n = 0.0
+        self._ask()
+
+    @property
+    def over(self) -> bool:
+        """Whether there is nothing to wait for any more."""
+        return not self._waiting or not self._appraiser.works
+
+    def look(self) -> bool:
+        """Take the answers there are; return whether there is news."""
+        news = False
+        for number, told in self._appraiser.answers():
+            if number != self._asked or not self._waiting:
+                continue
+            if isinstance(told, Costs):
+                self.tick_s = max(self.tick_s or 0.0, told.tick_ns * 1e-9)
+                news = True
+                continue
+            if isinstance(told, Errors):
+                self._error_n = max(self._error_n, told.force_n or 0.0)
+            self._waiting.pop(0)
+            self._ask()
+            if not self._waiting:
+                self.error_n, news = self._error_n, True
+        return news
+
+    def _ask(self) -> None:
+        if self._waiting:
+            self._asked = self._appraiser.ask(self._waiting[0])
+
+    def close(self) -> None:
+        """Let go of who was asked."""
+        self._appraiser.close()
+
+
+class Preflight(QObject):
+    """Shows the window before a session, has things measured again, and tells what was decided, once.
+
+    The machine stays somebody else's; the servo turns at rest meanwhile.
+    """
+
+    started = Signal(object)
+    cancelled = Signal()
+    failed = Signal(object)
+    _measured = Signal(object)
+
+    def __init__(
+        self, chosen: NewSession, protocol: Protocol, ready: Ready, screen: QScreen, who: str, theme: Theme
+    ) -> None:
+        super().__init__()
+        self._chosen, self._protocol, self._ready, self._screen = chosen, protocol, ready, screen
+        self._who = who
+        self._measuring: threading.Thread | None = None
+        self._appraisal = Appraisal(_scenes(protocol))
+        self.window = PreflightWindow(protocol.limits.lateness_ms * 1e3, theme=theme)
+        self.window.start_asked.connect(self._start)
+        self.window.again_asked.connect(self._again)
+        self.window.cancelled.connect(self._cancel)
+        self._measured.connect(self._take)
+        self._timer = QTimer(self)
+        self._timer.timeout.connect(self._look)
+        self._timer.start(LOOK_MS)
+
+    def open(self) -> None:
+        """Show what was found."""
+        self._show()
+        place(self.window, self.window.screen(), corner=False)
+        self.window.show()
+
+    def close(self) -> None:
+        """Let go of window and processes; what is being measured is waited for, since it uses the servo."""
+        self._timer.stop()
+        self._appraisal.close()
+        if self._measuring is not None:
+            self._measuring.join(PATIENCE_S)
+        self.window.finish()
+        self.window.deleteLater()
+        self.deleteLater()
+
+    @property
+    def _facts(self) -> Facts:
+        return replace(self._ready.facts_with(self._screen), tick_s=self._appraisal.tick_s)
+
+    def _show(self) -> None:
+        facts = self._facts
+        self.window.show_view(
+            preflight_view(
+                self._protocol,
+                facts,
+                checks(facts, self._protocol),
+                self._who,
+                error_n=self._appraisal.error_n,
+                asked_error=self._appraisal.error_n is not None or not self._appraisal.over,
+                now=datetime.now().astimezone(),
+                busy=self._measuring is not None,
+            )
+        )
+
+    def _look(self) -> None:
+        if self._appraisal.look() or self._appraisal.over:
+            self._show()
+        if self._appraisal.over:
+            self._timer.stop()
+
+    def _again(self) -> None:
+        """Measure anew, in a thread of its own: it looks at the servo for two seconds."""
+        if self._measuring is not None:
+            return
+        self._measuring = threading.Thread(target=self._measure, name="preflight", daemon=True)
+        self._show()
+        self._measuring.start()
+
+    def _measure(self) -> None:
+        try:
+            found: object = measured(self._ready.machine, self._chosen)
+        except StudyError as error:
+            found = error
+        self._measured.emit(found)
+
+    def _take(self, found: object) -> None:
+        self._measuring = None
+        if isinstance(found, Facts):
+            self._ready = replace(self._ready, facts=found)
+            self._show()
+        else:
+            self.failed.emit(found)
+
+    def _start(self) -> None:
+        self.started.emit(replace(self._ready, facts=replace(self._ready.facts, tick_s=self._appraisal.tick_s)))
+
+    def _cancel(self) -> None:
+        self.cancelled.emit()
+
+
+def _scenes(protocol: Protocol) -> tuple[Scene, ...]:
+    """Return the study's scenes, each once."""
+    scenes = (protocol.scene_for(condition) for condition in protocol.conditions)
+    return tuple(dict.fromkeys(scene for scene in scenes if len(scene.liquids) == 1))

@@ -1,0 +1,5 @@
+"""Before a session: what was found, and whether to begin."""
+
+from study_app.gui.preflight.window import PreflightWindow
+
+__all__ = ["PreflightWindow"]

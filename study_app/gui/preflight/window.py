@@ -1,0 +1,183 @@
+"""Whether to begin: every check with its value, what will run, and one button that says what is accepted by it."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QSize, Qt, Signal
+from PySide6.QtGui import QCloseEvent, QKeyEvent
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QScrollArea, QVBoxLayout, QWidget
+
+from study_app.gui.cards import Card, Chip, Rule
+from study_app.gui.controls import ActionButton
+from study_app.gui.labels import figures, label
+from study_app.gui.plots import LatenessPlot
+from study_app.gui.preflight.rows import CheckRow
+from study_app.gui.preflight.view import WAITING, PreflightView, histogram
+from study_app.gui.theme import LIGHT, Theme, font
+from study_app.gui.themed import dress, wear
+
+FULL, LEAST = QSize(1200, 800), QSize(1024, 640)
+ASIDE = 352
+NOTHING_YET = "Nothing is created until you start."
+
+
+class PreflightWindow(QWidget):
+    """The checks of a session whose device and servo are ready, at rest.
+
+    ``start_asked`` accepts the warnings shown; ``again_asked`` has everything measured anew; ``cancelled`` goes back.
+    """
+
+    start_asked = Signal()
+    again_asked = Signal()
+    cancelled = Signal()
+
+    def __init__(self, limit_us: float, *, theme: Theme = LIGHT) -> None:
+        super().__init__()
+        self.setWindowTitle("Liquid Study")
+        self.setProperty("role", "window")
+        self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
+        self.setMinimumSize(LEAST)
+        self.resize(FULL)
+        self.theme = theme
+        self.who = label("", "label", "text2")
+        self.chip = Chip("ok", "check", "")
+        self.checks = Card(padding=10, gap=0)
+        self.rows: list[CheckRow] = []
+        self.plot = LatenessPlot(limit_us)
+        self.cancel = ActionButton("", "Cancel", height=46)
+        self.again = ActionButton("repeat", "Check again", height=46)
+        self.start = ActionButton("play", "Start", role="primary", height=46)
+        self._values: dict[str, QLabel] = {}
+        self._done = False
+        around = self.checks.column.contentsMargins()
+        self.checks.column.setContentsMargins(4, around.top(), 4, around.bottom())
+        self._lay_out()
+        self.cancel.clicked.connect(self.close)
+        self.again.clicked.connect(self.again_asked)
+        self.start.clicked.connect(self._start)
+        wear(self, theme)
+        self.start.setFocus()
+
+    def _lay_out(self) -> None:
+        titles = QVBoxLayout()
+        titles.setSpacing(4)
+        titles.addWidget(label("Ready to begin?", "title_dense"))
+        titles.addWidget(self.who)
+        head = QHBoxLayout()
+        head.addLayout(titles, 1)
+        head.addWidget(self.chip, 0, Qt.AlignmentFlag.AlignVCenter)
+        inside = QWidget()
+        left = QVBoxLayout(inside)
+        left.setContentsMargins(0, 0, 0, 0)
+        left.addWidget(self.checks)
+        left.addStretch()
+        area = QScrollArea()
+        area.setWidgetResizable(True)
+        area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        area.setWidget(inside)
+        lateness = Card("Servo lateness", label("measured at rest, µs", "small", "text2"), padding=18, gap=6)
+        self.plot.setMinimumHeight(150)
+        lateness.column.addWidget(self.plot, 1)
+        self.runs = Card("What will run", padding=18, gap=8)
+        self._grid = QGridLayout()
+        self._grid.setVerticalSpacing(9)
+        self.runs.column.addLayout(self._grid)
+        aside = QVBoxLayout()
+        aside.setSpacing(14)
+        aside.addWidget(lateness, 1)
+        aside.addWidget(self.runs)
+        side = QWidget()
+        side.setFixedWidth(ASIDE)
+        aside.setContentsMargins(0, 0, 0, 0)
+        side.setLayout(aside)
+        middle = QHBoxLayout()
+        middle.setSpacing(20)
+        middle.addWidget(area, 1)
+        middle.addWidget(side)
+        foot = QHBoxLayout()
+        foot.setSpacing(16)
+        foot.addWidget(self.cancel)
+        foot.addWidget(self.again)
+        self.note = label(NOTHING_YET, "label", "text2")
+        foot.addWidget(self.note)
+        foot.addStretch()
+        foot.addWidget(self.start)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(32, 22, 32, 20)
+        column.setSpacing(16)
+        column.addLayout(head)
+        column.addLayout(middle, 1)
+        column.addWidget(Rule())
+        column.addLayout(foot)
+
+    def show_view(self, view: PreflightView) -> None:
+        """Show what was found."""
+        self.who.setText(f"{view.study}  ·  {view.who}")
+        self._show_chip(view)
+        self.start.show_action("play", view.start_words)
+        self.start.setEnabled(not view.busy and not view.failures)
+        self.again.setEnabled(not view.busy)
+        self._show_checks(view)
+        self._show_rows(view)
+        edges, counts, p99_us = histogram(view.lateness_us)
+        self.plot.show_histogram(edges, counts, p99_us)
+
+    def _show_chip(self, view: PreflightView) -> None:
+        if view.busy:
+            self.chip.show_state("neutral", "clock", WAITING.capitalize())
+        elif view.failures:
+            self.chip.show_state("bad", "cross", view.passed)
+        elif view.warnings:
+            self.chip.show_state("warn", "warning", view.passed)
+        else:
+            self.chip.show_state("ok", "check", view.passed)
+
+    def _show_checks(self, view: PreflightView) -> None:
+        if [row.check for row in self.rows] == list(view.checks):
+            return
+        for row in self.rows:
+            row.setParent(None)
+            row.deleteLater()
+        self.rows = [CheckRow(check, last=check is view.checks[-1]) for check in view.checks]
+        for row in self.rows:
+            self.checks.column.addWidget(row)
+            dress(row, self.theme)
+
+    def _show_rows(self, view: PreflightView) -> None:
+        for place, (name, words) in enumerate(view.rows):
+            if name not in self._values:
+                value = figures("", "label")
+                value.setFont(font("label", weight=600, tabular=True))
+                value.setAlignment(Qt.AlignmentFlag.AlignRight)
+                self._grid.addWidget(label(name, "label", "text2"), place, 0)
+                self._grid.addWidget(value, place, 1)
+                self._values[name] = value
+            self._values[name].setText(words)
+
+    def _start(self) -> None:
+        """Begin, once."""
+        if not self._done and self.start.isEnabled():
+            self._done = True
+            self.start_asked.emit()
+
+    def finish(self) -> None:
+        """Close because the session's windows open, or it was called off elsewhere."""
+        self._done = True
+        self.close()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
+        """Begin on Enter, go back on Esc."""
+        if event.key() == Qt.Key.Key_Escape:
+            self.close()
+        elif event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
+            chosen = next((button for button in (self.cancel, self.again) if button.hasFocus()), self.start)
+            chosen.click()
+        else:
+            super().keyPressEvent(event)
+
+    def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802 - Qt's name
+        """Go back, if it was not we who closed it."""
+        super().closeEvent(event)
+        if not self._done:
+            self._done = True
+            self.cancelled.emit()

@@ -1,0 +1,155 @@
+"""The window before a session: every check with its value, warnings accepted by name, failures refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from datetime import datetime
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtWidgets import QApplication, QLabel
+
+from study_app.gui.preflight import PreflightWindow
+from study_app.gui.preflight.view import WAITING, histogram, preflight_view
+from study_app.gui.preflight.window import LEAST
+from study_app.gui.theme import DARK
+from study_app.haptics.telemetry import Timing
+from study_app.protocol.load import load
+from study_app.session.preflight import Facts, Screen, checks
+
+NOW = datetime(2026, 3, 2, 14, 20)
+WELL = Facts(
+    device="mouse",
+    fresh_share=1.0,
+    timing=Timing(2000, 1000.0, 6.2e-5, 2e-3, 0),
+    sample_age_s=0.001,
+    screen=Screen(60.0, 1.0),
+    probe_s=0.002,
+    probe_fault="",
+    free_bytes=212 * 10**9,
+    participant="P007",
+    recordings=True,
+    tick_s=146e-9,
+    lateness_ns=np.arange(1, 2001) * 31,
+)
+SCALED = replace(WELL, screen=Screen(60.0, 1.5))
+FULL_DISK = replace(WELL, free_bytes=1)
+
+
+def view_of(facts, **more):
+    protocol = load("rek2024")
+    return preflight_view(protocol, facts, checks(facts, protocol), "Participant P007", now=NOW, **more)
+
+
+@pytest.fixture
+def window(qtbot):
+    made = PreflightWindow(1000.0)
+    qtbot.addWidget(made)
+    made.show_view(view_of(WELL))
+    made.show()
+    return made
+
+
+def test_every_check_has_a_row_with_its_value(window):
+    said = {row.check.name: row.accessibleName() for row in window.rows}
+    assert said["Servo rate"].startswith("Servo rate, passed, 1000.0 Hz")
+    assert "146 ns a tick" in said["Cost of the scenes"]
+    assert len(said) == len(checks(WELL, load("rek2024")))
+
+
+@pytest.mark.parametrize(
+    ("facts", "passed", "words", "able"),
+    [
+        (WELL, "9 of 9 passed", "Start", True),
+        (SCALED, "8 of 9 passed", "Start with 1 warning", True),
+        (replace(SCALED, probe_s=0.4), "7 of 9 passed", "Start with 2 warnings", True),
+        (FULL_DISK, "8 of 9 passed", "Cannot start", False),
+    ],
+)
+def test_the_button_says_what_is_accepted_by_it(window, facts, passed, words, able):
+    window.show_view(view_of(facts))
+    assert (window.chip.word, window.start.text(), window.start.isEnabled()) == (passed, words, able)
+
+
+def test_a_warning_says_what_to_do(window):
+    window.show_view(view_of(SCALED))
+    row = next(row for row in window.rows if row.check.name == "Screen")
+    assert any("Use 100 %" in part.text() for part in row.findChildren(QLabel))
+
+
+@pytest.mark.parametrize("key", [Qt.Key.Key_Return, Qt.Key.Key_Enter])
+def test_enter_begins_once(window, qtbot, key):
+    began = []
+    window.start_asked.connect(lambda: began.append(1))
+    qtbot.keyClick(window, key)
+    qtbot.keyClick(window, key)
+    assert began == [1]
+
+
+def test_enter_does_not_begin_what_cannot(window, qtbot):
+    window.start_asked.connect(lambda: pytest.fail("begun"))
+    window.show_view(view_of(FULL_DISK))
+    qtbot.keyClick(window, Qt.Key.Key_Return)
+    window.show_view(view_of(WELL, busy=True))
+    qtbot.keyClick(window, Qt.Key.Key_Return)
+
+
+def test_enter_on_another_button_does_what_it_says(window, qtbot):
+    window.start_asked.connect(lambda: pytest.fail("begun"))
+    window.again.setFocus()
+    with qtbot.waitSignal(window.again_asked):
+        qtbot.keyClick(window.again, Qt.Key.Key_Return)
+
+
+@pytest.mark.parametrize("how", ["escape", "cancel", "close"])
+def test_one_goes_back_without_a_trace(window, qtbot, how):
+    with qtbot.waitSignal(window.cancelled):
+        if how == "escape":
+            qtbot.keyClick(window, Qt.Key.Key_Escape)
+        elif how == "cancel":
+            qtbot.mouseClick(window.cancel, Qt.MouseButton.LeftButton)
+        else:
+            window.close()
+    assert not window.isVisible()
+
+
+def test_finishing_is_not_going_back(window):
+    window.cancelled.connect(lambda: pytest.fail("cancelled"))
+    window.finish()
+    assert not window.isVisible()
+
+
+def test_what_will_run_and_how_true_it_is(window):
+    rows = dict(view_of(WELL).rows)
+    assert rows["Answers"] == "62"
+    assert rows["Force off the definition"] == WAITING
+    assert dict(view_of(WELL, error_n=0.004).rows)["Force off the definition"] == "< 0.01 N"
+    assert dict(view_of(WELL, error_n=0.031).rows)["Force off the definition"] == "0.03 N"
+    assert "Force off the definition" not in dict(view_of(WELL, asked_error=False).rows)
+    assert datetime.strptime(rows["Ends about"], "%H:%M").hour == 14
+
+
+def test_the_histogram_holds_every_turn():
+    edges, counts, p99 = histogram(WELL.lateness_ns / 1e3)
+    assert counts.sum() == 2000
+    assert len(edges) == len(counts) + 1
+    assert p99 == pytest.approx(np.percentile(WELL.lateness_ns / 1e3, 99))
+    assert histogram(np.empty(0))[2] is None
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_no_words_are_cut_in_the_smallest_window(qtbot, theme):
+    made = PreflightWindow(1000.0, **({"theme": DARK} if theme == "dark" else {}))
+    qtbot.addWidget(made)
+    made.show_view(view_of(SCALED, error_n=0.004))
+    made.resize(LEAST)
+    made.show()
+    QApplication.processEvents()
+    for row in made.rows:
+        for part in row.findChildren(QLabel):
+            if not part.toolTip():  # an elided one says all of it in its tip
+                needed = part.sizeHint().width() if not part.wordWrap() else 0
+                assert part.width() >= needed, (row.check.name, part.text())
+    for value in made.runs.findChildren(QLabel):
+        assert made.rect().contains(value.mapTo(made, QPoint(0, 0)))
