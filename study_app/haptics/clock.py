@@ -12,7 +12,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from study_app.errors import StudyError
 from study_app.haptics.cfunctions import NOW, SLEEP, c_function, record_at
+from study_app.haptics.clock_grants import Blocks, Grant
 from study_app.haptics.layout import records
 
 if sys.platform == "win32":
@@ -22,6 +24,7 @@ elif sys.platform == "darwin":
 else:
     from study_app.haptics import clock_linux as platform
 
+MOST_SPIN_US = 1000.0
 VIRTUAL = np.dtype([("now_ns", np.int64)], align=True)
 _virtual_at = record_at(VIRTUAL)
 
@@ -44,18 +47,37 @@ class Clock(Protocol):
 
 
 class SystemClock:
-    """The monotonic clock of the machine, whose origin is the machine's own (often its start)."""
+    """The monotonic clock of the machine, whose origin is the machine's own (often its start).
+
+    Parameters
+    ----------
+    spin_us : how long before a deadline a sleep ends early, to look at the clock until it is there; default: what this
+        system's timer needs. It takes up to ``spin_us`` of a core's time every period, which `spun_ns` counts.
+
+    Raises
+    ------
+    StudyError
+        A spin below 0 or above 1000 µs.
+    """
 
     runs = True
 
-    def __init__(self) -> None:
-        self._memory = platform.open_clock()
+    def __init__(self, spin_us: float | None = None) -> None:
+        self.spin_us = platform.SPIN_US if spin_us is None else spin_us
+        if not 0.0 <= self.spin_us <= MOST_SPIN_US:
+            raise StudyError(f"a spin lasts 0 to {MOST_SPIN_US:g} µs before a deadline, not {spin_us:g}")
+        self._memory = platform.open_clock(round(1000 * self.spin_us))
         self.now, self.sleep = _system_functions()
         self.context = int(self._memory.ctypes.data)
 
     def now_ns(self) -> int:
         """Return the time [ns]."""
         return int(self.now.ctypes(self.context))
+
+    @property
+    def spun_ns(self) -> int:
+        """How long all sleeps together looked at the clock instead of sleeping [ns]."""
+        return int(self._memory[0].spun_ns)
 
 
 class VirtualClock:
@@ -74,9 +96,18 @@ class VirtualClock:
         return int(self._memory[0].now_ns)
 
 
-def raise_priority() -> str:
-    """Ask the system to run the calling thread before others; return in words what it granted."""
-    return platform.raise_priority()
+def raise_priority(blocks: Blocks = (), *, real_time: bool = True) -> Grant:
+    """Ask the system to run the calling thread before others, and to keep memory at hand; return what it granted.
+
+    Parameters
+    ----------
+    blocks : the thread's memory, of which none is locked where this is empty
+    real_time : False: stay an ordinary thread, whose timers are exact nevertheless
+    """
+    grant = platform.raise_priority(real_time=real_time)
+    if not (blocks and real_time):
+        return grant
+    return grant.with_memory(locked=platform.lock_memory(blocks), advice=platform.MEMORY)
 
 
 @cache

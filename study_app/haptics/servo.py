@@ -10,6 +10,7 @@ from typing import Any, Self
 from study_app.errors import DeviceLost, ServoFault, StudyError
 from study_app.haptics.cfunctions import Driver
 from study_app.haptics.clock import Clock, SystemClock
+from study_app.haptics.clock_grants import Grant
 from study_app.haptics.layout import STATUS_DEVICE_LOST, STATUS_NON_FINITE, STATUS_STALE_FAULT
 from study_app.haptics.pack import elements_needed
 from study_app.haptics.scene import Scene
@@ -37,10 +38,17 @@ class Servo:
     clock : ``SystemClock`` (default) or ``VirtualClock``
     rate_hz : turns a second; every scene must be made for this rate
     elements : the most wake elements a scene may call for (``pack.elements_needed``)
+    real_time : False: the thread asks for no more than an ordinary one has
     """
 
     def __init__(
-        self, device: Driver, *, clock: Clock | None = None, rate_hz: float = 1000.0, elements: int = ELEMENTS
+        self,
+        device: Driver,
+        *,
+        clock: Clock | None = None,
+        rate_hz: float = 1000.0,
+        elements: int = ELEMENTS,
+        real_time: bool = True,
     ) -> None:
         self.rate_hz = rate_hz
         self.elements = elements
@@ -49,7 +57,9 @@ class Servo:
         self._scene = Scene(rate_hz=rate_hz)
         self._serial = 0
         self._loading = threading.Lock()
-        self._loop = LoopThread(device, clock or SystemClock(), self._scene, elements, self.telemetry)
+        self._loop = LoopThread(
+            device, clock or SystemClock(), self._scene, elements, self.telemetry, real_time=real_time
+        )
         self._ending = weakref.finalize(self, self._loop.end)
 
     def prepare(self) -> None:
@@ -145,12 +155,17 @@ class Servo:
         """Return the time on the servo's clock [ns], the clock of all samples."""
         return self._loop.clock.now_ns()
 
+    @property
+    def grant(self) -> Grant:
+        """What the system granted to the servo's thread."""
+        return self._loop.grant
+
     def describe(self) -> dict[str, Any]:
         """Return what a receipt should record: the rate, and the priority that the system granted to the thread.
 
         Nothing that follows from the liquids: they are blinded.
         """
-        return {"rate_hz": self.rate_hz, "priority": self._loop.priority}
+        return {"rate_hz": self.rate_hz, "priority": self._loop.grant.priority}
 
     def __enter__(self) -> Self:
         if self._loop.clock.runs:

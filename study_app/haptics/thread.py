@@ -15,6 +15,7 @@ from types import FrameType
 from study_app.errors import ServoFault
 from study_app.haptics.cfunctions import Driver
 from study_app.haptics.clock import Clock, raise_priority
+from study_app.haptics.clock_grants import NO_THREAD, Blocks, Grant
 from study_app.haptics.layout import READING, STATUS_OK, records
 from study_app.haptics.loop import CONTROL, ClockCalls, DeviceCalls, Output, let_go, offer_scene, run
 from study_app.haptics.pack import pack, pack_into
@@ -35,26 +36,38 @@ class LoopThread:
     driver, clock : what it reads and writes, and when
     rest : a scene without liquids, which it begins with
     elements : wake elements each of the two slots has room for
+    real_time : whether to ask for a thread that runs before others
     """
 
-    def __init__(self, driver: Driver, clock: Clock, rest: Scene, elements: int, telemetry: Telemetry) -> None:
+    def __init__(
+        self,
+        driver: Driver,
+        clock: Clock,
+        rest: Scene,
+        elements: int,
+        telemetry: Telemetry,
+        *,
+        real_time: bool = True,
+    ) -> None:
         self.clock = clock
         self._driver = driver  # both kept alive: the loop has nothing but addresses of theirs
         self.live = False  # begun, and not ended
         self.thread: threading.Thread | None = None
-        self.priority = "none: not in a thread of its own"
+        self.grant: Grant = NO_THREAD
         self.control = records(CONTROL, 1)
         self.control[0].period_ns = round(1e9 / rest.rate_hz)
         self._rest = rest
+        self._real_time = real_time
         self._safety = new_safety(driver.force_limit_n)
         self._slots = (pack(rest, capacity=elements), pack(rest, capacity=elements))
+        self._output = Output(telemetry.ring, telemetry.written)
         self._device = DeviceCalls(driver.context, driver.read.address, driver.write.address)
         self._arguments = (
             self.control,
             self._slots,
             self._safety,
             records(READING, 1),
-            Output(telemetry.ring, telemetry.written),
+            self._output,
             self._device,
             ClockCalls(clock.context, clock.now.address, clock.sleep.address),
         )
@@ -112,6 +125,11 @@ class LoopThread:
         allow_suspension(self)
         self.hand_over(self._rest, 0)
 
+    def _blocks(self) -> Blocks:
+        """Return the memory that the loop works in."""
+        arrays = (self.control, *self._slots[0], *self._slots[1], self._safety, *self._arguments[3:4], *self._output)
+        return [(array.ctypes.data, array.nbytes) for array in arrays if array.nbytes]
+
     def _silence(self) -> ServoFault:
         return ServoFault(
             f"the servo is stuck: its device '{self._driver.name}' gave no answer for {_PATIENCE_S:g} s; switch it off"
@@ -129,7 +147,8 @@ class LoopThread:
 
     def _turn(self, ready: threading.Event) -> None:
         try:
-            self.priority = raise_priority()
+            self.grant = raise_priority(self._blocks(), real_time=self._real_time)
+            self.control[0].deadline_ns = self.clock.now_ns() + int(self.control[0].period_ns)
         finally:
             ready.set()
         try:

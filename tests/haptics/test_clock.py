@@ -13,10 +13,15 @@ if numba.config.DISABLE_JIT:
 
 from llvmlite import binding
 
-from study_app.haptics import clock_macos, clock_windows
+from study_app.errors import StudyError
+from study_app.haptics import clock_linux, clock_macos, clock_windows
 from study_app.haptics.cfunctions import NOW, SLEEP, c_function
 from study_app.haptics.clock import SystemClock, VirtualClock, raise_priority
+from study_app.haptics.clock_grants import Grant
 from study_app.haptics.layout import records
+
+if sys.platform != "win32":
+    import resource
 
 MS = 1_000_000
 
@@ -81,21 +86,139 @@ def in_a_thread(function):
 
 
 def test_what_the_system_grants_is_said_in_words():
-    assert in_a_thread(raise_priority).split()[0] in {"real-time", "raised", "normal"}
+    grant = in_a_thread(raise_priority)
+    assert grant.level in {"real-time", "raised", "normal"}
+    assert str(grant).startswith(grant.level)
+    assert (grant.level == "real-time") == (not grant.advice)
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="the scheduler of Linux")
-def test_linux_asks_for_less_where_more_is_refused(monkeypatch):
-    def refuse(*_):
-        raise PermissionError
+def test_an_ordinary_thread_is_left_one():
+    grant = in_a_thread(lambda: raise_priority(((0, 0),), real_time=False))
+    assert str(grant) == "normal (no more was asked for)"
 
+
+def refuse(*_):
+    raise PermissionError
+
+
+def nothing(*_):
+    pass
+
+
+@pytest.fixture
+def linux(monkeypatch):
+    """Return what asks Linux, where all is refused but what is ``granted``."""
+    if sys.platform != "linux":
+        pytest.skip("the scheduler of Linux")
+
+    def grant(*granted, rtprio=0):
+        monkeypatch.setattr(os, "sched_setscheduler", nothing if "fifo" in granted else refuse)
+        monkeypatch.setattr(clock_linux, "make_real_time", (lambda _thread: 20) if "service" in granted else refuse)
+        monkeypatch.setattr(os, "setpriority", nothing if "nice" in granted else refuse)
+        monkeypatch.setattr(resource, "getrlimit", lambda _kind: (rtprio, rtprio))
+        return in_a_thread(raise_priority)
+
+    return grant
+
+
+def test_linux_asks_for_less_where_more_is_refused(linux):
+    assert str(linux("fifo", "service", "nice")) == "real-time (SCHED_FIFO 60)"
+    assert str(linux("service", "nice")) == "real-time (SCHED_RR 20, by the desktop's service)"
+    raised, normal = linux("nice"), linux()
+    assert raised.priority == "raised (nice -15)"
+    assert normal.priority == "normal (the system grants no more)"
+    for grant in (raised, normal):
+        (advice,) = grant.advice
+        assert "/etc/security/limits.d/" in advice
+        assert "rtkit" in advice
+
+
+def test_linux_takes_the_priority_that_a_limit_allows(linux, monkeypatch):
     asked = []
-    monkeypatch.setattr(os, "sched_setscheduler", refuse)
-    monkeypatch.setattr(os, "setpriority", lambda *arguments: asked.append(arguments))
-    assert in_a_thread(raise_priority) == "raised (nice -15)"
-    assert len(asked) == 1
-    monkeypatch.setattr(os, "setpriority", refuse)
-    assert in_a_thread(raise_priority) == "normal (the system grants no more)"
+    monkeypatch.setattr(clock_linux, "_PRIORITY", 60)
+
+    def grant_20(_thread, _policy, parameters):
+        asked.append(parameters.sched_priority)
+        if parameters.sched_priority > 20:
+            raise PermissionError
+
+    linux("nice", rtprio=20)
+    monkeypatch.setattr(os, "sched_setscheduler", grant_20)
+    assert str(in_a_thread(raise_priority)) == "real-time (SCHED_FIFO 20)"
+    assert asked == [60, 20]
+
+
+def test_memory_that_is_not_locked_is_said_with_its_cure():
+    well = Grant("real-time", "SCHED_FIFO 60")
+    assert str(well.with_memory(locked=True, advice="cure")) == "real-time (SCHED_FIFO 60), memory locked"
+    assert str(well.with_memory(locked=False, advice="cure")) == "real-time (SCHED_FIFO 60), memory not locked; cure"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="a limit of Linux")
+def test_with_a_limit_only_the_servos_own_memory_is_locked(monkeypatch):
+    """A whole process that is locked under a limit is refused memory later, wherever it asks for some."""
+    asked = []
+
+    class Library:
+        def mlockall(self, flags):
+            asked.append(("all", flags))
+            return 0
+
+        def mlock(self, address, size):
+            asked.append((address.value, size.value))
+            return 0
+
+    monkeypatch.setattr(clock_linux.ctypes, "CDLL", lambda _name: Library())
+    monkeypatch.setattr(resource, "setrlimit", refuse)
+    monkeypatch.setattr(resource, "getrlimit", lambda _kind: (8 << 20, 8 << 20))
+    assert clock_linux.lock_memory([(4096, 100), (8192, 50)])
+    assert asked == [(4096, 100), (8192, 50)]
+    asked.clear()
+    monkeypatch.setattr(resource, "getrlimit", lambda _kind: (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
+    assert clock_linux.lock_memory([(4096, 100)])
+    assert asked == [("all", 7)]
+
+
+class FakeLibrary:
+    """A library of Windows whose functions return what they are told."""
+
+    def __init__(self, **answers):
+        for name, answer in answers.items():
+            setattr(self, name, lambda *_arguments, answer=answer: answer)
+
+
+def test_windows_takes_the_multimedia_scheduler_before_a_critical_thread():
+    kernel = {"GetCurrentThread": 1, "SetThreadPriority": 1}
+    avrt = FakeLibrary(AvSetMmThreadCharacteristicsW=5, AvSetMmThreadPriority=1)
+    none = FakeLibrary(AvSetMmThreadCharacteristicsW=0, AvSetMmThreadPriority=0)
+    assert str(clock_windows.ask(avrt, FakeLibrary(**kernel))) == "real-time (MMCSS Pro Audio)"
+    raised = clock_windows.ask(none, FakeLibrary(**kernel))
+    assert raised.priority == "raised (time critical)"
+    assert "Multimedia Class Scheduler" in raised.advice[0]
+    refused = clock_windows.ask(none, FakeLibrary(**(kernel | {"SetThreadPriority": 0})))
+    assert refused.level == "normal"
+
+
+# looking at the clock before a deadline
+
+
+def test_a_spin_takes_over_before_the_deadline_and_is_counted():
+    clock = SystemClock(spin_us=500)
+    deadlines = [clock.now_ns() + 2 * MS]
+    for _ in range(50):
+        woken = sleep(clock, deadlines[-1])
+        assert woken >= deadlines[-1]
+        deadlines.append(woken + 2 * MS)
+    assert 0 < clock.spun_ns <= 50 * 500_000
+    trusting = SystemClock(spin_us=0)
+    sleep(trusting, trusting.now_ns() + MS)
+    assert trusting.spun_ns == 0
+
+
+@pytest.mark.parametrize("spin_us", [-1.0, 1001.0, float("nan")])
+def test_a_spin_longer_than_a_turn_is_refused(spin_us):
+    with pytest.raises(StudyError, match="a spin lasts 0 to 1000 µs"):
+        SystemClock(spin_us=spin_us)
 
 
 # the other systems' logic, against C functions that stand in for theirs
@@ -119,6 +242,7 @@ class FakeWindows:
         self.memory = records(clock_windows._COUNTER, 1)
         self.memory[0].frequency_hz = COUNTER_HZ
         self.memory[0].timer = 7
+        self.memory[0].spin_ns = 500_000
 
     def query(self, out):
         self.ticks += 10

@@ -1,0 +1,46 @@
+"""What the system granted to the servo's thread, and in words how to be granted more."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal, TypeAlias
+
+Level: TypeAlias = Literal["real-time", "raised", "normal", "none"]
+Blocks: TypeAlias = Sequence[tuple[int, int]]
+"""Memory: (address, bytes) each."""
+
+
+@dataclass(frozen=True, slots=True)
+class Grant:
+    """What a thread may do.
+
+    ``level`` is its priority class ("none": there is no thread) and ``how`` the system's name for it; ``locked`` whether the servo's memory cannot
+    be swapped out, None where that was not asked for; ``advice`` how to be granted what was refused, empty where
+    nothing was.
+    """
+
+    level: Level
+    how: str = ""
+    locked: bool | None = None
+    advice: tuple[str, ...] = ()
+
+    @property
+    def priority(self) -> str:
+        """The priority class in words: "real-time (SCHED_FIFO 60)"."""
+        if self.level == "none":
+            return f"none: {self.how}"
+        return f"{self.level} ({self.how})" if self.how else self.level
+
+    def with_memory(self, *, locked: bool, advice: str) -> Grant:
+        """Return the same, memory locked or not; ``advice`` is how to have it locked."""
+        return replace(self, locked=locked, advice=self.advice if locked else (*self.advice, advice))
+
+    def __str__(self) -> str:
+        memory = {None: "", True: ", memory locked", False: ", memory not locked"}[self.locked]
+        return "; ".join((f"{self.priority}{memory}", *self.advice))
+
+
+REFUSED = "the system grants no more"
+NOT_ASKED = Grant("normal", "no more was asked for")
+NO_THREAD = Grant("none", "not in a thread of its own")
