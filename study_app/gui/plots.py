@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
-from PySide6.QtCore import QPointF, QSize, Qt
+from PySide6.QtCore import QEvent, QPointF, QSize, Qt
 from PySide6.QtGui import QColor, QPen
 from PySide6.QtWidgets import QFrame
 
@@ -42,7 +42,7 @@ def number(value: float) -> str:
 
 
 def pen(colour: str, width: float = STROKE, dash: tuple[float, float] | None = None) -> QPen:
-    """Return a cosmetic pen: its width is px whatever the plot's scale."""
+    """Return a cosmetic pen: its width is px of the screen whatever the plot's scale."""
     made = QPen(QColor(colour), width)
     made.setCosmetic(True)
     made.setCapStyle(Qt.PenCapStyle.FlatCap)
@@ -86,6 +86,16 @@ class Plot(Themed, pg.GraphicsView):
             axis.setTickPen(NOTHING)
         self.axes["left"].setWidth(60)
         self.axes["bottom"].setHeight(28)
+
+    def stroke(self, colour: str, width: float = STROKE, dash: tuple[float, float] | None = None) -> QPen:
+        """Return a pen of so many logical px, as wide on a screen of any density."""
+        return pen(colour, width * self.devicePixelRatioF(), dash)
+
+    def event(self, event: QEvent) -> bool:
+        """Draw with pens for the screen that the window was moved to."""
+        if event.type() == QEvent.Type.DevicePixelRatioChange:
+            self.wear(self.theme)
+        return bool(super().event(event))
 
     def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
         """Return a small size: a plot takes what is left, and never makes a window scroll."""
@@ -193,7 +203,7 @@ class TracePlot(Plot):
         super().wear(theme)
         colours = (theme.trace_x, theme.trace_y, theme.trace_z)
         for curve, end, colour, dash in zip(self.curves, self.ends, colours, DASHES, strict=False):
-            curve.setPen(pen(colour, STROKE, dash))
+            curve.setPen(self.stroke(colour, STROKE, dash))
             end.setColor(QColor(colour))
 
 
@@ -260,9 +270,9 @@ class LatenessPlot(Plot):
         """Take the colours of ``theme``."""
         super().wear(theme)
         self.bars.setOpts(brush=QColor(theme.accent), pen=QPen(Qt.PenStyle.NoPen))
-        self.p99_line.setPen(pen(theme.text, 1.4))
+        self.p99_line.setPen(self.stroke(theme.text, 1.4))
         self.p99_name.setColor(QColor(theme.text))
-        self.limit_line.setPen(pen(theme.bad, 1.4, (4.0, 3.0)))
+        self.limit_line.setPen(self.stroke(theme.bad, 1.4, (4.0, 3.0)))
         self.limit_name.setColor(QColor(theme.bad))
 
 
@@ -288,6 +298,8 @@ def apart(places: Sequence[float], least: float, reach: float) -> list[float]:
             if lack > 0:
                 moved[i] -= lack / 2
                 moved[i + 1] += lack / 2
+    for i in range(len(moved) - 1):
+        moved[i + 1] = max(moved[i + 1], moved[i] + least)
     rank = np.arange(len(moved))
     moved = np.maximum(moved, -reach + least * rank)
     moved = np.minimum(moved, reach - least * rank[::-1])

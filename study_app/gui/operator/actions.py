@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QButtonGroup, QHBoxLayout, QLineEdit, QWidget
+from PySide6.QtWidgets import QButtonGroup, QHBoxLayout, QLineEdit, QSizePolicy, QWidget
 
 from study_app.gui.cards import Card
 from study_app.gui.controls import ActionButton, Radio
@@ -35,13 +35,15 @@ class Actions(Card):
         self._resumes = False
         self._signs = True
         row = QHBoxLayout()
-        row.setSpacing(14)
+        row.setSpacing(10)
         row.addWidget(self.pause)
         row.addWidget(self.repeat)
         row.addWidget(self.exclude)
         row.addStretch()
         row.addWidget(self.end)
         row.addWidget(self.close_session)
+        for button in (self.pause, self.repeat, self.exclude, self.end, self.close_session):
+            button.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)  # its padding gives way
         self.close_session.hide()
         self.column.addLayout(row)
         self.column.addWidget(self.hint)

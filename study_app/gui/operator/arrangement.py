@@ -26,17 +26,17 @@ from study_app.gui.operator.tiles import Tiles
 from study_app.gui.operator.view import NOTES_SHOWN
 
 Width = Literal["wide", "narrow", "slim"]
-Height = Literal["high", "low", "least"]
+Height = Literal["high", "low", "lower", "least"]
 
 SIDE = 350
 MARGINS: dict[Width, int] = {"wide": 21, "narrow": 18, "slim": 9}
 GAPS: dict[Width, int] = {"wide": 18, "narrow": 14, "slim": 9}
 RAILS: dict[Width, int] = {"wide": WIDTH, "narrow": NARROW, "slim": SLIM}
-NARROW_BELOW, SLIM_BELOW = 1500, 1300
-LOW_BELOW, LEAST_BELOW = 840, 690
-STOPS: dict[Height, int] = {"high": 250, "low": 236, "least": 236}
-NOTES: dict[Height, int] = {"high": NOTES_SHOWN, "low": 2, "least": 0}
-DEVICE_ROWS: dict[Height, int] = {"high": ALL_ROWS, "low": 3, "least": 2}
+NARROW_BELOW, SLIM_BELOW = 1500, 1320
+LOW_BELOW, LOWER_BELOW, LEAST_BELOW = 870, 750, 705
+STOPS: dict[Height, int] = {"high": 250, "low": 236, "lower": 236, "least": 236}
+NOTES: dict[Height, int] = {"high": NOTES_SHOWN, "low": 2, "lower": 1, "least": 0}
+DEVICE_ROWS: dict[Height, int] = {"high": ALL_ROWS, "low": 3, "lower": 2, "least": 2}
 ACROSS_FROM = 640  # so wide a middle has four tiles, and two plots, side by side
 SIGNS_FROM = 690  # so wide a row of buttons has room for their signs
 GAP = 10
@@ -105,7 +105,8 @@ class Arrangement(QWidget):
 
     def _arrange(self, size: QSize) -> None:
         width: Width = "wide" if size.width() >= NARROW_BELOW else "narrow" if size.width() >= SLIM_BELOW else "slim"
-        height: Height = "high" if size.height() >= LOW_BELOW else "low" if size.height() >= LEAST_BELOW else "least"
+        steps: tuple[tuple[int, Height], ...] = ((LOW_BELOW, "high"), (LOWER_BELOW, "low"), (LEAST_BELOW, "lower"))
+        height: Height = next((name for from_, name in steps if size.height() >= from_), "least")
         row = size.width() - 2 * MARGINS[width] - GAPS[width] - SIDE
         middle = row - RAILS[width] - GAPS[width]
         signs = (row if width == "slim" else middle) >= SIGNS_FROM

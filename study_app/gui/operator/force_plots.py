@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QPointF, QSize
 from PySide6.QtGui import QColor
@@ -21,7 +20,6 @@ from study_app.gui.plots import (
     Plot,
     TracePlot,
     number,
-    pen,
     step_for,
     time_ticks,
 )
@@ -83,10 +81,10 @@ class ForcePlot(TracePlot):
     def wear(self, theme: Theme) -> None:
         """Take the colours of ``theme``."""
         super().wear(theme)
-        self.curves[3].setPen(pen(theme.text3, 1.4))
+        self.curves[3].setPen(self.stroke(theme.text3, 1.4))
         self.ends[3].setColor(QColor(theme.text3))
         for line in self.limits:
-            line.setPen(pen(theme.bad, 1.4, (4.0, 3.0)))
+            line.setPen(self.stroke(theme.bad, 1.4, (4.0, 3.0)))
         if self.limit_name is not None:
             self.limit_name.setColor(QColor(theme.bad))
         if self.size_field is not None:
@@ -128,8 +126,9 @@ class WakePlot(Plot):
     def _make_room(self) -> None:
         height = max(2.0 * LINE_PX, self.box.height())
         step = step_for(self._asked, max(1, int(height / LINE_PX / 1.5) - 1))
-        rows = max(1, int(np.ceil(self._asked / step - 1e-9)))
-        self._reach = rows * step
+        step = step if step <= self._asked else step_for(self._asked / 2.6, 1)  # one line at least above zero
+        rows = int(self._asked / step + 1e-9)
+        self._reach = self._asked
         if (rows, step) != self._ticks:
             self._ticks = (rows, step)
             self.show_ticks("left", [(k * step, number(k * step)) for k in range(rows + 1)])
@@ -140,7 +139,7 @@ class WakePlot(Plot):
     def wear(self, theme: Theme) -> None:
         """Take the colours of ``theme``."""
         super().wear(theme)
-        self.curve.setPen(pen(theme.accent, STROKE))
+        self.curve.setPen(self.stroke(theme.accent, STROKE))
 
 
 class ForceCard(Card):
