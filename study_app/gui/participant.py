@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from threading import Thread
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QEvent, QRect, QSize, Qt, QTimer, Signal
@@ -26,7 +27,7 @@ from study_app.gui.pages.questionnaire import QuestionnaireWidget
 from study_app.gui.pages.reading import ReadingPage
 from study_app.gui.pages.text import TextWidget
 from study_app.gui.pointer import PointerCapture
-from study_app.gui.scene_view import TankWidget
+from study_app.gui.scene_view import TankWidget, paint_ahead
 from study_app.gui.theme import PARTICIPANT, font, load_fonts, stylesheet
 from study_app.protocol.words import Words, words
 from study_app.session.events import Continue, ForceStopped, PauseAsked
@@ -46,6 +47,7 @@ if TYPE_CHECKING:
 LEAST_SIZE = QSize(1024, 640)
 WINDOWED_SIZE = QSize(1366, 768)
 PILOT_FRAME = 10
+AHEAD_MS = 100  # after a page came, what comes next is painted
 SETTLING_MS = 100  # from one of the program's windows to the next, none may have the keyboard for so long
 
 
@@ -63,7 +65,8 @@ class ParticipantWindow(QWidget):
 
     While ``may_close`` is false, closing the window in the middle of a session is a pause.
     ``event`` carries the session's events; ``pointer`` the hand's place [m] and ``buttons`` the buttons' bits while the
-    pointer is captured; ``painted`` the time of the sample [ns] of every view, while it is drawn.
+    pointer is captured; ``painted`` the time of the sample [ns] of every view, while it is drawn. ``painting`` is the
+    last thread that painted ahead.
     """
 
     event = Signal(object)  # type: ignore[assignment]  # hides QWidget.event() from Python, not from Qt
@@ -89,6 +92,7 @@ class ParticipantWindow(QWidget):
         self._windowed = windowed
         self._captures = captures_pointer
         self.may_close = False
+        self.painting: Thread | None = None
         self.frame_px = PILOT_FRAME if pilot else 0
         self._page: Page | None = None
         self._widget: PageWidget | TankWidget = ReadingPage(
@@ -100,6 +104,10 @@ class ParticipantWindow(QWidget):
         self._settling = QTimer(self)
         self._settling.setInterval(SETTLING_MS)
         self._settling.timeout.connect(self._pause_if_left)
+        self._ahead = QTimer(self)
+        self._ahead.setSingleShot(True)
+        self._ahead.setInterval(AHEAD_MS)
+        self._ahead.timeout.connect(self._paint_ahead)
         self._escape = EscapeHold(self)
         self._escape.held.connect(self._stop_force)
         self._escape.tapped.connect(self._pause)
@@ -162,6 +170,7 @@ class ParticipantWindow(QWidget):
             made.focus_first()
         old.hide()  # only now, or Qt would lead the keyboard somewhere itself
         old.deleteLater()
+        self._ahead.start()
 
     def show_view(self, view: TankView) -> None:
         """Draw a view in the tank, while it is shown."""
@@ -194,6 +203,7 @@ class ParticipantWindow(QWidget):
         """Let the page fill the window."""
         super().resizeEvent(event)
         self._widget.setGeometry(self._room())
+        self._ahead.start()
 
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802
         """Do not let the participant close a session by accident: that is a pause."""
@@ -209,6 +219,12 @@ class ParticipantWindow(QWidget):
         painter = QPainter(self)
         painter.fillRect(self.rect(), QColor(PARTICIPANT.warn if self.frame_px else PARTICIPANT.window))
         painter.end()
+
+    def _paint_ahead(self) -> None:
+        """While a text is read, paint the tank that comes after it."""
+        if isinstance(self._page, TextPage) and self._page.coming is not None:
+            size, ratio = self._room().size(), self.devicePixelRatioF()
+            self.painting = paint_ahead(self._page.coming, self._words, self._text_scale, size, ratio)
 
     def _title(self) -> None:
         title = self._words.window_title

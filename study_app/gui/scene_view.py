@@ -6,6 +6,7 @@ delayed clock, and nothing is smoothed or eased. Nothing here knows which liquid
 
 from __future__ import annotations
 
+from threading import Thread
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
@@ -40,6 +41,24 @@ if TYPE_CHECKING:
 AREA = (0.075, 0.122, 0.85, 0.712)
 PATCH = (88.0, 72.0)  # photodiode patch: black square, white square in its corner [logical px]
 ALWAYS = QRegion(0, 0, 1, 1)  # a frame in which nothing moved is a frame too
+
+
+def look(page: TaskPage, captions: Captions, width: int, height: int) -> tuple[Box, Camera]:
+    """Return the tank of a page and the camera that shows it in a window of ``width`` × ``height`` [px]."""
+    box = Box.around(page.workspace_m, page.body_radius_m)
+    left, top, wide, high = AREA
+    top = max(top, captions.above(width, height) / height)
+    room = (1 - top) * height - captions.below(width, height)
+    return box, Camera.fitted(box, left * width, top * height, wide * width, min(high * height, room))
+
+
+def paint_ahead(page: TaskPage, words: Words, text_scale: float, size: QSize, ratio: float) -> Thread:
+    """Paint the still images of a page that is to come, in a thread of their own, so that it comes at once."""
+    width, height = size.width(), size.height()
+    box, camera = look(page, Captions(page, words, text_scale), width, height)
+    painting = Thread(target=backdrop, args=((width, height), ratio, box, camera), name="backdrop")
+    painting.start()
+    return painting
 
 
 class TankWidget(QWidget):
@@ -133,11 +152,7 @@ class TankWidget(QWidget):
 
     def _lay_out(self, ratio: float) -> None:
         width, height = self.width(), self.height()
-        left, top, wide, high = AREA
-        top = max(top, self._captions.above(width, height) / height)
-        room = (1 - top) * height - self._captions.below(width, height)
-        place = (left * width, top * height, wide * width, min(high * height, room))
-        self._camera = Camera.fitted(self._box, *place)
+        self._box, self._camera = look(self._page, self._captions, width, height)
         self._captions.lay_out(width, height, self._camera.point((0, self._box.floor, self._box.z))[1])
         self._placer = BallPlacer(self._camera, self._box, self._page.body_radius_m)
         for step in range(DEPTH_STEPS):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from study_app.protocol.schedule import PageStep, Trial
+from study_app.protocol.schedule import Trial
 from study_app.protocol.words import Words, words
 from study_app.session.pages import (
     EndPage,
@@ -22,7 +22,7 @@ def page(state: SessionState) -> Page:
     """Return what the participant sees in any phase but the one before the first page."""
     match state.phase:
         case Phase.TASK:
-            return _task_page(state)
+            return _task_page(state, state.trial)
         case Phase.ANSWERING:
             return _questionnaire_page(state)
         case Phase.PAUSED:
@@ -58,11 +58,12 @@ def _text_page(state: SessionState) -> TextPage:
         language=language,
         languages=state.languages,
         stays_until_s=state.stays_until_s,
+        coming=None if (trial := _coming(state)) is None else _task_page(state, trial),
     )
 
 
-def _task_page(state: SessionState) -> TaskPage:
-    protocol, trial = state.plan.protocol, state.trial
+def _task_page(state: SessionState, trial: Trial) -> TaskPage:
+    protocol = state.plan.protocol
     task = protocol.tasks[protocol.blocks[trial.block].task]
     return TaskPage(
         trial=trial.number,
@@ -70,7 +71,7 @@ def _task_page(state: SessionState) -> TaskPage:
         task=task,
         workspace_m=protocol.device.workspace_m,
         body_radius_m=protocol.scene.body.diameter_m / 2 / protocol.scene.scale,
-        progress=_progress(state),
+        progress=_progress(state, trial),
     )
 
 
@@ -89,28 +90,30 @@ def _questionnaire_page(state: SessionState) -> QuestionnairePage:
         ),
         labels=scale.labels[language],
         cannot_judge=None if scale.cannot_judge is None else _text(state, scale.cannot_judge),
-        progress=_progress(state),
+        progress=_progress(state, trial),
         chosen=tuple((item, answer.value) for item, answer in state.answers.items() if answer.given),
     )
 
 
-def _progress(state: SessionState) -> Progress:
-    """Return where the trial is among its block's."""
-    trial = state.trial
+def _progress(state: SessionState, trial: Trial) -> Progress:
+    """Return where a trial is among its block's."""
     return _among(state, trial, trial.label(state.plan.protocol, state.plan.language), trial.index)
 
 
 def _progress_between(state: SessionState) -> Progress | None:
     """Return where a page to read is: before the first trial of its part, or after so many; None outside the parts."""
-    steps = state.plan.schedule.steps
-    trials = [step for step in (*steps[state.index + 1 :], None) if not isinstance(step, PageStep)]
-    coming = trials[0]
+    steps, coming = state.plan.schedule.steps, _coming(state)
     done = next((step for step in reversed(steps[: state.index]) if isinstance(step, Trial)), None)
     if done is not None and (coming is None or state.plan.protocol.pages[state.page_id].kind == "break"):
         return None if done.part is None else _among(state, done, "", done.index + 1)
     if coming is None or coming.part is None:
         return None
     return _among(state, coming, "", coming.index)
+
+
+def _coming(state: SessionState) -> Trial | None:
+    """Return the next trial after the present step."""
+    return next((step for step in state.plan.schedule.steps[state.index + 1 :] if isinstance(step, Trial)), None)
 
 
 def _among(state: SessionState, trial: Trial, label: str, index: int) -> Progress:

@@ -27,26 +27,6 @@ class Progress:
 
 
 @dataclass(frozen=True, slots=True)
-class TextPage:
-    """A text to read and a button to go on: consent, instructions, announcements, breaks, the debrief.
-
-    ``language`` is the one all pages are in from here on; ``languages`` are those that may be chosen instead, with it
-    among them, none where there is no choice. ``stays_until_s`` is when the page may be left at the earliest [s,
-    session's clock], None at once.
-    """
-
-    id: str
-    kind: Literal["consent", "instructions", "break", "debrief"]
-    title: str
-    paragraphs: tuple[str, ...]
-    button: str
-    progress: Progress | None = None
-    language: str = "en"
-    languages: tuple[str, ...] = ()
-    stays_until_s: float | None = None
-
-
-@dataclass(frozen=True, slots=True)
 class TaskPage:
     """The tank: move the ball. Nothing of the condition is here: how late the tank is drawn is the runner's to know.
 
@@ -59,6 +39,27 @@ class TaskPage:
     workspace_m: tuple[float, float, float]
     body_radius_m: float
     progress: Progress | None
+
+
+@dataclass(frozen=True, slots=True)
+class TextPage:
+    """A text to read and a button to go on: consent, instructions, announcements, breaks, the debrief.
+
+    ``language`` is the one all pages are in from here on; ``languages`` are those that may be chosen instead, with it
+    among them, none where there is no choice. ``stays_until_s`` is when the page may be left at the earliest [s,
+    session's clock], None at once. ``coming`` is the next task, so that it can be made ready while one reads.
+    """
+
+    id: str
+    kind: Literal["consent", "instructions", "break", "debrief"]
+    title: str
+    paragraphs: tuple[str, ...]
+    button: str
+    progress: Progress | None = None
+    language: str = "en"
+    languages: tuple[str, ...] = ()
+    stays_until_s: float | None = None
+    coming: TaskPage | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,6 +7,7 @@ it. They are painted with 16 bits a channel and dithered, so that the dark gradi
 from __future__ import annotations
 
 import math
+import threading
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -26,6 +27,7 @@ from study_app.gui.theme import PARTICIPANT
 
 ROOM = ("#0E141A", "#16222C", "#0A1015")
 SEED = 11
+_PAINTING = threading.Lock()
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,9 +39,17 @@ class Backdrop:
     front_at: QRectF
 
 
-@lru_cache(maxsize=2)
 def backdrop(size: tuple[int, int], ratio: float, box: Box, camera: Camera) -> Backdrop:
-    """Paint both images of a tank for a widget of ``size`` [logical px] on a screen of pixel ratio ``ratio``."""
+    """Return both images of a tank for a widget of ``size`` [logical px] on a screen of pixel ratio ``ratio``.
+
+    The last two are kept. It may be called in another thread to have them at hand: who asks meanwhile waits for it.
+    """
+    with _PAINTING:
+        return _painted(size, ratio, box, camera)
+
+
+@lru_cache(maxsize=2)
+def _painted(size: tuple[int, int], ratio: float, box: Box, camera: Camera) -> Backdrop:
     area = QRectF(0, 0, *size)
     back = _blank(area.size(), ratio, QImage.Format.Format_RGBX64)
     painter = _painter(back)
