@@ -15,9 +15,9 @@ Blocks: TypeAlias = Sequence[tuple[int, int]]
 class Grant:
     """What a thread may do.
 
-    ``level`` is its priority class ("none": there is no thread) and ``how`` the system's name for it; ``locked`` whether the servo's memory cannot
-    be swapped out, None where that was not asked for; ``advice`` how to be granted what was refused, empty where
-    nothing was.
+    ``level`` is its priority class ("none": there is no thread) and ``how`` the system's name for it; ``locked`` whether
+    the servo's memory cannot be swapped out, None where that was not asked for; ``advice`` how to be granted what was
+    refused, empty where nothing was.
     """
 
     level: Level

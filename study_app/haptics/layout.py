@@ -243,6 +243,7 @@ SAFETY = np.dtype(
         ("turn_ns", np.int64),  # time of the last turn
         ("usable_ns", np.int64),  # time of the last sample that was accepted
         ("turn_s", np.float64),  # time since the turn before
+        ("late_s", np.float64),  # by how much more than is forgiven this turn came late
         ("fade", np.float64),  # share of the force that is sent, 0 … 1
         ("fade_s", np.float64),  # how long a fade from 0 to 1 takes at present
         ("device_limit_n", np.float64),  # the device's own force limit

@@ -23,6 +23,7 @@ from study_app.haptics.layout import (
     LIMITER_NORM,
     LIMITER_SLEW,
     LIMITER_SLOPE,
+    LIMITER_STALE,
     LIMITER_STOP,
     SAFETY,
     STATUS_NON_FINITE,
@@ -147,10 +148,13 @@ def _scale(force_n: Any, lift_n: Any, factor: float) -> None:
 
 @part
 def _fade(force_n: Any, lift_n: Any, safety: Record, sample: Record) -> None:
-    """Weaken the force while it fades in (start 500 ms, scene 50 ms) or out (no usable sample)."""
-    if safety.withheld:
-        sample.limiters |= safety.withheld
-        safety.fade = max(safety.fade - safety.turn_s / FADE_OUT_S, 0.0)
+    """Weaken the force while it fades in (start 500 ms, scene 50 ms) or out (no usable sample, or a late turn)."""
+    if safety.withheld or safety.late_s > 0.0:
+        sample.limiters |= safety.withheld if safety.withheld else LIMITER_STALE
+        lasted_s = max(safety.late_s, safety.turn_s if safety.withheld else 0.0)
+        safety.fade = max(safety.fade - lasted_s / FADE_OUT_S, 0.0)
+        if safety.late_s >= FADE_OUT_S:
+            safety.fade_s = START_FADE_S
     else:
         safety.fade = min(safety.fade + safety.turn_s / safety.fade_s, 1.0)
     if safety.fade < 1.0:

@@ -11,7 +11,7 @@ from study_app.errors import DeviceLost, ServoFault, StudyError
 from study_app.haptics.cfunctions import Driver
 from study_app.haptics.clock import Clock, SystemClock
 from study_app.haptics.clock_grants import Grant
-from study_app.haptics.layout import STATUS_DEVICE_LOST, STATUS_NON_FINITE, STATUS_STALE_FAULT
+from study_app.haptics.layout import STATUS_DEVICE_LOST, STATUS_NON_FINITE, STATUS_OK, STATUS_STALE_FAULT
 from study_app.haptics.pack import elements_needed
 from study_app.haptics.scene import Scene
 from study_app.haptics.telemetry import Telemetry
@@ -24,6 +24,9 @@ _FAULTS = {
     STATUS_STALE_FAULT: "sent nothing usable for 50 ms; check its cable and start anew",
     STATUS_NON_FINITE: "was to be sent a force that is not a finite number; check the scene's parameters",
 }
+
+
+_STUCK = "holds the last turn up, or the computer does: no turn for 75 ms; switch it off if it pushes, start anew"
 
 
 class Servo:
@@ -135,8 +138,9 @@ class Servo:
 
     @property
     def fault(self) -> str | None:
-        """Why the servo stopped itself, in a sentence; None while it has not."""
-        reason = _FAULTS.get(int(self._loop.control[0].status))
+        """Why the servo stopped itself, or hangs, in a sentence; None while it does neither."""
+        status = int(self._loop.control[0].status)
+        reason = _STUCK if status == STATUS_OK and self._loop.stuck else _FAULTS.get(status)
         return None if reason is None else f"the device '{self._device.name}' {reason}"
 
     @property
@@ -148,8 +152,10 @@ class Servo:
         """Raise ``DeviceLost`` or ``ServoFault`` if the servo has stopped itself."""
         fault = self.fault
         if fault is not None:
-            lost = self._loop.control[0].status == STATUS_DEVICE_LOST
-            raise (DeviceLost if lost else ServoFault)(f"{fault}; the force is zero")
+            status = int(self._loop.control[0].status)
+            if status == STATUS_OK:  # it hangs: nobody can say what the device does
+                raise ServoFault(fault)
+            raise (DeviceLost if status == STATUS_DEVICE_LOST else ServoFault)(f"{fault}; the force is zero")
 
     def now_ns(self) -> int:
         """Return the time on the servo's clock [ns], the clock of all samples."""

@@ -26,6 +26,7 @@ from study_app.haptics.telemetry import Telemetry
 
 _FOREVER = -1
 _PATIENCE_S = 2.0  # for a loop that was told to end; it takes one turn
+_STUCK_NS = 75_000_000  # a turn late by this may never come: seen with the next frame, it is known within 100 ms
 
 
 class LoopThread:
@@ -76,6 +77,12 @@ class LoopThread:
         """Compile the loop for its arguments, or load it from the cache: zero force is written, no turn taken."""
         let_go(self._device)
         run(*self._arguments, 0)
+
+    @property
+    def stuck(self) -> bool:
+        """Whether the turn that is due, or under way, has been so for so long that something hangs."""
+        running = self.thread is not None and self.live and self.control[0].run != 0
+        return bool(running and self.clock.now_ns() - int(self.control[0].deadline_ns) > _STUCK_NS)
 
     def start(self) -> None:
         """Turn in a thread of its own until `end`; until then Ctrl-Z does not stop it with its force on."""

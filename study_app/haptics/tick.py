@@ -47,7 +47,7 @@ def tick(model: Any, safety: Record, sample: Record) -> None:
     sample.limiters = 0
     sample.status = STATUS_OK
     interval_s = admit(model.parameters[0], model.state[0], safety, sample)
-    watch(safety, sample)
+    watch(model.parameters[0], safety, sample)
     if interval_s > 0.0:
         respond(model, interval_s)
     report(model.state[0], sample)

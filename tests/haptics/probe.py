@@ -2,7 +2,16 @@
 
 import numpy as np
 
-from study_app.haptics.cfunctions import READ, READ_LOST, READ_NEW, READ_NOTHING_NEW, WRITE, c_function, record_at
+from study_app.haptics.cfunctions import (
+    READ,
+    READ_LOST,
+    READ_NEW,
+    READ_NOTHING_NEW,
+    WRITE,
+    c_function,
+    fence,
+    record_at,
+)
 from study_app.haptics.layout import READING, records
 
 WRITES = 8192
@@ -20,6 +29,7 @@ PROBE = np.dtype(
         ("stall_at_read", np.int64),
         ("stall_ns", np.int64),
         ("buttons", np.int64),
+        ("hangs", np.int64),  # while not 0, a reading does not end
         ("clock", np.intp),
         ("forces_n", np.float64, (WRITES, 3)),
     ],
@@ -40,6 +50,8 @@ def _read(context, now_ns, reading):
         probe.began_ns = now_ns
     if probe.reads == probe.stall_at_read:
         _clock_at(probe.clock).now_ns += probe.stall_ns
+    while probe.hangs != 0:
+        fence()
     if probe.reads >= probe.lost_at_read:
         return READ_LOST
     if probe.reads >= probe.silent_from_read:

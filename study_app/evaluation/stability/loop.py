@@ -165,7 +165,7 @@ def _answer(model: Any, safety: Any, sample: Any, safe: int) -> None:
         return
     sample.limiters = 0
     interval_s = admit(model.parameters[0], model.state[0], safety, sample)
-    watch(safety, sample)
+    watch(model.parameters[0], safety, sample)
     if interval_s > 0.0:
         respond(model, interval_s)
     report(model.state[0], sample)

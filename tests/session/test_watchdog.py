@@ -1,0 +1,119 @@
+"""What a session makes of a servo that stops itself, and what the hand feels of windows that stand still."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+from study_app.devices.scripted import ScriptedDevice
+from study_app.haptics.clock import VirtualClock
+from study_app.haptics.layout import STATUS_OK
+from study_app.haptics.servo import Servo
+from study_app.session.pages import TroublePage
+from study_app.session.state import Phase
+from tests.compiled import needs_servo
+from tests.session import small
+from tests.session.test_runner_with_servo import Bench
+
+pytestmark = needs_servo
+
+FRAME_TICKS = 16
+SEEN_WITHIN_S = 0.1
+
+
+@pytest.fixture
+def clock() -> VirtualClock:
+    return VirtualClock()
+
+
+@pytest.fixture
+def bench(clock: VirtualClock) -> Iterator[Bench]:
+    device = ScriptedDevice()
+    with device, Servo(device, clock=clock, elements=100) as servo:
+        yield Bench(servo, device)
+
+
+def frames(bench: Bench, ticks: int) -> Any:
+    """Let ticks pass while the windows look every frame; return the samples."""
+    reader = bench.servo.telemetry.reader()
+    for _ in range(0, ticks, FRAME_TICKS):
+        bench.servo.advance(FRAME_TICKS)
+        bench.runner.poll()
+    return reader.read()
+
+
+def fail_by_silence(bench: Bench, _clock: VirtualClock) -> None:
+    bench.device._state.last_ns = 1 << 62  # nothing newer than this ever comes
+
+
+def fail_by_loss(bench: Bench, _clock: VirtualClock) -> None:
+    bench.device.unplug()
+
+
+def fail_by_a_force_that_is_no_number(bench: Bench, _clock: VirtualClock) -> None:
+    for model in bench.servo._loop._slots:
+        model.liquids.drag.factor_kg_m = np.nan
+
+
+@pytest.mark.parametrize(
+    ("fail", "said"),
+    [
+        (fail_by_silence, "nothing usable for 50 ms"),
+        (fail_by_loss, "stopped answering"),
+        (fail_by_a_force_that_is_no_number, "not a finite number"),
+    ],
+)
+def test_a_servo_that_faults_is_seen_within_100_ms_and_its_trial_is_marked(
+    bench: Bench, clock: VirtualClock, fail: Any, said: str
+) -> None:
+    frames(bench, 800)
+    assert bench.runner.state.phase is Phase.TASK
+    trial = bench.runner.state.trial.number
+    fail(bench, clock)
+    reader = bench.servo.telemetry.reader()
+    noticed_s = None
+    for _ in range(10):
+        bench.servo.advance(FRAME_TICKS)
+        clock._memory[0].now_ns += FRAME_TICKS * 1_000_000 if bench.servo.fault else 0  # the loop has ended
+        bench.runner.poll()
+        if bench.runner.state.phase is Phase.TROUBLE:
+            noticed_s = bench.clock()
+            break
+    samples = reader.read()
+    faulted_s = samples.time_ns[samples.status != STATUS_OK][0] * 1e-9
+    assert noticed_s is not None
+    assert noticed_s - faulted_s <= SEEN_WITHIN_S
+    assert not samples.device_force_n[-1].any()
+    assert isinstance(bench.pages[-1], TroublePage)
+    (broke,) = bench.journal.of("broke")
+    assert said in broke["what"]
+    (row,) = bench.journal.of("trial_ended")
+    assert (row["trial"], row["outcome"]) == (trial, "interrupted")
+
+
+def forces_of_six_seconds(*, frozen: bool) -> Any:
+    """Return the forces (n, 3) [N] of one hand, looked at every frame, or not at all for 5 s in the middle."""
+    device = ScriptedDevice()
+    with device, Servo(device, clock=VirtualClock(), elements=100) as servo:
+        bench = Bench(servo, device)
+        reader = servo.telemetry.reader()
+        frames(bench, 800)
+        if frozen:
+            servo.advance(5008)
+        frames(bench, 320 if frozen else 5328)
+        assert bench.runner.state.phase is Phase.TASK
+        assert servo.fault is None
+        samples = reader.read()
+        assert reader.dropped == 0
+        return samples.device_force_n
+
+
+def test_windows_that_stand_still_for_five_seconds_change_no_force(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(small.TABLES["tasks"]["explore"], "max_s", 20)
+    frozen, watched = forces_of_six_seconds(frozen=True), forces_of_six_seconds(frozen=False)
+    assert len(frozen) == len(watched) == 6128
+    assert np.abs(frozen[800:5808]).max() > 0.5
+    assert frozen.tobytes() == watched.tobytes()
