@@ -8,7 +8,7 @@ apart by their ``phase``.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -20,12 +20,13 @@ from study_app.analysis.decided import Decided
 from study_app.analysis.excluding import check_there, with_excluded
 from study_app.analysis.questions import Block, Kind, Setting, settings_of
 from study_app.analysis.sessions import Session, read_session, read_tables
-from study_app.errors import AnalysisError
+from study_app.errors import AnalysisError, StoreError
 from study_app.store import blinding
 from study_app.store.abandoned import never_begun
+from study_app.store.blinding import Key
 from study_app.store.doubts import Doubt, doubts
 from study_app.store.exclusions import Exclusion, exclusions
-from study_app.store.layout import StudyFolder
+from study_app.store.layout import SessionFolder, StudyFolder
 from study_app.store.open_session import Place
 
 COMPLETED: Final = "completed"
@@ -143,7 +144,7 @@ def load_study(folder: Path) -> Study:
     sessions = [session for session in place.sessions() if not never_begun(session.path)]
     if not sessions:
         raise AnalysisError(_no_sessions(place.path))
-    key = blinding.revealed_key(place.path)
+    key = _key(place, sessions)
     listed = exclusions(place.path)
     records = [read_session(sessions[0], key)]
     records += [read_session(session, key, like=records[0]) for session in sessions[1:]]
@@ -169,6 +170,18 @@ def load_study(folder: Path) -> Study:
     )
 
 
+def _key(place: StudyFolder, sessions: Sequence[SessionFolder]) -> Key | None:
+    """Return the opened key; a session of another study is named as such, and not as one under another key."""
+    try:
+        return blinding.revealed_key(place.path)
+    except StoreError:
+        first, *others = [read_session(session, None) for session in sessions]
+        for other in others:
+            if other.study != first.study:
+                raise AnalysisError(_other_study(other, first)) from None
+        raise
+
+
 def _no_sessions(path: Path) -> str:
     if not path.is_dir():
         return f"{path} is no folder: give a study's folder, such as results/rek2024"
@@ -181,13 +194,17 @@ def _no_sessions(path: Path) -> str:
     )
 
 
+def _other_study(other: Session, first: Session) -> str:
+    return (
+        f"{other.folder.path} is of the study {other.study!r}, {first.folder.path} of {first.study!r}: keep each study "
+        "in a folder of its own"
+    )
+
+
 def _check_alike(first: Session, other: Session) -> None:
     """Refuse to pool what was not asked alike, or not under one key."""
     if other.study != first.study:
-        raise AnalysisError(
-            f"{other.folder.path} is of the study {other.study!r}, {first.folder.path} of {first.study!r}: keep each "
-            "study in a folder of its own"
-        )
+        raise AnalysisError(_other_study(other, first))
     if other.facts["key_hash"] != first.facts["key_hash"]:
         raise AnalysisError(
             f"{other.folder.path} and {first.folder.path} ran under different sealed keys, so that one code does not "

@@ -184,6 +184,7 @@ def test_one_participant_all_equal_and_missing_answers_give_a_report_that_says_s
     alone = read(tmp_path / "one")
     assert "about this person alone" in alone
     assert "1 participants" not in alone
+    assert run_in_r(tmp_path / "one").returncode == 0
     assert "1 pairs" not in alone
 
     def gaps(condition: str, item: str) -> Answer:
@@ -194,6 +195,10 @@ def test_one_participant_all_equal_and_missing_answers_give_a_report_that_says_s
     report(rek.folder, tmp_path / "equal")
     told = read(tmp_path / "equal")
     assert "not tested (no variation: every participant answered alike under all settings)" in told
+    assert "no statement could be tested (no variation: every participant answered alike under all settings)" in told
+    assert "“Feels like a liquid”, “Immersive”, “Adequate force”" in told
+    assert "could not be tested: no variation" in told
+    assert "no delay could be compared with 0 ms" in told
     assert "Skillings-Mack" in told
     assert "Effects of the mixed model" not in told
     numbers(tmp_path / "equal")
@@ -270,8 +275,12 @@ def test_another_study_mixed_in_or_an_empty_folder_is_one_clear_error(
     twelve(rek, people=2)
     foreign = small.add("P077", lambda _condition, _item: 4)
     shutil.copytree(foreign.path.parent, rek.folder / "data" / "sub-P077")
-    with pytest.raises(AnalysisError, match="keep each study in a folder of its own"):
-        report(rek.folder, tmp_path / "report")
+    for _ in ("sealed", "opened"):
+        with pytest.raises(AnalysisError, match=r"is of the study 'small', .* keep each study in a folder of its own"):
+            report(rek.folder, tmp_path / "report")
+        shutil.move(rek.folder / "data" / "sub-P077", tmp_path / "sub-P077")
+        rek.open()
+        shutil.move(tmp_path / "sub-P077", rek.folder / "data" / "sub-P077")
     (tmp_path / "empty").mkdir()
     with pytest.raises(AnalysisError, match="holds no sessions"):
         report(tmp_path / "empty", tmp_path / "report")

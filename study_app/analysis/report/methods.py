@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from study_app import __version__
+from study_app.analysis.captions import people_a_setting
 from study_app.analysis.measures import QUARTILES
 from study_app.analysis.report.words import counted, listed, number, settings_noun, test_name
 from study_app.analysis.results import BlockFound, Results, Tested
@@ -40,8 +41,14 @@ def _sample(study: Study) -> str:
     gone = f"; {counted(out, 'further session')} {'was' if out == 1 else 'were'} left out" if out else ""
     return (
         f"{people[:1].upper()}{people[1:]}{kind} took part in “{study.title}” (protocol {study.name}, version "
-        f"{study.version}){gone}, each under all settings."
+        f"{study.version}){gone}, {_under(study)}."
     )
+
+
+def _under(study: Study) -> str:
+    if all(set(people_a_setting(study, block).values()) == {study.n} for block in study.blocks):
+        return "each under all settings"
+    return "some of them under fewer than all settings, single trials being left out"
 
 
 def _presented(study: Study, results: Results) -> str:
@@ -73,7 +80,7 @@ def _liquids(found: BlockFound) -> Iterator[str]:
             "within participants, the statistic being the sum of the statements' Friedman statistics."
         )
     if found.omnibus:
-        one = found.omnibus[0]
+        one = next((one for one in found.omnibus if one.outcome.p is not None), found.omnibus[0])
         yield (
             f"Each statement was tested by {test_name(one.outcome)} ({one.outcome.method}), with "
             f"{one.outcome.effect_name} as the effect, {_families(found.omnibus)}."
@@ -107,7 +114,7 @@ def _delays(found: BlockFound, results: Results) -> Iterator[str]:
         yield from _liquids(found)
         return
     if found.trends:
-        one = found.trends[0]
+        one = next((one for one in found.trends if one.outcome.p is not None), found.trends[0])
         yield (
             f"Trends over the delay were tested by Page's L ({one.outcome.method.split(',')[0]}), one-sided in the "
             f"direction stated beforehand, {_families(found.trends)}; "

@@ -120,7 +120,9 @@ def _calls(found: BlockFound) -> Iterator[str]:
     block = _text(found.id)
     codes = _vector([setting.code for setting in found.settings])
     for one in found.omnibus:
-        if isinstance(one.outcome, Friedman) and one.outcome.statistic is not None and one.outcome.p_chi2 is not None:
+        if not isinstance(one.outcome, Friedman) or one.outcome.n < 2:
+            continue  # R's friedman.test refuses a single participant
+        if one.outcome.statistic is not None and one.outcome.p_chi2 is not None:
             numbers = f"{_number(one.outcome.statistic)}, {_number(one.outcome.p_chi2)}"
             yield f"friedman({_text(one.item)}, wide({block}, {_text(one.item)}, {codes}), {numbers})"
     for one in found.trends:

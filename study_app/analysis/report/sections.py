@@ -91,7 +91,8 @@ def _tests(title: str, found: BlockFound, tests: Sequence[Tested], results: Resu
     intervals = dict.fromkeys(one.outcome.interval.method for one in tests if one.outcome.interval is not None)
     yield paragraph(
         f"{test_name(first.outcome)}; effect: {first.outcome.effect_name}. Found by: "
-        f"{'; '.join(dict.fromkeys(one.outcome.method for one in tests))}. {'; '.join(families)}. "
+        f"{'; '.join(dict.fromkeys(one.outcome.method for one in tests if one.outcome.p is not None)) or 'none'}. "
+        f"{'; '.join(families)}. "
         + (f"Intervals: 95 %, {'; '.join(intervals)}. " if intervals else "")
         + VERDICTS_MEAN.format(alpha=f"{results.decided.alpha:g}"),
         "soft",
@@ -250,7 +251,7 @@ def _against(found: BlockFound) -> Iterator[str]:
                 p_value(one.found.p_permutation),
                 p_value(one.p_adjusted),
                 "–" if one.found.n_needed is None else str(one.found.n_needed),
-                one.verdict + (" *" if one.found.checks_agree is False else ""),
+                one.verdict + _doubt(one),
             ]
             for one in found.against
         ],
@@ -258,6 +259,12 @@ def _against(found: BlockFound) -> Iterator[str]:
         last=1,
     )
     yield paragraph(" ".join(_about_against(found.against)), "soft")
+
+
+def _doubt(one: Against) -> str:
+    if one.found.checks_agree is False:
+        return " *"
+    return " †" if one.found.verdict == "different" and one.verdict == "inconclusive" else ""
 
 
 def _about_against(against: Sequence[Against]) -> Iterator[str]:
@@ -284,6 +291,9 @@ def _about_against(against: Sequence[Against]) -> Iterator[str]:
     disagree = sum(one.found.checks_agree is False for one in against)
     if disagree:
         yield f"*: p with and without normality decide differently ({disagree}); equivalent is only what both show."
+    alone = sum(_doubt(one) == " †" for one in against)
+    if alone:
+        yield f"†: a t test alone, not corrected, would call it different ({alone})."
 
 
 def _threshold(found: BlockFound) -> Iterator[str]:

@@ -43,6 +43,7 @@ def limits(study: Study, results: Results) -> tuple[str, ...]:
                 f"{lead(found)}: so few participants, with the ties in their answers and the other p of the family as "
                 f"they came out, could not have shown anything in {listed(out)}, even had they all agreed."
             )
+        lines += _untested(found)
         lines += _mixed_up(found, results)
         lines += _of_equivalence(found)
     return tuple(lines)
@@ -77,6 +78,16 @@ def _in_general(study: Study, results: Results) -> Iterator[str]:
             f"{people[:1].upper()}{people[1:]}: below {FEW} no bootstrap interval and no mixed model is given, since "
             "they do not hold there. What is not shown here may well be there."
         )
+
+
+def _untested(found: BlockFound) -> Iterator[str]:
+    """Name the statements that gave nothing to test, with the reason."""
+    reasons: dict[str, list[str]] = {}
+    for one in (*found.omnibus, *found.trends):
+        if one.verdict == "not tested":
+            reasons.setdefault(one.outcome.note, []).append(f"“{short(found, one.item)}”")
+    for reason, items in reasons.items():
+        yield f"{lead(found)}: {listed(items)} could not be tested: {reason}."
 
 
 def _mixed_up(found: BlockFound, results: Results) -> Iterator[str]:
@@ -115,9 +126,16 @@ def _of_block(found: BlockFound, alpha: float) -> Iterator[str]:
     if told:
         yield f"{lead(found)}: the {noun}s differ in {told}."
     elif found.omnibus:
-        yield f"{lead(found)}: in no single statement a difference between the {noun}s is shown."
+        yield f"{lead(found)}: {_nothing(found.omnibus, f'in no single statement a difference between the {noun}s')}."
     yield from _recognised(found)
     yield from _delays(found)
+
+
+def _nothing(tests: tuple[Tested, ...], what: str) -> str:
+    """Return that ``what`` is shown, none being there, or why nothing could be tested."""
+    if any(one.outcome.p is not None for one in tests):
+        return f"{what} is shown"
+    return f"no statement could be tested ({'; '.join(dict.fromkeys(one.outcome.note for one in tests))})"
 
 
 def _shown(found: BlockFound, tests: tuple[Tested, ...]) -> str:
@@ -160,7 +178,7 @@ def _delays(found: BlockFound) -> Iterator[str]:
     if told:
         yield f"{lead(found)}: answers follow the delay, in the direction stated before the study, in {told}."
     elif found.trends:
-        yield f"{lead(found)}: in no statement a trend over the delay is shown."
+        yield f"{lead(found)}: {_nothing(found.trends, 'in no statement a trend over the delay')}."
     lowest = [
         f"“{short(found, one.item)}” {ms(one.steps.lowest_ms)}"
         for one in found.lowest
@@ -168,7 +186,7 @@ def _delays(found: BlockFound) -> Iterator[str]:
     ]
     if lowest:
         yield (
-            f"{lead(found)}: the lowest delay at which {_used(found)} suffice to show a trend: "
+            f"{lead(found)}: the lowest delay at which the answers of {_used(found)} show a trend: "
             f"{listed(lowest)}. Each is an upper bound: shorter delays may be noticed too."
         )
     threshold = found.threshold
@@ -191,13 +209,17 @@ def _equivalent(found: BlockFound) -> Iterator[str]:
     if not found.against:
         return
     bound, control = found.against[0].found.bound, ms(found.against[0].control_ms)
-    within = f"to within ±{bound:g} {'point' if bound == 1 else 'points'}"
+    within = f"within ±{bound:g} {'point' if bound == 1 else 'points'} of those at {control}"
     up_to = [
         f"“{short(found, item)}” up to {ms(delay)}"
         for item, delay in (found.equivalent_up_to or {}).items()
         if delay is not None
     ]
     if up_to:
-        yield f"{lead(found)}: mean answers as at {control}, {within}, are shown for {listed(up_to)}."
+        yield f"{lead(found)}: mean answers {within} are shown for {listed(up_to)}."
+    elif all(one.found.p is None for one in found.against):
+        reasons = "; ".join(dict.fromkeys(one.found.note for one in found.against))
+        yield f"{lead(found)}: no delay could be compared with {control} ({reasons})."
     else:
-        yield f"{lead(found)}: in no statement are mean answers as at {control}, {within}, shown even at the next."
+        nearest = ms(found.against[0].delay_ms)
+        yield f"{lead(found)}: mean answers {within} are shown in no statement, not even at {nearest}."

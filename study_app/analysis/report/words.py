@@ -15,8 +15,8 @@ NUMBERS: Final = tuple(_SMALL.split())
 VERDICTS_MEAN: Final = (
     "Shown: adjusted p at most {alpha}. Suggested: the same in a statement that was not decided on before the study, "
     "which is a reason to look again and no finding. Not shown: these data do not settle it; that is not evidence of "
-    "sameness. Out of reach: as many participants, with these ties, could not have shown it however their answers had "
-    "been arranged, the other p of the family being what they are: adjusted p depends on those too."
+    "sameness. Out of reach: however these answers had been arranged within participants, they could not have shown "
+    "it, the other p of the family being what they are: adjusted p depends on those too."
 )
 
 

@@ -6,7 +6,7 @@ pooled, so that the interval does not hold the spread between people.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -109,7 +109,7 @@ def threshold(
     lapses: Bounds = LAPSES if lapse is None else (lapse, lapse)
     best = fit(counts, shape, guesses, lapses)
     ends = tuple(_end(counts, shape, guesses, lapses, best, side) for side in (-1.0, 1.0))
-    told = (*at_bounds(counts, best, guesses, lapses), *([] if n is None else [POOLED]))
+    told = (*at_bounds(counts, best, guesses, lapses), *_beyond(counts, ends), *([] if n is None else [POOLED]))
     return _outcome(counts, best, (ends[0], ends[1]), shape, people, dropped, "; ".join(told))
 
 
@@ -161,6 +161,12 @@ def _end(counts: Counts, shape: Shape, guess: Bounds, lapse: Bounds, best: Curve
             break
         inside, step = outside, step * 1.5
     return float(brentq(above, inside, outside, xtol=1e-5 * counts.span))
+
+
+def _beyond(counts: Counts, ends: Sequence[float | None]) -> Iterator[str]:
+    """Say where the interval reaches beyond what was asked about."""
+    if any(end is not None and not counts.levels.min() <= end <= counts.levels.max() for end in ends):
+        yield "the interval reaches beyond the levels that were asked about, where only the function's shape tells it"
 
 
 def _outcome(

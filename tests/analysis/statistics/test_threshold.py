@@ -159,6 +159,10 @@ def test_rates_and_widths_at_the_end_of_the_fit_are_told() -> None:
     assert "as steep as the fit allows" in step.note
     above = threshold(DELAYS, [0, 0, 0, 0, 0, 1, 2], [20] * 7)
     assert "outside the levels" in above.note
+    far = threshold(DELAYS, [0, 0, 0, 1, 0, 2, 3], [5] * 7)
+    assert far.upper is not None
+    assert far.upper > 300
+    assert "the interval reaches beyond the levels that were asked about" in far.note
     plain = threshold(DELAYS, [0, 1, 5, 9, 15, 20, 20], [20] * 7)
     assert plain.note == ""
     assert threshold(DELAYS, [0, 0, 1, 4, 14, 17, 17], [20] * 7, lapse=0.06).note == ""  # fixed, not found
