@@ -117,7 +117,7 @@ class Captions:
     def things(self, task: TaskShown | None) -> dict[str, Placed]:
         """Return what can change among the words."""
         return {
-            "count": Placed((task.reached, task.of) if task else None, self._count),
+            "count": Placed(self._counted(task), self._count),
             "hint": Placed(self._hint_words(task), self._hint),
         }
 
@@ -161,19 +161,22 @@ class Captions:
 
     def _hint_words(self, task: TaskShown | None) -> str:
         """Return how long it takes until the participant may or must go on."""
-        if task is None:
-            return ""
         todo, words = self._page.task, self._words
+        elapsed_s = task.elapsed_s if task else 0.0  # before the first view nothing has happened yet
         if isinstance(todo, Explore):
-            wait = math.ceil(todo.min_s - task.elapsed_s)
+            wait = math.ceil(todo.min_s - elapsed_s)
             return words.continue_in.format(seconds=wait) if wait > 0 else words.continue_now
         if todo.duration_s is None:
             return ""
-        return words.seconds_left.format(seconds=max(0, math.ceil(todo.duration_s - task.elapsed_s)))
+        return words.seconds_left.format(seconds=max(0, math.ceil(todo.duration_s - elapsed_s)))
+
+    def _counted(self, task: TaskShown | None) -> tuple[int, int | None]:
+        if task is not None:
+            return task.reached, task.of
+        return 0, self._page.task.count if isinstance(self._page.task, Reach) else None
 
     def _draw_count(self, painter: QPainter, task: TaskShown | None) -> None:
-        reached = task.reached if task else 0
-        of = task.of if task else None
+        reached, of = self._counted(task)
         count = str(reached) if of is None else self._words.reached.format(reached=reached, of=of)
         upper = QRectF(self._count.topLeft(), self._count.size() * 0.5)
         upper.setWidth(self._count.width())
