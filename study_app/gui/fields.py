@@ -34,7 +34,7 @@ def write_number(value: float, decimals: int) -> str:
 
 
 class NumberField(QLineEdit):
-    """A low field for a number; Return or leaving it takes it, Esc goes back, Up and Down step.
+    """A low field for a number; Return or leaving it takes it, Esc goes back, Up and Down step; Return tries again.
 
     ``entered(value)`` comes once for what was typed; ``unread(text)`` where it is no number; ``abandoned()`` at Esc;
     ``stepped(steps)`` at Up and Down. While something is typed, `show_text` does not touch it.
@@ -52,7 +52,7 @@ class NumberField(QLineEdit):
         self.setProperty("dense", "true")
         self.setAlignment(Qt.AlignmentFlag.AlignRight)
         self.setFont(font("label", tabular=True))
-        self.returnPressed.connect(self._take)
+        self.returnPressed.connect(self._try)
 
     @property
     def state(self) -> str:
@@ -85,7 +85,10 @@ class NumberField(QLineEdit):
         """Leave to the window the keys that mean nothing in a number, so that its shortcuts work from here."""
         if event.type() == QEvent.Type.ShortcutOverride and isinstance(event, QKeyEvent):
             undoes = event.matches(QKeySequence.StandardKey.Undo) or event.matches(QKeySequence.StandardKey.Redo)
-            if (undoes and not self.isModified()) or (event.text().isprintable() and not self._writes(event.text())):
+            plain = event.modifiers() in {Qt.KeyboardModifier.NoModifier, Qt.KeyboardModifier.ShiftModifier}
+            if (undoes and not self.isModified()) or (
+                plain and event.text().isalpha() and not self._writes(event.text())
+            ):
                 event.ignore()
                 return True
         return super().event(event)
@@ -96,7 +99,7 @@ class NumberField(QLineEdit):
             self.stepped.emit(1)
         elif event.key() == Qt.Key.Key_Down:
             self.stepped.emit(-1)
-        elif event.key() == Qt.Key.Key_Escape and self.text() != self._shown:
+        elif event.key() == Qt.Key.Key_Escape and (self.text() != self._shown or self._state == "refused"):
             self.put_back()
             self.abandoned.emit()
         elif event.text().isalpha() and not self._writes(event.text()):
@@ -118,6 +121,12 @@ class NumberField(QLineEdit):
     @staticmethod
     def _writes(text: str) -> bool:
         return bool(text) and set(text) <= NUMERALS
+
+    def _try(self) -> None:
+        """Take what was typed, a refused number once more: what was in its way may be gone."""
+        if self._state == "refused":
+            self.setModified(True)
+        self._take()
 
     def _take(self) -> None:
         """Say what was typed, once; it stays where it says no number."""

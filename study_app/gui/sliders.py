@@ -46,7 +46,7 @@ class Range:
 
     def value(self, share: float) -> float:
         """Return the number at a place, with as many figures as a slider can tell apart."""
-        if share <= 0.0:
+        if share <= 0.0 or self.most <= self.least:
             return self.least
         if share >= 1.0:
             return self.most

@@ -87,6 +87,7 @@ class FormPanel(Card):
         self._setting: Setting | None = None
         self._liquids: tuple[object, ...] = ()
         self._side = "A"
+        self._refused: tuple[str, str] | None = None
         self.blocks: dict[str, SectionBlock] = {}
         self.rows: dict[str, ParameterRow] = {}
         self.badge = Badge()
@@ -139,9 +140,11 @@ class FormPanel(Card):
             refused = self._side != bench.felt
             self._setting, self._side = setting, bench.felt
             self._show_form(form(setting), forget=refused)
-        name, why = view.refused or ("", "")
-        if name in self.rows and why != self.rows[name].refused:
-            self.rows[name].show_refused(why)
+        if view.refused is not self._refused:
+            self._refused = view.refused
+            name, why = view.refused or ("", "")
+            if name in self.rows:
+                self.rows[name].show_refused(why)
 
     def _show_liquids(self, view: LabView) -> None:
         bench = view.workbench

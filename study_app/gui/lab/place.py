@@ -154,13 +154,13 @@ class LabPlace(QWidget):
 
     def _shortcuts(self) -> None:
         """Give X, undo and redo to the place alone: other places of the window have keys of their own."""
-        keys = QKeySequence.StandardKey
         for sequence, signal in (
-            (QKeySequence(KEY), self.switched),
-            (QKeySequence(keys.Undo), self.undo_asked),
-            (QKeySequence(keys.Redo), self.redo_asked),
+            (KEY, self.switched),
+            ("Ctrl+Z", self.undo_asked),
+            ("Ctrl+Shift+Z", self.redo_asked),
+            ("Ctrl+Y", self.redo_asked),
         ):
-            shortcut = QShortcut(sequence, self)
+            shortcut = QShortcut(QKeySequence(sequence), self)
             shortcut.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
             shortcut.activated.connect(signal)
 

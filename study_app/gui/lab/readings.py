@@ -37,10 +37,14 @@ class ReadingCard(Card):
         self.stack.addWidget(Hidden(HIDDEN, why))
         self.column.addLayout(self.stack, 1)
 
-    def show_blind(self, blind: bool) -> None:
-        """Show the content, or that it is hidden."""
+    def show_blind(self, blind: bool) -> bool:
+        """Show the content, or that it is hidden; return which.
+
+        Hidden content stays as it was before: its size would tell when another setting is felt.
+        """
         self.stack.setCurrentIndex(int(blind))
         self.aside.setVisible(not blind)
+        return blind
 
 
 class CostLine(QWidget):
@@ -120,7 +124,8 @@ class CostCard(ReadingCard):
 
     def show_view(self, view: LabView) -> None:
         """Show the felt setting's costs."""
-        self.show_blind(view.workbench.blind)
+        if self.show_blind(view.workbench.blind):
+            return
         self.aside.setText(_aside(view))
         here = [row for row in view.cost if row.ns is not None]
         away = [row for row in view.cost if row.ns is None]
@@ -151,7 +156,8 @@ class ErrorCard(ReadingCard):
 
     def show_view(self, view: LabView) -> None:
         """Show the felt setting's errors."""
-        self.show_blind(view.workbench.blind)
+        if self.show_blind(view.workbench.blind):
+            return
         rows = view.errors or (ErrorRow("Not measured yet", ""),)
         while len(self.lines) < len(rows):
             name, value = Elided("label", "text2"), figures("", "label")
@@ -238,7 +244,8 @@ class LimiterCard(ReadingCard):
 
     def show_view(self, view: LabView) -> None:
         """Show the limiters, each always in the same place."""
-        self.show_blind(view.workbench.blind)
+        if self.show_blind(view.workbench.blind):
+            return
         _fit(self.lines, len(view.limiters), LimiterLine, self._lines, self)
         for line, limiter in zip(self.lines, view.limiters, strict=True):
             line.show_limiter(limiter)

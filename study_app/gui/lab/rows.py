@@ -12,7 +12,7 @@ from study_app.gui.lab.view import FormRow
 from study_app.gui.labels import label
 from study_app.gui.sliders import Range, Slider
 from study_app.gui.theme import font
-from study_app.lab.parameters import OFF, ON, Parameter
+from study_app.lab.parameters import OFF, ON, Parameter, Value
 
 LABEL_WIDTH, FIELD_WIDTH, UNIT_WIDTH = 108, 86, 40
 GAP = 8
@@ -94,6 +94,8 @@ class NumberRow(ParameterRow):
 
     def show_row(self, row: FormRow) -> None:
         """Show the number, unless it is being dragged or typed; changed ones are bold."""
+        if self._row is not None and row.value != self._row.value:
+            self.show_refused("")
         self._row = row
         it = self.parameter = row.parameter
         span = Range(it.least * it.factor, it.most * it.factor, it.logarithmic, it.whole)
@@ -152,7 +154,11 @@ class NumberRow(ParameterRow):
         self.show_refused(f"{said}: write one such as {example}, or press Esc.")
 
     def _forget(self) -> None:
+        """Show what counts in place of what was refused."""
         self.show_refused("")
+        if self._row is not None:
+            self.show_row(self._row)
+            self.field.put_back()
 
 
 class ChoiceRow(ParameterRow):
@@ -160,6 +166,7 @@ class ChoiceRow(ParameterRow):
 
     def __init__(self, parameter: Parameter) -> None:
         super().__init__(parameter)
+        self._value: Value = None
         self.name = _name(parameter.label)
         self.choice = Choice()
         self.choice.setProperty("dense", "true")
@@ -173,6 +180,9 @@ class ChoiceRow(ParameterRow):
 
     def show_row(self, row: FormRow) -> None:
         """Show which it is; changed ones are bold with an accent edge."""
+        if row.value != self._value:
+            self.show_refused("")
+        self._value = row.value
         self.choice.setCurrentIndex(self.choice.findData(row.value))
         state = "changed" if row.changed else ""
         if self.choice.property("state") != state:
@@ -187,6 +197,9 @@ class ChoiceRow(ParameterRow):
         return (self.choice,)
 
     def _choose(self, index: int) -> None:
+        """Ask for another one; the view says when it is."""
+        self.show_refused("")
+        self.choice.setCurrentIndex(self.choice.findData(self._value))
         self.changed.emit(self.parameter.name, self.choice.itemData(index), False)
 
 
@@ -203,6 +216,8 @@ class SwitchRow(ParameterRow):
 
     def show_row(self, row: FormRow) -> None:
         """Show whether it is on; changed ones are bold."""
+        if (row.value == ON) != self.toggle.isChecked():
+            self.show_refused("")
         self.toggle.setChecked(row.value == ON)
         self.toggle.setFont(font("label", weight=600 if row.changed else None))
 
@@ -211,6 +226,9 @@ class SwitchRow(ParameterRow):
         return (self.toggle,)
 
     def _switch(self, on: bool) -> None:
+        """Ask for the other; the view says when it is."""
+        self.show_refused("")
+        self.toggle.setChecked(not on)
         self.changed.emit(self.parameter.name, ON if on else OFF, False)
 
 

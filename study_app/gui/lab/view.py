@@ -127,7 +127,8 @@ class LabView:
 
     ``liquids`` are what a side can be set to, ``paths`` the programmed motions; ``path`` is the one that runs, None for
     live motion alone. ``busy`` says what is waited for ("Opening the Falcon"); ``refused`` is the parameter that could
-    not be changed and one line why. ``tail_a``, ``tail_b``, ``trace`` and ``now`` are None where nothing has moved yet,
+    not be changed and one line why,
+    a new pair for every refusal. ``tail_a``, ``tail_b``, ``trace`` and ``now`` are None where nothing has moved yet,
     a tail also where the setting has no wake. ``cost`` and ``errors`` are of the felt setting, empty until they are
     measured; ``measuring`` while they are measured anew.
     """

@@ -1,0 +1,38 @@
+"""A lab in which a ball was moved, computed once."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numba
+import pytest
+
+from study_app.gui.lab.place import LabPlace
+from study_app.gui.lab.view import LabView
+from study_app.gui.theme import LIGHT
+from study_app.gui.themed import wear
+from tests.gui.lab.sample import lab_view, still_view
+
+
+@pytest.fixture(scope="session")
+def moved() -> LabView:
+    if numba.config.DISABLE_JIT:
+        pytest.skip("a motion of three seconds is quick enough in compiled code alone")
+    return lab_view()
+
+
+@pytest.fixture(scope="session")
+def still() -> LabView:
+    return still_view()
+
+
+@pytest.fixture
+def place(qtbot: Any) -> Any:
+    made = LabPlace()
+    wear(made, LIGHT)
+    qtbot.addWidget(made)
+    made.resize(1528, 900)
+    made.show()
+    qtbot.waitExposed(made)
+    made.activateWindow()
+    return made

@@ -1,0 +1,208 @@
+"""Every parameter with slider and field; what is changed is seen, what is refused is said, nothing typed is lost."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import pytest
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtTest import QTest
+
+from study_app.gui.lab.rows import ChoiceRow, NumberRow, SwitchRow
+from study_app.gui.lab.view import LabView, form
+from study_app.lab.parameters import sections
+from tests.gui.lab.sample import still_view, workbench
+
+
+@pytest.fixture
+def told(place: Any, still: LabView) -> list[tuple[Any, ...]]:
+    said: list[tuple[Any, ...]] = []
+    place.changed.connect(lambda *what: said.append(what))
+    place.show_view(still)
+    return said
+
+
+def fields(place: Any) -> dict[str, NumberRow]:
+    return {name: row for name, row in place.form.rows.items() if isinstance(row, NumberRow)}
+
+
+def test_there_is_a_row_for_every_parameter(place: Any, told: Any, still: LabView) -> None:
+    wanted = [it for section in sections(still.workbench.a.scene) for it in section.parameters]
+    assert list(place.form.rows) == [it.name for it in wanted]
+    kinds = {NumberRow: 0, ChoiceRow: 0, SwitchRow: 0}
+    for it in wanted:
+        kinds[type(place.form.rows[it.name])] += 1  # type: ignore[index]
+    assert all(kinds.values())
+    assert list(place.form.blocks) == [section.title for section in form(still.workbench.a)]
+
+
+def test_units_and_numbers_are_those_people_read(place: Any, told: Any) -> None:
+    rows = fields(place)
+    assert rows["wake.breaking_span_m"].field.text() == "68"
+    assert rows["wake.decay"].field.text() == "0.999975"
+    assert rows["liquid.viscosity_pa_s"].field.text() == ""
+    assert rows["wake.breaking_span_m"].slider.number == pytest.approx(68)
+    assert rows["body.diameter_m"].field.accessibleName() == "Diameter, mm"
+
+
+def test_changed_ones_are_bold_with_a_tick_where_they_were(place: Any, told: Any) -> None:
+    rows = fields(place)
+    changed = {name for name, row in rows.items() if row.field.state == "changed"}
+    assert changed == {"wake.scaling", "wake.exponent", "wake.breaking_angle_deg"}
+    assert all((row.name.font().weight() == 600) == (name in changed) for name, row in rows.items())
+    assert rows["wake.scaling"].slider.tick == 1700
+    assert place.form.blocks["Wake"].count.text() == "3 of 8 changed"
+    assert place.form.blocks["Body"].count.text() == ""
+
+
+def test_every_number_says_exactly_what_it_shows_when_entered_again(place: Any, told: Any, still: LabView) -> None:
+    """Millimetres and rounding do not creep into a parameter that was only looked at."""
+    for name, row in fields(place).items():
+        value = still.workbench.a.value(name)
+        if value is None:
+            continue
+        told.clear()
+        QTest.keyClick(row.field, Qt.Key.Key_End)
+        row.field.setModified(True)
+        QTest.keyClick(row.field, Qt.Key.Key_Return)
+        assert told == [(name, value, False)]
+
+
+def test_typing_takes_si_units(place: Any, told: Any) -> None:
+    row = fields(place)["body.diameter_m"]
+    row.field.selectAll()
+    QTest.keyClicks(row.field, "50")
+    QTest.keyClick(row.field, Qt.Key.Key_Return)
+    assert told == [("body.diameter_m", pytest.approx(0.05), False)]
+
+
+def test_sliding_takes_si_units_and_says_when_it_is_held(place: Any, told: Any) -> None:
+    row = fields(place)["wake.breaking_span_m"]
+    middle = QPoint(row.slider.width() // 2, row.slider.height() // 2)
+    QTest.mousePress(row.slider, Qt.MouseButton.LeftButton, pos=middle)
+    assert row.field.text() == "250"
+    place.show_view(still_view(workbench(breaking_span_m=0.1)))  # a refresh amid a drag does not pull the knob away
+    assert row.slider.number == pytest.approx(250, abs=8)
+    QTest.mouseRelease(row.slider, Qt.MouseButton.LeftButton, pos=middle)
+    assert [held for _, _, held in told] == [True, False]
+    assert told[-1][1] == pytest.approx(0.25, abs=0.008)
+
+
+def test_what_is_no_number_is_said_in_one_line_and_stays(place: Any, told: Any, still: LabView) -> None:
+    row = fields(place)["wake.exponent"]
+    row.field.selectAll()
+    QTest.keyClicks(row.field, "0.5.5")
+    QTest.keyClick(row.field, Qt.Key.Key_Return)
+    assert told == []
+    assert row.why.isVisible()
+    assert "“0.5.5” is no number" in row.why.text()
+    place.show_view(dataclasses.replace(still, measuring=True))
+    assert row.field.text() == "0.5.5"
+    assert row.field.state == "refused"
+    QTest.keyClick(row.field, Qt.Key.Key_Escape)
+    assert row.field.text() == "0.6"
+    assert row.field.state == "changed"
+    assert not row.why.isVisible()
+
+
+def test_what_the_model_refuses_stays_with_the_reason_until_it_is_mended(place: Any, told: Any, still: LabView) -> None:
+    row = fields(place)["wake.length"]
+    row.field.selectAll()
+    QTest.keyClicks(row.field, "9000")
+    QTest.keyClick(row.field, Qt.Key.Key_Return)
+    why = "length 9000 exceeds scaling 2600: lower length or raise scaling"
+    refused = dataclasses.replace(still, refused=("wake.length", why))
+    for _ in range(3):
+        place.show_view(refused)
+    assert (row.field.text(), row.field.state, row.why.text()) == ("9000", "refused", why)
+    assert row.field.accessibleDescription() == why
+    roomier = still.workbench.change("wake.scaling", 9500)
+    place.show_view(dataclasses.replace(still, workbench=roomier))
+    assert (row.field.text(), row.field.state) == ("9000", "refused")
+    QTest.keyClick(row.field, Qt.Key.Key_Return)  # what was in its way is gone: try again
+    assert told[-1] == ("wake.length", 9000, False)
+    place.show_view(dataclasses.replace(still, workbench=roomier.change("wake.length", 9000)))
+    assert (row.field.text(), row.field.state, row.refused) == ("9000", "changed", "")
+
+
+def test_escape_leaves_what_was_refused(place: Any, told: Any, still: LabView) -> None:
+    row = fields(place)["wake.length"]
+    row.slider.setValue(row.slider.maximum())
+    refused = ("wake.length", "too long")
+    place.show_view(dataclasses.replace(still, refused=refused))
+    assert (row.field.text(), row.slider.number) == ("100000", 100_000)
+    row.field.setFocus()
+    QTest.keyClick(row.field, Qt.Key.Key_Escape)
+    assert (row.field.text(), row.slider.number, row.refused) == ("1700", 1700, "")
+    place.show_view(dataclasses.replace(still, refused=refused, measuring=True))
+    assert row.refused == ""
+    place.show_view(dataclasses.replace(still, refused=(refused[0], refused[1])))
+    assert row.refused == "too long"
+
+
+@pytest.mark.parametrize("name", ["effects.history", "velocity.kind"])
+def test_lists_and_switches_wait_for_the_view(place: Any, told: Any, still: LabView, name: str) -> None:
+    row = place.form.rows[name]
+    if isinstance(row, SwitchRow):
+        row.toggle.click()
+        assert not row.toggle.isChecked()
+    else:
+        row.choice.activated.emit(1)
+        assert row.choice.currentIndex() == 0
+    assert len(told) == 1
+    place.show_view(dataclasses.replace(still, refused=(name, "it needs a viscosity")))
+    assert row.why.isVisible()
+    assert row.why.text() == "it needs a viscosity"
+
+
+def test_an_effect_that_comes_brings_its_rows_and_the_keyboard_stays(place: Any, told: Any, still: LabView) -> None:
+    toggle = place.form.rows["effects.added_mass"].toggle
+    toggle.setFocus()
+    QTest.keyClick(toggle, Qt.Key.Key_Space)
+    assert told == [("effects.added_mass", "on", False)]
+    more = dataclasses.replace(still, workbench=still.workbench.change(*told[0][:2]))
+    place.show_view(more)
+    assert "added_mass.coefficient" in place.form.rows
+    assert place.form.rows["effects.added_mass"].toggle is toggle
+    assert toggle.isChecked()
+    assert place.focusWidget() is toggle
+    place.show_view(still)
+    assert "added_mass.coefficient" not in place.form.rows
+
+
+def test_tab_goes_through_every_part_from_top_to_bottom(place: Any, told: Any, still: LabView) -> None:
+    place.show_view(dataclasses.replace(still, workbench=still.workbench.change("effects.added_mass", "on")))
+    wanted = [part for row in place.form.rows.values() for part in row.parts()]
+    found, part = [], place.form.copy
+    for _ in range(3 * len(wanted)):
+        part = part.nextInFocusChain()
+        if part in wanted:
+            found.append(part)
+        if len(found) == len(wanted):
+            break
+    assert found == wanted
+
+
+def test_the_liquid_and_the_copy_name_their_sides(place: Any, told: Any, still: LabView) -> None:
+    chosen = []
+    place.liquid_chosen.connect(lambda *what: chosen.append(what))
+    assert place.form.liquid.currentText() == "Water"
+    assert place.form.copy.text() == "Copy to B"
+    place.form.liquid.activated.emit(1)
+    place.show_view(dataclasses.replace(still, workbench=still.workbench.switch()))
+    assert place.form.liquid.currentText() == "Light oil"
+    assert place.form.copy.text() == "Copy to A"
+    place.form.liquid.activated.emit(3)
+    assert [(side, choice.title) for side, choice in chosen] == [("A", "Honey"), ("B", "Syrup")]
+
+
+def test_no_row_is_cut(place: Any, told: Any) -> None:
+    for width in (1528, 1280, 952):
+        place.resize(width, 700)
+        place.layout().activate()
+        for name, row in fields(place).items():
+            assert row.field.fontMetrics().horizontalAdvance(row.field.text()) <= row.field.width() - 18, name
+            assert row.slider.width() >= 48, (name, width)
+            longest = max(row.name.text().split(), key=len)
+            assert row.name.fontMetrics().horizontalAdvance(longest) <= row.name.width(), name
