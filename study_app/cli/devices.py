@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from study_app.devices.falcon.calibration import Calibration
     from study_app.devices.falcon.device import FalconDevice
     from study_app.devices.falcon.emulator.face import Emulator
-    from study_app.devices.falcon.findings import Report
     from study_app.devices.falcon.weighing import Ask, Notes
 
 _WIDTH = 100
@@ -61,32 +60,13 @@ def doctor(name: str, firmware: Path | None, faults: tuple[str, ...]) -> None:
     """
     click.echo(_PREPARING)  # what is imported and compiled next takes long the first time
     from study_app.devices.falcon.doctor import examine
-    from study_app.devices.falcon.findings import report
+    from study_app.devices.falcon.findings import lines, report
 
     found = report(examine(name, firmware=firmware, faults=faults, tell=click.echo))
-    for line in _reported(found):
+    for line in lines(found):
         click.echo(line)
     if not found.well:
         click.get_current_context().exit(EXIT_FOUND)
-
-
-def _reported(found: Report) -> list[str]:
-    """Return what was found, mode for mode."""
-    lines = ["", *(f"seen: {words}" for words in found.seen), ""]
-    for finding in found.findings:
-        word = "FOUND" if finding.state == "found" else finding.state
-        lines.append(f"{finding.number:>2}  {word:<13}  {finding.symptom}")
-        if finding.state == "found" and not finding.says_itself:
-            lines.append(_indented(f"cause: {finding.cause}", 19))
-            lines.append(_indented(f"cure: {finding.cure}", 19))
-            lines.append(_indented(f"known by: {finding.known_by}", 19))
-            if finding.paste:
-                lines += ["", finding.paste, ""]  # in one line, to be copied
-    lines.append("")
-    if found.failure is not None:
-        lines.append(_indented(found.failure, 0))
-    lines.append(_indented(found.conclusion, 0))
-    return lines
 
 
 @devices.command()

@@ -6,6 +6,7 @@ Loads neither the compiler nor a driver, and goes from one process to another as
 from __future__ import annotations
 
 from dataclasses import dataclass
+from textwrap import fill
 from typing import TYPE_CHECKING, Final, Literal
 
 from study_app.devices.falcon.diagnosis import MODES, Mode
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
     from study_app.devices.falcon.doctor import Examined
 
 State = Literal["ok", "found", "not looked at"]
+WIDTH: Final = 100
 NOTHING_WRONG: Final = "Nothing is wrong with it."
 
 
@@ -72,8 +74,12 @@ class Report:
 
 def report(examined: Examined) -> Report:
     """Return what an examination shows, mode for mode."""
-    findings = tuple(_finding(number, mode, examined.facts) for number, mode in enumerate(MODES, start=1))
-    return Report(examined.seen, findings, examined.failure)
+    return Report(examined.seen, findings_of(examined.facts), examined.failure)
+
+
+def findings_of(facts: Facts) -> tuple[Finding, ...]:
+    """Return every mode in its order, as facts show it."""
+    return tuple(_finding(number, mode, facts) for number, mode in enumerate(MODES, start=1))
 
 
 def _finding(number: int, mode: Mode, facts: Facts) -> Finding:
@@ -89,3 +95,27 @@ def _finding(number: int, mode: Mode, facts: Facts) -> Finding:
         mode.paste if facts.platform == "linux" else "",
         says_itself=mode.id == "firmware-file" and facts.program == "refused",  # the refusal says it all
     )
+
+
+def lines(found: Report) -> list[str]:
+    """Return a report as text of 100 columns; what is to be pasted stands in one line."""
+    told = ["", *(f"seen: {words}" for words in found.seen), ""]
+    for finding in found.findings:
+        word = "FOUND" if finding.state == "found" else finding.state
+        told.append(f"{finding.number:>2}  {word:<13}  {finding.symptom}")
+        if finding.state == "found" and not finding.says_itself:
+            told.append(_indented(f"cause: {finding.cause}", 19))
+            told.append(_indented(f"cure: {finding.cure}", 19))
+            told.append(_indented(f"known by: {finding.known_by}", 19))
+            if finding.paste:
+                told += ["", finding.paste, ""]  # in one line, to be copied
+    told.append("")
+    if found.failure is not None:
+        told.append(_indented(found.failure, 0))
+    told.append(_indented(found.conclusion, 0))
+    return told
+
+
+def _indented(words: str, by: int) -> str:
+    space = " " * by
+    return fill(words, WIDTH, initial_indent=space, subsequent_indent=space, break_long_words=False)

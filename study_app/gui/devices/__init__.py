@@ -1,0 +1,1 @@
+"""What can be felt with on this machine, and what is wrong with it."""

@@ -1,0 +1,185 @@
+"""The devices' place: what there is to feel with, which one sessions begin with, and what is wrong with a Falcon.
+
+It draws values and says what is asked for; it opens no device.
+"""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QBoxLayout, QButtonGroup, QFileDialog, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
+
+from study_app.gui.cards import SHADOW, Card
+from study_app.gui.controls import ActionButton
+from study_app.gui.devices.rows import DeviceList
+from study_app.gui.devices.view import DeviceShown
+from study_app.gui.labels import Elided, label
+from study_app.gui.place import Place
+from study_app.gui.theme import font
+from study_app.gui.themed import dress
+
+STACKED_BELOW = 1000
+BESIDE = 340
+NO_FILE = "None chosen"
+
+
+class FirmwareCard(Card):
+    """The file of a Falcon's program; ``chosen`` carries its path, None to forget it."""
+
+    chosen = Signal(object)
+
+    def __init__(self) -> None:
+        super().__init__("Falcon's firmware", gap=8)
+        about = label(
+            "A Falcon has no program until one is loaded, and none may be given away with this software. Choose the "
+            "file you hold; it is loaded only where the Falcon needs it.",
+            "label",
+            "text2",
+            wraps=True,
+        )
+        about.setFont(font("label", weight=400))
+        self.file = Elided("label", "text")
+        self.choose = ActionButton("file", "Choose file …", height=38)
+        self.forget = ActionButton("", "Forget", height=38)
+        self.choose.clicked.connect(self._choose)
+        self.forget.clicked.connect(lambda: self.chosen.emit(None))
+        buttons = QHBoxLayout()
+        buttons.setSpacing(12)
+        buttons.addWidget(self.choose, 1)
+        buttons.addWidget(self.forget)
+        self.column.addWidget(about)
+        self.column.addWidget(self.file)
+        self.column.addLayout(buttons)
+        self._path = ""
+        self.show_file(None)
+
+    def show_file(self, path: str | None) -> None:
+        """Show which file was chosen."""
+        self._path = path or ""
+        self.file.show_text(path or NO_FILE)
+        self.forget.setEnabled(path is not None)
+
+    def _choose(self) -> None:
+        path, _ = QFileDialog.getOpenFileName(self, "Falcon's firmware", self._path, "Firmware (*.bin);;All files (*)")
+        if path:
+            self.chosen.emit(path)
+
+
+class HelpCard(Card):
+    """What to do next with a Falcon: the words that need no window."""
+
+    def __init__(self) -> None:
+        super().__init__("Before the first session", gap=8)
+        for words in (
+            "Plug in cable and mains adapter, then Refresh.",
+            "Diagnose … finds, opens, loads, homes and turns it without force, and says what is wrong.",
+            "liquid-study devices calibrate measures how strong it is, with a known weight.",
+        ):
+            line = label(words, "label", "text2", wraps=True)
+            line.setFont(font("label", weight=400))
+            self.column.addWidget(line)
+
+
+class DevicesPlace(Place):
+    """Every device with its state.
+
+    ``look_asked`` where the machine is to be looked at again; ``chosen`` carries the name of the device that sessions
+    begin with; ``firmware_chosen`` a path or None; ``diagnose_asked`` the name of a Falcon.
+    """
+
+    look_asked = Signal()
+    chosen = Signal(str)
+    firmware_chosen = Signal(object)
+    diagnose_asked = Signal(str)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._group = QButtonGroup(self)
+        self.people = DeviceList("To feel with", self._group)
+        self.simulated = DeviceList("Moves by itself", self._group)
+        self.firmware = FirmwareCard()
+        self.help = HelpCard()
+        self.refresh = ActionButton("repeat", "Refresh", key="F5")
+        self.refresh.clicked.connect(self.look_asked)
+        for part in (self.people, self.simulated):
+            part.chosen.connect(self.chosen)
+            part.diagnose_asked.connect(self.diagnose_asked)
+        self.firmware.chosen.connect(self.firmware_chosen)
+        self._lay_out()
+
+    def _lay_out(self) -> None:
+        titles = QVBoxLayout()
+        titles.setSpacing(4)
+        titles.addWidget(label("Devices", "title"))
+        titles.addWidget(
+            label("The one that is marked is what a new session begins with.", "body", "text2", wraps=True)
+        )
+        head = QHBoxLayout()
+        head.setContentsMargins(SHADOW, 0, SHADOW, 0)
+        head.addLayout(titles, 1)
+        head.addWidget(self.refresh)
+        lists = QVBoxLayout()
+        lists.setSpacing(18)
+        lists.addWidget(self.people)
+        lists.addWidget(self.simulated)
+        lists.addStretch()
+        beside = QVBoxLayout()
+        beside.setSpacing(18)
+        beside.addWidget(self.firmware)
+        beside.addWidget(self.help)
+        beside.addStretch()
+        self._body = QBoxLayout(QBoxLayout.Direction.LeftToRight)
+        self._body.setSpacing(18)
+        self._body.addLayout(lists, 1)
+        self._body.addLayout(beside)
+        inside = QWidget()
+        page = QVBoxLayout(inside)
+        page.setContentsMargins(30, 30, 30, 22)
+        page.setSpacing(20)
+        page.addLayout(head)
+        page.addLayout(self._body, 1)
+        self._area = QScrollArea()
+        self._area.setWidgetResizable(True)
+        self._area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self._area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self._area.setWidget(inside)
+        row = QVBoxLayout(self)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.addWidget(self._area)
+
+    def enter(self) -> None:
+        """Look at the machine again: something may have been plugged in."""
+        self.look_asked.emit()
+
+    def show_devices(self, shown: tuple[DeviceShown, ...], preferred: str) -> None:
+        """Show what was found, and which device sessions begin with."""
+        self.people.show_devices(tuple(one for one in shown if not _simulated(one)))
+        self.simulated.show_devices(tuple(one for one in shown if _simulated(one)))
+        self._group.setExclusive(False)  # or what is marked could not lose its mark
+        for part in (self.people, self.simulated):
+            part.mark(preferred.partition(":")[0])
+            dress(part, self.theme)
+        self._group.setExclusive(True)
+
+    def show_firmware(self, path: str | None) -> None:
+        """Show which file a Falcon's program is loaded from."""
+        self.firmware.show_file(path)
+
+    def show_looking(self, looking: bool) -> None:
+        """Say that the machine is being looked at."""
+        self.refresh.setEnabled(not looking)
+        self.refresh.show_action("repeat", "Looking …" if looking else "Refresh")
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
+        """Make room: what is beside goes below."""
+        super().resizeEvent(event)
+        stacked = self.width() < STACKED_BELOW
+        way = QBoxLayout.Direction.TopToBottom if stacked else QBoxLayout.Direction.LeftToRight
+        self._body.setDirection(way)
+        for card in (self.firmware, self.help):
+            card.setMinimumWidth(0 if stacked else BESIDE)
+            card.setMaximumWidth(16_777_215 if stacked else BESIDE)
+
+
+def _simulated(shown: DeviceShown) -> bool:
+    return shown.icon == "fast_forward"
