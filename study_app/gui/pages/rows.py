@@ -62,6 +62,7 @@ class Row(QGroupBox):
         )
         for cell in self.cells:
             cell.clicked.connect(lambda _=False, cell=cell: self._clicked(cell))
+            cell.toggled.connect(lambda on, cell=cell: self._toggled(cell, on=on))
             cell.entered.connect(self._wander)
             cell.left.connect(lambda: self._wander(-1))
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
@@ -233,6 +234,11 @@ class Row(QGroupBox):
         room = QRectF(0, 0, places.statement_width, 1e4)
         height = QFontMetricsF(face).boundingRect(room, WRAP_LEFT, self.item.text).height()
         return face, note_face, height, QFontMetricsF(note_face).height() if note else 0.0
+
+    def _toggled(self, cell: Cell, *, on: bool) -> None:
+        """Hear a screen reader, which checks a button without a click."""
+        if on and not (self.answered and self.value == cell.value):
+            self._clicked(cell)
 
     def _clicked(self, cell: Cell) -> None:
         self.setFocus(Qt.FocusReason.MouseFocusReason)
