@@ -15,9 +15,9 @@ Blocks: TypeAlias = Sequence[tuple[int, int]]
 class Grant:
     """What a thread may do.
 
-    ``level`` is its priority class ("none": there is no thread) and ``how`` the system's name for it; ``locked`` whether
-    the servo's memory cannot be swapped out, None where that was not asked for; ``advice`` how to be granted what was
-    refused, empty where nothing was.
+    ``level`` is its priority class ("none": there is no thread), ``how`` the system's name for it; ``locked`` tells
+    whether the servo's memory cannot be swapped out, None where that was not asked for; ``advice`` how to be granted
+    what was refused, empty where nothing was.
     """
 
     level: Level
@@ -33,8 +33,8 @@ class Grant:
         return f"{self.level} ({self.how})" if self.how else self.level
 
     def with_memory(self, *, locked: bool, advice: str) -> Grant:
-        """Return the same, memory locked or not; ``advice`` is how to have it locked."""
-        return replace(self, locked=locked, advice=self.advice if locked else (*self.advice, advice))
+        """Return the same, memory locked or not; ``advice`` is how to have it locked, where no other is given."""
+        return replace(self, locked=locked, advice=self.advice if locked or self.advice else (advice,))
 
     def __str__(self) -> str:
         memory = {None: "", True: ", memory locked", False: ", memory not locked"}[self.locked]

@@ -5,10 +5,12 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
 from study_app.errors import StoreError
+from study_app.haptics.clock_grants import Grant
 from study_app.haptics.telemetry import timing
 from study_app.session.ports import ServoPort
 from study_app.session.preflight import Facts, Screen
@@ -18,8 +20,15 @@ from study_app.store.blinding import sealed_hash
 LOOK_S = 1 / 60
 
 
+class MeasuredServo(ServoPort, Protocol):
+    """What is asked of the servo here, beyond what a session asks."""
+
+    @property
+    def grant(self) -> Grant: ...  # noqa: D102
+
+
 def measure(
-    servo: ServoPort,
+    servo: MeasuredServo,
     results: Path,
     *,
     device: str,
@@ -50,6 +59,7 @@ def measure(
         free_bytes=free_bytes,
         participant=participant,
         recordings=recordings,
+        grant=servo.grant,
         key_hash=sealed_hash(results),
         lateness_ns=np.asarray(samples["lateness_ns"], np.int64),
     )

@@ -12,6 +12,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from study_app.haptics.clock_grants import NO_THREAD, Grant
 from study_app.haptics.limits import refuses
 from study_app.haptics.telemetry import Timing
 from study_app.protocol.describe import expected_duration_s
@@ -46,7 +47,8 @@ class Facts:
     newest sample was when somebody looked (95th percentile). ``probe_s`` is how long a file took to be on the disk of
     the results, None where it could not be written for the reason ``probe_fault``; ``free_bytes`` None where unknown.
     ``tick_s`` is what the dearest scene of the study takes of a turn, None where nobody measured it; ``key_hash`` that
-    of the study's sealed key, None before its first session. ``lateness_ns`` (n,) is that of every turn [ns].
+    of the study's sealed key, None before its first session. ``lateness_ns`` (n,) is that of every turn [ns],
+    ``grant`` what the system lets the servo's thread do.
     """
 
     device: str
@@ -61,6 +63,7 @@ class Facts:
     recordings: bool
     tick_s: float | None = None
     key_hash: str | None = None
+    grant: Grant = NO_THREAD
     lateness_ns: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64), compare=False, repr=False)
 
 
@@ -95,8 +98,14 @@ class Check:
 
 def checks(facts: Facts, protocol: Protocol) -> tuple[Check, ...]:
     """Return what is to be said of ``facts``, for a session of ``protocol``."""
-    found = [_device(facts), _rate(facts, protocol), _lateness(facts, protocol), _delay(facts, protocol)]
-    found += [_screen(facts), _folder(facts), _space(facts, protocol), _blinding(facts, protocol)]
+    found = [_device(facts), _rate(facts, protocol), _lateness(facts, protocol), _priority(facts)]
+    found += [
+        _delay(facts, protocol),
+        _screen(facts),
+        _folder(facts),
+        _space(facts, protocol),
+        _blinding(facts, protocol),
+    ]
     return (*found, *_cost(facts, protocol), *_balance(facts, protocol))
 
 
@@ -139,6 +148,15 @@ def _lateness(facts: Facts, protocol: Protocol) -> Check:
     advice = "" if share <= 1 else "Trials would not count: close other programs."
     verdict: Verdict = "ok" if share <= 1 else "warning"
     return Check("Servo lateness", verdict, f"{late_ms:.2f} ms", about, advice, share)
+
+
+def _priority(facts: Facts) -> Check:
+    """Say what the servo's thread was granted, and how to be granted more: others make an ordinary thread late."""
+    grant = facts.grant
+    memory = {None: "", True: ", memory locked", False: ", memory not locked"}[grant.locked]
+    advice = "; ".join(f"{it[0].upper()}{it[1:]}" for it in grant.advice)
+    verdict: Verdict = "ok" if grant.level in {"real-time", "none"} else "warning"
+    return Check("Priority", verdict, grant.level, f"{grant.how}{memory}", f"{advice}." if advice else "")
 
 
 def _delay(facts: Facts, protocol: Protocol) -> Check:

@@ -11,6 +11,7 @@ import pytest
 from study_app.devices.scripted import ScriptedDevice
 from study_app.errors import StoreError
 from study_app.haptics.clock import VirtualClock
+from study_app.haptics.clock_grants import Grant
 from study_app.haptics.servo import Servo
 from study_app.haptics.telemetry import Timing
 from study_app.protocol.model import Protocol
@@ -31,6 +32,7 @@ WELL = Facts(
     free_bytes=10**10,
     participant="P007",
     recordings=True,
+    grant=Grant("real-time", "SCHED_FIFO 60", locked=True),
 )
 
 
@@ -52,6 +54,8 @@ def test_where_all_is_well_nothing_is_said_but_so() -> None:
         ({"timing": Timing(1900, 950.0, 1e-4, 2e-3, 0)}, "Servo rate", "warning"),
         ({"timing": Timing(2000, 1000.0, 2.1e-3, 2e-3, 0)}, "Servo lateness", "warning"),
         ({"timing": Timing(2000, 1000.0, 1e-4, 21e-3, 9)}, "Servo lateness", "warning"),
+        ({"grant": Grant("raised", "nice -15", advice=("do this",))}, "Priority", "warning"),
+        ({"grant": Grant("normal", "refused", locked=False)}, "Priority", "warning"),
         ({"sample_age_s": 0.01}, "Visual delay", "warning"),
         ({"screen": Screen(30.0, 1.0)}, "Visual delay", "warning"),
         ({"screen": Screen(60.0, 1.5)}, "Screen", "warning"),
@@ -65,6 +69,12 @@ def test_each_fact_has_its_limit(changed: dict[str, Any], name: str, verdict: st
     assert verdicts(**changed)[name] == verdict
     reason = refused(checks(replace(WELL, **changed), small.protocol()))
     assert (name.lower() in reason) == (verdict == "failure")
+
+
+def test_what_was_not_granted_is_told_with_how_to_grant_it() -> None:
+    grant = Grant("raised", "nice -15", advice=("do this",)).with_memory(locked=False, advice="do that")
+    said = {check.name: check.said for check in checks(replace(WELL, grant=grant), small.protocol())}["Priority"]
+    assert said == "raised; nice -15, memory not locked; Do this."
 
 
 def test_a_servo_below_500_hz_is_refused_whatever_it_achieves() -> None:
