@@ -13,6 +13,7 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QRegion, QResizeEvent
 from PySide6.QtWidgets import QWidget
 
+from study_app.gui.pages.base import page_painter
 from study_app.gui.tank import sprites
 from study_app.gui.tank.backdrop import Backdrop, backdrop
 from study_app.gui.tank.camera import Box, Camera
@@ -29,6 +30,7 @@ from study_app.gui.tank.frame import (
     target_place,
 )
 from study_app.gui.tank.onset import OnsetPatch
+from study_app.gui.tank.patch import paint_patch, patch_place
 from study_app.gui.theme import TANK
 from study_app.protocol.model import Explore, Reach
 from study_app.session.pages import TaskPage
@@ -39,7 +41,6 @@ if TYPE_CHECKING:
 
 # Where the tank lies in the window, in shares of it.
 AREA = (0.075, 0.122, 0.85, 0.712)
-PATCH = (88.0, 72.0)  # photodiode patch: black square, white square in its corner [logical px]
 ALWAYS = QRegion(0, 0, 1, 1)  # a frame in which nothing moved is a frame too
 
 
@@ -125,9 +126,9 @@ class TankWidget(QWidget):
         """Paint what lies in the region asked for, and tell when."""
         still = self._ready()
         region = event.region()
-        painter = QPainter(self)
+        painter = page_painter(self)
         painter.drawImage(QPointF(0, 0), still.back)
-        painter.setRenderHints(QPainter.RenderHint.Antialiasing | QPainter.RenderHint.SmoothPixmapTransform)
+        painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
         self._paint_things(painter, region)
         if region.intersects(still.front_at.toAlignedRect()):
             painter.drawImage(still.front_at.topLeft(), still.front)
@@ -251,14 +252,9 @@ class TankWidget(QWidget):
             sprites.draw(painter, sprite, ball.middle)
 
     def _patch_place(self) -> QRectF:
-        black, _ = PATCH
-        return QRectF(self.width() - black, self.height() - black, black, black)
+        return patch_place(self.width(), self.height())
 
     def _paint_patch(self, painter: QPainter, region: QRegion) -> None:
         place = self._patch_place()
-        if not region.intersects(place.toAlignedRect()):
-            return
-        black, white = PATCH
-        painter.fillRect(place, QColor(Qt.GlobalColor.black))
-        if self._patch.lit:
-            painter.fillRect(place.adjusted(black - white, black - white, 0, 0), QColor(Qt.GlobalColor.white))
+        if region.intersects(place.toAlignedRect()):
+            paint_patch(painter, place, lit=self._patch.lit)

@@ -13,11 +13,12 @@ from PySide6.QtCore import QEvent, QPoint
 from PySide6.QtGui import QColor, QImage, QRegion
 from PySide6.QtWidgets import QApplication
 
-from study_app.gui.scene_view import PATCH, TankWidget
+from study_app.gui.scene_view import TankWidget
 from study_app.gui.tank import caustics
 from study_app.gui.tank.camera import Box, Camera
 from study_app.gui.tank.frame import BallPlacer, changes
 from study_app.gui.tank.onset import OnsetPatch
+from study_app.gui.tank.patch import PATCH
 from study_app.protocol.words import words
 from tests.gui.small import explore, reach, task_page, view
 
