@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal
+from PySide6.QtCore import QEvent, QObject, QTimer, Signal
 from PySide6.QtWidgets import QHBoxLayout, QProgressBar, QWidget
 
 from study_app.gui.cards import Card, Icon
@@ -28,6 +28,8 @@ class TankNote(Card):
         self.words = label("", "strong", wraps=True)
         self.cancel = ActionButton("", "Cancel", height=36)
         self.fade_in = ActionButton("", "Fade in again", role="primary", height=36)
+        self.dismiss = ActionButton("", "Close", height=36)
+        self._dismissed = ""
         self.bar = QProgressBar()
         self.bar.setRange(0, 0)
         self.bar.setTextVisible(False)
@@ -38,10 +40,12 @@ class TankNote(Card):
         row.addWidget(self.words, 1)
         row.addWidget(self.cancel)
         row.addWidget(self.fade_in)
+        row.addWidget(self.dismiss)
         self.column.addLayout(row)
         self.column.addWidget(self.bar)
         self.cancel.clicked.connect(self.cancel_asked)
         self.fade_in.clicked.connect(self.fade_in_asked)
+        self.dismiss.clicked.connect(self._put_away)
         self._wait = QTimer(self)
         self._wait.setSingleShot(True)
         self._wait.setInterval(SHOWN_AFTER_MS)
@@ -65,7 +69,8 @@ class TankNote(Card):
                 self._appear()
             return
         self._wait.stop()
-        if not view.trouble and view.force_on:
+        self._dismissed = self._dismissed if view.trouble == self._dismissed else ""
+        if view.force_on and view.trouble == self._dismissed:
             self.hide()
         elif self.isHidden() or before is None or _said(before) != _said(view):
             self._appear()
@@ -77,6 +82,12 @@ class TankNote(Card):
             width = min(WIDTH, parent.width() - 32)
             self.resize(width, max(self.sizeHint().height(), self.heightForWidth(width)))
             self.move((parent.width() - width) // 2, parent.height() - self.height() - 56)
+
+    def _put_away(self) -> None:
+        """Say this trouble no more; the force is on all the while."""
+        if self._view is not None:
+            self._dismissed = self._view.trouble
+        self.hide()
 
     def _appear(self) -> None:
         view = self._view
@@ -90,7 +101,8 @@ class TankNote(Card):
         self.bar.setVisible(waiting)
         self.cancel.setVisible(waiting)
         self.fade_in.setVisible(not waiting and not view.force_on and view.may_fade_in)
-        self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents, not (waiting or self.fade_in.isVisible()))
+        self.fade_in.show_action("", "Try again" if view.trouble else "Fade in again")
+        self.dismiss.setVisible(bool(view.trouble) and view.force_on)
         self.show()
         self.raise_()
         self.place()

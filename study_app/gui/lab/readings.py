@@ -19,6 +19,8 @@ from study_app.gui.themed import Themed, dress
 
 NAME_WIDTH = 84
 LINE = 26
+COST_HEIGHT, ERROR_HEIGHT = 236, 3 * LINE + 6  # of what is usual, kept free until it is measured
+UNKNOWN = "–"
 LimiterState = Literal["acting", "acted", "quiet"]
 
 
@@ -74,6 +76,12 @@ class CostLine(QWidget):
         self.ns.setText(f"{ns:.0f} ns")
         self.setAccessibleName(f"{cost.effect}: {ns:.0f} ns")
 
+    def show_waiting(self) -> None:
+        """Show that the number is not known now."""
+        self.bar.show_share(0.0)
+        self.ns.setText(UNKNOWN)
+        self.setAccessibleName(f"{self.name.accessibleName()}: being measured")
+
 
 class AbsentLine(QWidget):
     """An effect that takes nothing, and why."""
@@ -121,12 +129,16 @@ class CostCard(ReadingCard):
         self.content.addLayout(whole)
         self.content.addLayout(self._absent)
         self.content.addStretch()
+        self.stack.widget(0).setMinimumHeight(COST_HEIGHT)
 
     def show_view(self, view: LabView) -> None:
         """Show the felt setting's costs."""
         if self.show_blind(view.workbench.blind):
             return
         self.aside.setText(_aside(view))
+        if view.measuring and not view.cost and self.lines:
+            self._wait()
+            return
         here = [row for row in view.cost if row.ns is not None]
         away = [row for row in view.cost if row.ns is None]
         dearest = max((row.ns or 0.0 for row in here), default=0.0)
@@ -139,6 +151,12 @@ class CostCard(ReadingCard):
         tick_ns = view.tick_ns if view.tick_ns is not None else sum(row.ns or 0.0 for row in here)
         period_ms = 1000 / view.workbench.in_hand.scene.rate_hz
         self.sum.setText(f"{grouped(round(tick_ns))} ns of {period_ms:g} ms" if view.cost else "not measured yet")
+
+    def _wait(self) -> None:
+        """Take the numbers away and leave the lines, so that nothing below jumps while a slider is dragged."""
+        for line in self.lines:
+            line.show_waiting()
+        self.sum.setText(UNKNOWN)
 
 
 class ErrorCard(ReadingCard):
@@ -153,12 +171,17 @@ class ErrorCard(ReadingCard):
         self.lines: list[tuple[Elided, QLabel]] = []
         self.content.addLayout(self._grid)
         self.content.addStretch()
+        self.stack.widget(0).setMinimumHeight(ERROR_HEIGHT)
 
     def show_view(self, view: LabView) -> None:
         """Show the felt setting's errors."""
         if self.show_blind(view.workbench.blind):
             return
         rows = view.errors or (ErrorRow("Not measured yet", ""),)
+        if view.measuring and not view.errors and self.lines and self.lines[0][1].text():
+            for name, value in self.lines:
+                value.setText(UNKNOWN if name.isVisibleTo(self) else "")
+            return
         while len(self.lines) < len(rows):
             name, value = Elided("label", "text2"), figures("", "label")
             value.setFont(font("label", weight=600, tabular=True))

@@ -38,6 +38,8 @@ from study_app.gui.theme import PARTICIPANT, RADIUS_CARD, TANK, font
 from study_app.gui.themed import Themed
 
 MOUSE = "mouse"
+WORKSPACE_M: Point = (0.1, 0.06, 0.06)
+BALL_M = 0.0034  # radius that the glass is made for: it stays where it is while the ball's own is changed
 RING = "break"
 Words: TypeAlias = tuple[str, str]
 """What a plate says, and the icon before it."""
@@ -64,9 +66,9 @@ class LabTank(Themed, QWidget):
         self.setMinimumSize(420, 260)
         self._view: LabView | None = None
         self._camera: Camera | None = None
-        self._box = Box.around((0.1, 0.06, 0.06), 0.0034)
+        self._workspace_m, self._radius_m = WORKSPACE_M, BALL_M
+        self._box = Box.around(WORKSPACE_M, BALL_M)
         self._placer: BallPlacer | None = None
-        self._key: object = None
         self._name_font = font("label", weight=600)
         self.pointer = PointerCapture(self)
         self.pointer.moved.connect(self.moved)
@@ -79,11 +81,12 @@ class LabTank(Themed, QWidget):
     def show_view(self, view: LabView) -> None:
         """Draw the tank as of now."""
         self._view = view
-        key = (view.workspace_m, view.body_radius_m)
-        if key != self._key:
-            self._key = key
-            self._box = Box.around(*key)
+        if view.workspace_m != self._workspace_m:
+            self._workspace_m = view.workspace_m
+            self._box = Box.around(view.workspace_m, BALL_M)
             self._camera = None
+        if view.body_radius_m != self._radius_m:
+            self._radius_m, self._placer = view.body_radius_m, None
         if self.pointer.held and not self._takes_pointer:
             self.pointer.release()
         self.setAccessibleName(f"Tank. {self._first_words()}. {self._hint()}".replace("..", "."))
@@ -140,8 +143,9 @@ class LabTank(Themed, QWidget):
         if self._camera is None:
             room = (self.width() - 2 * MARGIN_X, self.height() - MARGIN_TOP - MARGIN_BOTTOM)
             self._camera = Camera.fitted(self._box, MARGIN_X, MARGIN_TOP, *room, pitch=PITCH)
-            radius = self._view.body_radius_m if self._view is not None else 0.0034
-            self._placer = BallPlacer(self._camera, self._box, radius)
+            self._placer = None
+        if self._placer is None:
+            self._placer = BallPlacer(self._camera, self._box, self._radius_m)
         return self._camera
 
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name

@@ -192,6 +192,20 @@ def test_waiting_is_told_after_300_ms_and_can_be_cancelled(place: Any, still: La
     assert not place.note.cancel.isVisible()
 
 
+def test_trouble_beside_a_force_that_is_on_can_be_put_away_until_there_is_another(place: Any, still: LabView) -> None:
+    full = dataclasses.replace(still, trouble="The disk is full: free some room.")
+    place.show_view(full)
+    assert place.note.words.text() == full.trouble
+    assert not place.note.fade_in.isVisible()
+    place.note.dismiss.click()
+    place.show_view(dataclasses.replace(full, measuring=True))
+    assert not place.note.isVisible()
+    place.show_view(dataclasses.replace(full, trouble="The folder is gone: choose another."))
+    assert place.note.isVisible()
+    place.show_view(dataclasses.replace(full, force_on=False))
+    assert place.note.fade_in.text() == "Try again"
+
+
 def test_what_is_quick_is_not_told(place: Any, still: LabView) -> None:
     place.show_view(dataclasses.replace(still, busy="Opening the mouse"))
     place.show_view(still)
@@ -308,6 +322,17 @@ def test_the_pointer_is_the_ball_only_while_the_mouse_leads(place: Any, still: L
     assert not place.tank.pointer.held
     QTest.mousePress(place.tank, Qt.MouseButton.LeftButton, pos=place.tank.rect().center())
     assert not place.tank.pointer.held
+
+
+def test_a_ball_that_grows_leaves_the_glass_where_it_is(place: Any, moved: LabView) -> None:
+    place.show_view(moved)
+    settle()
+    glass = place.tank._camera, place.tank._box
+    small = place.tank.grab().toImage()
+    place.show_view(dataclasses.replace(moved, body_radius_m=0.006))
+    settle()
+    assert (place.tank._camera, place.tank._box) == glass
+    assert place.tank.grab().toImage() != small
 
 
 def test_entered_and_left(place: Any, still: LabView) -> None:

@@ -103,6 +103,24 @@ def test_costs_are_bars_of_the_dearest_and_absent_ones_say_why(place: Any, still
     assert [line[0]._whole for line in place.error.lines if line[0].isVisible()] == ["Not measured yet"]
 
 
+def test_nothing_jumps_while_a_slider_is_dragged(place: Any, still: LabView) -> None:
+    place.show_view(still)
+    for _ in range(4):
+        QApplication.processEvents()
+    before = [card.geometry() for card in (place.cost, place.error, place.limiters)]
+    for _ in range(3):
+        place.show_view(dataclasses.replace(still, cost=(), errors=(), tick_ns=None, measuring=True))
+        QApplication.processEvents()
+    assert [card.geometry() for card in (place.cost, place.error, place.limiters)] == before
+    assert {line.ns.text() for line in place.cost.lines} == {"–"}
+    assert {value.text() for _, value in place.error.lines} == {"–"}
+    assert place.cost.sum.text() == "–"
+    assert place.cost.lines[0].accessibleName() == "Wake: being measured"
+    place.show_view(still)
+    assert [line.ns.text() for line in place.cost.lines][:2] == ["84 ns", "31 ns"]
+    assert place.error.lines[0][1].text() == "4e−15"
+
+
 def test_a_limiter_says_what_it_does(place: Any, still: LabView) -> None:
     told = (Limiter("Slew", 14, acting=True), Limiter("Fade", 500, acting=False), Limiter("Force", 0, acting=False))
     place.show_view(dataclasses.replace(still, limiters=told))
