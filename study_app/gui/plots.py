@@ -46,7 +46,7 @@ def pen(colour: str, width: float = STROKE, dash: tuple[float, float] | None = N
     made = QPen(QColor(colour), width)
     made.setCosmetic(True)
     made.setCapStyle(Qt.PenCapStyle.FlatCap)
-    made.setJoinStyle(Qt.PenJoinStyle.RoundJoin)
+    made.setJoinStyle(Qt.PenJoinStyle.BevelJoin)  # so many points lie on a curve that joins are not seen, but paid for
     if dash is not None:
         made.setDashPattern(list(dash))
     return made
@@ -143,6 +143,8 @@ class TracePlot(Plot):
         self._name_height = self._names_after_s = 0.0
         self._newest: list[float] = []
         self.curves = [pg.PlotCurveItem(antialias=True) for _ in names]
+        for curve, dash in zip(self.curves, (*DASHES, None), strict=False):
+            draw_quickly(curve, solid=dash is None)
         self.ends = [pg.TextItem(name, anchor=(0, 0.5)) for name in names]
         for item in (*self.curves, *self.ends):
             self.box.addItem(item)
@@ -274,6 +276,11 @@ class LatenessPlot(Plot):
         self.p99_name.setColor(QColor(theme.text))
         self.limit_line.setPen(self.stroke(theme.bad, 1.4, (4.0, 3.0)))
         self.limit_name.setColor(QColor(theme.bad))
+
+
+def draw_quickly(curve: pg.PlotCurveItem, *, solid: bool) -> None:
+    """Let a solid curve be drawn a piece at a time, which takes half as long; dashes run on from piece to piece."""
+    curve.setSegmentedLineMode("on" if solid else "off")
 
 
 def step_for(reach: float, most: int) -> float:

@@ -19,6 +19,7 @@ from study_app.gui.plots import (
     Floats,
     Plot,
     TracePlot,
+    draw_quickly,
     number,
     step_for,
     time_ticks,
@@ -102,6 +103,7 @@ class WakePlot(Plot):
         self._asked = self._reach = LEAST_WAKE_MPS
         self._ticks: tuple[int, float] = (0, 0.0)
         self.curve = pg.PlotCurveItem(antialias=True)
+        draw_quickly(self.curve, solid=True)
         self.box.addItem(self.curve)
         self.box.sigResized.connect(self._make_room)
         self.show_ticks("bottom", time_ticks(TRACE_WINDOW_S))

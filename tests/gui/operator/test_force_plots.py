@@ -132,8 +132,8 @@ def test_repainting_keeps_no_reference_to_none(card: ForceCard) -> None:
     before = sys.getrefcount(None)
     for step in range(200):
         card.show_forces(forces, round((SECONDS + 0.01 * step) * 1e9))
-        card.plot.repaint()
-        card.wake.repaint()
+        card.plot.viewport().repaint()
+        card.wake.viewport().repaint()
     assert abs(sys.getrefcount(None) - before) < 100
 
 

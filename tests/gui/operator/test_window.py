@@ -343,5 +343,5 @@ def test_repainting_the_live_plots_keeps_no_reference_to_none(running, health):
         running.show_traces(health, 4.0 + 0.03 * step)
         if step % 15 == 0:
             running.show_lateness(health)
-        running.position.plot.repaint()
+        running.position.plot.viewport().repaint()
     assert abs(sys.getrefcount(None) - before) < 100
