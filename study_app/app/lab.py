@@ -30,7 +30,7 @@ from study_app.gui.lab.view import DeviceShown, LabView, Now
 from study_app.gui.new_session import DEVICE_WORDS
 from study_app.lab.presets import Choice, liquids_at_hand, preset_text, save, spoken
 from study_app.lab.programmes import TITLES
-from study_app.lab.workbench import Side, Workbench
+from study_app.lab.workbench import Chance, Side, Workbench
 
 if TYPE_CHECKING:
     from study_app.lab.live import Live
@@ -68,6 +68,7 @@ class LabVisit(QObject):
     ----------
     place : the widgets; this ends with them
     open_live, make_appraiser : what opens a device by its name, what begins the process that appraises
+    chance : what a blinding is drawn from
     """
 
     _saved = Signal(object)
@@ -78,6 +79,7 @@ class LabVisit(QObject):
         *,
         open_live: Callable[..., Live] | None = None,
         make_appraiser: Callable[[], AsksPrice] = Appraiser,
+        chance: Chance | None = None,
     ) -> None:
         super().__init__(place)
         self.place = place
@@ -90,6 +92,7 @@ class LabVisit(QObject):
         self._entered = False
         self._prices = Prices(make_appraiser)
         self._opening = LabOpening(open_live)
+        self._chance = chance if chance is not None else random.SystemRandom()
         self._said = ""
         self._hook_before = sys.excepthook
         self._frames = self._timer(FRAME_MS, self._frame)
@@ -281,7 +284,7 @@ class LabVisit(QObject):
     @_guarded
     def _blind(self, asked: bool) -> None:
         if asked:
-            self._feel(self.bench.blinded(random.SystemRandom()), anew=True)
+            self._feel(self.bench.blinded(self._chance), anew=True)
         else:
             self._feel(self.bench.revealed())
 

@@ -51,6 +51,13 @@ class Prices:
         self.closed = True
 
 
+class Stays:
+    """Draws that exchange nothing."""
+
+    def random(self) -> float:
+        return 0.9
+
+
 @pytest.fixture
 def prices() -> Prices:
     return Prices()
@@ -217,16 +224,19 @@ def test_a_lost_device_is_told_and_can_be_opened_again(felt: LabVisit, qtbot: An
 
 
 def test_while_blind_nothing_tells_one_from_the_other(felt: LabVisit, qtbot: Any, tmp_path: Path) -> None:
+    """Though nothing is exchanged, what is felt begins anew: a hand that felt no fade would know."""
+    felt._chance = Stays()
     small = felt.bench.change("body.diameter_m", 0.02)
     felt._feel(small)
     assert felt.live is not None
     assert felt.view().body_radius_m == pytest.approx(0.001)
     qtbot.waitUntil(lambda: felt.live.due_in_s is None, timeout=SOON_MS)
-    before = felt.live.servo.telemetry.latest().scene
+    before = felt.live.servo._serial  # the scene that was asked for last, though no tick may have taken it yet
     felt.place.blind_asked.emit(True)
-    qtbot.waitUntil(lambda: felt.live.servo.telemetry.latest().scene > before, timeout=SOON_MS)  # anew, whichever it is
+    qtbot.waitUntil(lambda: felt.live.servo.telemetry.latest().scene > before, timeout=SOON_MS)
     view = felt.view()
     assert view.workbench.blind
+    assert view.felt == "A"
     assert view.body_radius_m == pytest.approx(0.0034)
     felt.place.switched.emit()
     felt.place.save_asked.emit(tmp_path / "told.toml")
