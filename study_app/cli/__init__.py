@@ -12,7 +12,20 @@ import sys
 import click
 
 from study_app import __version__
-from study_app.cli import accuracy, falcon, identify, model, power, report, results, running, soak, solver, stability
+from study_app.cli import (
+    accuracy,
+    falcon,
+    identify,
+    model,
+    power,
+    report,
+    results,
+    running,
+    soak,
+    solver,
+    stability,
+    timing,
+)
 from study_app.cli.devices import devices
 from study_app.cli.words import EXIT_USER_ERROR
 from study_app.errors import StudyError
@@ -33,7 +46,7 @@ def commands(context: click.Context) -> None:
         context.exit(app.home())
 
 
-for module in (running, results, report, power, model, accuracy, stability, identify, solver, soak, falcon):
+for module in (running, results, report, power, model, accuracy, stability, identify, solver, soak, timing, falcon):
     for command in vars(module).values():
         if isinstance(command, click.Command):
             commands.add_command(command)

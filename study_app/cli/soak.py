@@ -6,10 +6,15 @@ import signal
 import threading
 from pathlib import Path
 from types import FrameType
+from typing import TYPE_CHECKING
 
 import click
 
+from study_app.cli.timing import LOAD, windows_thread
 from study_app.cli.words import EXIT_FOUND
+
+if TYPE_CHECKING:
+    from study_app.evaluation.timing.load import LoadName
 
 
 @click.command()
@@ -17,15 +22,19 @@ from study_app.cli.words import EXIT_FOUND
 @click.option("--virtual", is_flag=True, help="In virtual time: a day in minutes.")
 @click.option("--protocol", default="rek2024", show_default=True, metavar="FILE", help="Whose liquids are felt.")
 @click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True)
+@click.option("--load", type=LOAD, default="none", help="Paint both windows of a session meanwhile; keep cores busy.")
 @click.option("--to", type=click.Path(path_type=Path), metavar="DIR", help="Folder to write the report into, too.")
 @click.pass_context
-def soak(context: click.Context, hours: float, protocol: str, seed: int, to: Path | None, *, virtual: bool) -> None:
+def soak(
+    context: click.Context, hours: float, protocol: str, seed: int, load: LoadName, to: Path | None, *, virtual: bool
+) -> None:
     """Run the servo with a restless hand and every fault there is; say what drifted, leaked or broke.
 
     Ctrl+C ends it with the report so far.
     """
     from study_app.evaluation.output import make_folder
     from study_app.evaluation.soak.run import soak as soak_servo
+    from study_app.evaluation.timing.load import beside
     from study_app.protocol.load import load_scenes
 
     scenes = load_scenes(protocol)
@@ -40,7 +49,11 @@ def soak(context: click.Context, hours: float, protocol: str, seed: int, to: Pat
 
     before = {number: signal.signal(number, end) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
-        found = soak_servo(scenes, hours, virtual=virtual, seed=seed, ending=ending, tell=click.echo)
+        found = beside(
+            load,
+            windows_thread(load) if load != "none" else None,
+            lambda: soak_servo(scenes, hours, virtual=virtual, seed=seed, ending=ending, tell=click.echo),
+        )
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)

@@ -1,0 +1,80 @@
+"""Half an hour of servo in virtual time, in every fault there is, while both windows of a session paint."""
+
+from __future__ import annotations
+
+import threading
+
+import pytest
+from PySide6.QtWidgets import QApplication
+
+from study_app.app.timing import lend
+from study_app.evaluation.soak.run import soak
+from study_app.evaluation.timing.loops import LEAD_IN, PERIOD_NS
+from study_app.protocol.load import load_scenes
+from tests.compiled import needs_servo
+
+FLAT_BYTES = 5 * 2**20
+HALF_AN_HOUR = 0.5
+
+pytestmark = needs_servo
+
+
+@pytest.mark.usefixtures("qapp")
+def test_half_an_hour_under_load_drops_nothing_drifts_by_nothing_and_takes_no_memory() -> None:
+    windows = lend("gui")
+    found = windows.during(lambda: soak(load_scenes("rek2024"), HALF_AN_HOUR, virtual=True))
+    assert found.findings == ()
+    assert found.ticks == found.planned == 1_800_000
+    assert found.dropped == 0
+    assert found.counts.missing == 0
+    assert found.counts.drift_ns == 0
+    assert abs(found.growth_bytes) <= FLAT_BYTES
+    assert windows.frames > 20
+
+
+@pytest.mark.usefixtures("qapp")
+def test_windows_are_open_while_work_is_done_and_gone_after_it() -> None:
+    windows = lend("gui")
+    seen: list[int] = []
+
+    def work() -> str:
+        wait = threading.Event()
+        while windows.frames < 3:
+            wait.wait(0.005)
+        seen.append(windows.frames)
+        return "done"
+
+    assert windows.during(work) == "done"
+    assert seen[0] >= 3
+    assert not [one for one in QApplication.topLevelWidgets() if one.isVisible()]
+
+
+@pytest.mark.usefixtures("qapp")
+def test_what_work_raises_is_raised_where_the_windows_are() -> None:
+    def work() -> None:
+        raise KeyError("lost")
+
+    with pytest.raises(KeyError, match="lost"):
+        lend("none").during(work)
+
+
+@pytest.mark.usefixtures("qapp")
+def test_a_timer_of_qt_fires_as_often_as_asked_in_the_windows_thread() -> None:
+    windows = lend("none")
+    fired: list[threading.Thread] = []
+    start_ns = windows.during(lambda: windows.timer(1, LEAD_IN, lambda: fired.append(threading.current_thread())))
+    assert len(fired) == LEAD_IN
+    assert set(fired) == {threading.main_thread()}
+    assert start_ns > PERIOD_NS
+    assert windows.frames == 0
+
+
+@pytest.mark.usefixtures("qapp")
+def test_a_tick_that_fails_in_the_timer_is_told_to_who_asked() -> None:
+    windows = lend("none")
+
+    def fail() -> None:
+        raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        windows.during(lambda: windows.timer(1, 5, fail))
