@@ -65,13 +65,24 @@ def paint_ahead(page: TaskPage, words: Words, text_scale: float, size: QSize, ra
 class TankWidget(QWidget):
     """Draws a task page and, on it, the views that it is shown.
 
-    ``painted(sample_ns)`` comes once for every view, from inside the painting, with the time of what was drawn.
+    ``painted(sample_ns)`` comes once for every view with the time of what was drawn: from inside the painting, or with
+    ``on_card``, on a surface of the graphics card, when that swapped. ``swapped`` comes with each swap.
     """
 
     painted = Signal(object)
+    swapped = Signal()
 
-    def __init__(self, page: TaskPage, words: Words, parent: QWidget | None = None, *, text_scale: float = 1.0) -> None:
+    def __init__(
+        self,
+        page: TaskPage,
+        words: Words,
+        parent: QWidget | None = None,
+        *,
+        text_scale: float = 1.0,
+        on_card: bool = False,
+    ) -> None:
         super().__init__(parent)
+        self._pane: QWidget | None = self._made_pane() if on_card else None
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.setAccessibleName(page.instruction)
         self._page = page
@@ -80,6 +91,7 @@ class TankWidget(QWidget):
         self._patch = OnsetPatch()
         self._view: TankView | None = None
         self._unpainted = False
+        self._drawn_ns: int | None = None
         self._things: dict[str, Placed] = {}
         self._ball: BallPlace | None = None
         self._camera: Camera | None = None
@@ -114,19 +126,49 @@ class TankWidget(QWidget):
         self._patch.follow((x, y, z), view.sample_time_ns)
         self._ready()
         things = self._frame()
-        self.update(changes(self._things, things) + ALWAYS)
+        if self._pane is None:
+            self.update(changes(self._things, things) + ALWAYS)
+        else:
+            self._pane.update()
         self._things = things
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
         """Find the tank's place anew."""
         super().resizeEvent(event)
         self._camera = None
+        if self._pane is not None:
+            self._pane.setGeometry(self.rect())
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802
         """Paint what lies in the region asked for, and tell when."""
-        still = self._ready()
-        region = event.region()
+        if self._pane is not None:
+            return
         painter = page_painter(self)
+        self._paint(painter, event.region())
+        painter.end()
+        self._tell()
+
+    def _made_pane(self) -> QWidget:
+        """Return a surface of the graphics card that fills the widget."""
+        from study_app.gui.tank.pane import Pane  # noqa: PLC0415 - OpenGL: only where it is drawn with
+
+        pane = Pane(self, self._paint)
+        pane.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+        pane.swapped.connect(self._swapped)
+        return pane
+
+    def _swapped(self) -> None:
+        self.swapped.emit()
+        self._tell()
+
+    def _tell(self) -> None:
+        """Say once of every view that it was painted."""
+        if self._unpainted and self._drawn_ns is not None:
+            self._unpainted = False
+            self.painted.emit(self._drawn_ns)
+
+    def _paint(self, painter: QPainter, region: QRegion) -> None:
+        still = self._ready()
         painter.drawImage(QPointF(0, 0), still.back)
         painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
         self._paint_things(painter, region)
@@ -134,10 +176,7 @@ class TankWidget(QWidget):
             painter.drawImage(still.front_at.topLeft(), still.front)
         self._captions.draw(painter, region, self._task)
         self._paint_patch(painter, region)
-        painter.end()
-        if self._unpainted and self._view is not None:
-            self._unpainted = False
-            self.painted.emit(self._view.sample_time_ns)
+        self._drawn_ns = None if self._view is None else self._view.sample_time_ns
 
     @property
     def _task(self) -> TaskShown | None:

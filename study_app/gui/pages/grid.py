@@ -113,7 +113,7 @@ def grid(width: float, height: float, asked: Asked, per_page: int, *, text_scale
     title_top = top + (22 if tight else 32) * text
     intro_top = title_top + title * 1.25 + (0 if tight else 3) * scale
     intro = asked.intro((width - 2 * across.margin) / text) * text
-    heading = asked.heading(2 * across.cell_pitch / text, across.judge_width / text) * text
+    heading = asked.heading(2 * across.cell_pitch / text, across.judge_width / text) * text * 1.03
     if per_page < asked.items:
         heading = max(heading, LEAST_CELL * scale)  # the parts' tabs stand beside it
     rows_top = intro_top + intro + heading + (10 if tight else 26) * scale

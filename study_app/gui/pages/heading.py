@@ -18,7 +18,7 @@ SHARES = (1.0, 1.2, 1.4, 1.6, 1.8)
 def label_height(labels: tuple[str, ...], widest: float) -> float:
     """Return the height [px] of labels at scale 1 that may be ``widest`` px wide, where they wrap as they are drawn."""
     metrics = QFontMetricsF(font("label", weight=600))
-    room = QRectF(0, 0, min(LABEL_WIDTH, widest), 1e3)
+    room = QRectF(0, 0, min(LABEL_WIDTH, 0.95 * widest), 1e3)  # letters of other sizes are not quite in proportion
     return max((metrics.boundingRect(room, WRAP_LEFT, text).height() for text in labels), default=0.0)
 
 
@@ -94,11 +94,20 @@ class Heading(QWidget):
         bounds = metrics.boundingRect(QRectF(0, 0, width, 1e4), WRAP_LEFT, self._labels[column])
         return bounds.width() <= width and bounds.height() <= self.height() + 1
 
+    def _bounds(self, column: int) -> tuple[float, float]:
+        """Return between which places [px] a label stands: those of the scale do not cross the rule beside it."""
+        assert self._grid is not None  # noqa: S101  # painted only when placed
+        rule = self._grid.rule
+        if rule is None or column == POINTS:
+            return 0.0, self.width()
+        return (rule, self.width()) if self._grid.judge_left < self._grid.cells_left else (0.0, rule)
+
     def _place(self, column: int) -> QRectF:
         """Return the room of a label: its column, and beside it as much as it needs, within the row."""
         assert self._grid is not None  # noqa: S101  # painted only when placed
         left, width = self._grid.cell(column)
         pitch = min(self._grid.cell_pitch, LABEL_WIDTH * self._grid.text) if column < POINTS else width
         wide = next((pitch * share for share in SHARES if self._fits(column, pitch * share)), 2 * pitch)
-        middle = max(min(left + width / 2, self.width() - wide / 2), wide / 2)
+        low, high = self._bounds(column)
+        middle = max(min(left + width / 2, high - wide / 2), low + wide / 2)
         return QRectF(middle - wide / 2, 0, wide, self.height())
