@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 from PySide6.QtCore import QSize
@@ -9,6 +10,46 @@ from PySide6.QtGui import QGuiApplication, QScreen
 from PySide6.QtWidgets import QWidget
 
 from study_app.errors import DisplayError
+
+
+@dataclass(frozen=True, slots=True)
+class ScreenShown:
+    """A screen as the system tells it: sizes in logical pixels and, where it knows them (else 0), in millimetres."""
+
+    number: int
+    name: str
+    width_px: int
+    height_px: int
+    refresh_hz: float
+    scaling: float
+    width_mm: float
+    height_mm: float
+
+    @property
+    def words(self) -> str:
+        """Size, rate and scaling, in a line."""
+        size = f"{round(self.width_px * self.scaling)} × {round(self.height_px * self.scaling)}"
+        return f"{size}, {self.refresh_hz:.0f} Hz, {self.scaling:.0%}".replace("%", "\u202f%")
+
+
+def screens_shown() -> tuple[ScreenShown, ...]:
+    """Return the screens there are, in their order."""
+    return tuple(screen_shown(screen) for screen in QGuiApplication.screens())
+
+
+def screen_shown(screen: QScreen) -> ScreenShown:
+    """Return what the system tells of a screen."""
+    size, physical = screen.size(), screen.physicalSize()
+    return ScreenShown(
+        number=QGuiApplication.screens().index(screen) + 1,
+        name=screen.name(),
+        width_px=size.width(),
+        height_px=size.height(),
+        refresh_hz=screen.refreshRate(),
+        scaling=screen.devicePixelRatio(),
+        width_mm=physical.width(),
+        height_mm=physical.height(),
+    )
 
 
 def choose_screens(number: int | None) -> tuple[QScreen, QScreen]:

@@ -1,0 +1,250 @@
+"""The display test: the photodiode's patch, greys, lines and frames, full-screen where a participant would look.
+
+Frames are asked for as a session asks for them, and the time of each painting is kept; the patch is the tank's own.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+from PySide6.QtCore import QRect, QSize, Qt, QTimer, Signal
+from PySide6.QtGui import QCloseEvent, QColor, QKeyEvent, QPainter, QPaintEvent, QScreen
+from PySide6.QtWidgets import QBoxLayout, QGridLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
+
+from study_app.gui.controls import ActionButton
+from study_app.gui.fields import NumberField, write_number
+from study_app.gui.labels import figures, label
+from study_app.gui.settings.frames import LEAST_S, Frames, FrameTimes
+from study_app.gui.settings.offset import OffsetForm
+from study_app.gui.settings.patterns import GreyRamp, LineField
+from study_app.gui.tank.patch import paint_patch, patch_place
+from study_app.gui.theme import PARTICIPANT
+from study_app.gui.themed import wear
+from study_app.store.machine import DisplayOffset
+
+TOLD_MS = 500
+INTERVAL_MS = (50.0, 5000.0)
+FIRST_MS = 500.0
+NAMES = ("Frames painted", "Median gap", "Longest of 99 %", "Missed in 10 s")
+LEAST = QSize(960, 600)
+
+
+class DisplayTest(QWidget):
+    """One screen under test; Esc leaves.
+
+    ``kept(mean [ms], spread [ms], how)`` where an offset is to be kept, ``forgotten`` where it is not to be; ``left``
+    when the window has gone.
+
+    Parameters
+    ----------
+    screen_words
+        Which screen it is, for the heading.
+    refresh_hz
+        How often it shows a frame, as the system says.
+    now_ns
+        The clock.
+    least_s
+        So long frames are counted before anything is said of them.
+    """
+
+    kept = Signal(float, float, str)
+    forgotten = Signal()
+    left = Signal()
+
+    def __init__(
+        self,
+        screen_words: str,
+        refresh_hz: float,
+        *,
+        now_ns: Callable[[], int] = time.perf_counter_ns,
+        least_s: float = LEAST_S,
+    ) -> None:
+        super().__init__()
+        self.setWindowTitle("Display test")
+        self.setMinimumSize(LEAST)
+        self._now_ns = now_ns
+        self.times = FrameTimes(refresh_hz, least_s)
+        self.lit = False
+        self.toggles = 0
+        self._toggled_ns = now_ns()
+        self.interval_ms = FIRST_MS
+        self._unpainted = False
+        self.interval = NumberField()
+        self.interval.setFixedWidth(88)
+        self.interval.setAccessibleName("The patch toggles every, ms")
+        self.interval.show_text(write_number(FIRST_MS, 0))
+        self.values: list[QLabel] = [figures("–", "number") for _ in NAMES]
+        self.offset = OffsetForm()
+        self.leave = ActionButton("", "Leave (Esc)", height=40)
+        self._lay_out(screen_words)
+        self._connect()
+        wear(self, PARTICIPANT)
+        self.frames = QTimer(self)
+        self.frames.setTimerType(Qt.TimerType.PreciseTimer)
+        self.frames.setInterval(max(4, round(1000 / self.times.refresh_hz)))
+        self.frames.timeout.connect(self.frame)
+        self.told = QTimer(self)
+        self.told.setInterval(TOLD_MS)
+        self.told.timeout.connect(self.tell)
+
+    def _lay_out(self, screen_words: str) -> None:
+        titles = QVBoxLayout()
+        titles.setSpacing(2)
+        titles.addWidget(label("Display test", "title"))
+        titles.addWidget(label(screen_words, "body", "text2"))
+        head = QHBoxLayout()
+        head.addLayout(titles)
+        head.addStretch()
+        head.addWidget(self.leave, 0, Qt.AlignmentFlag.AlignTop)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(40, 32, 40, 32)
+        column.setSpacing(18)
+        column.addLayout(head)
+        column.addLayout(self._figures())
+        column.addWidget(GreyRamp())
+        column.addLayout(self._fields())
+        column.addStretch()
+        column.addLayout(self._foot())
+
+    def _figures(self) -> QGridLayout:
+        """Return the live figures, a name over each."""
+        grid = QGridLayout()
+        grid.setHorizontalSpacing(40)
+        grid.setVerticalSpacing(2)
+        for place, (name, value) in enumerate(zip(NAMES, self.values, strict=True)):
+            value.setAccessibleName(name)
+            grid.addWidget(label(name, "label", "text2"), 0, place)
+            grid.addWidget(value, 1, place)
+        grid.setColumnStretch(len(NAMES), 1)
+        return grid
+
+    def _fields(self) -> QBoxLayout:
+        """Return the fields of lines, and what to look for in them."""
+        row = QHBoxLayout()
+        row.setSpacing(16)
+        for thick in (1, 2):
+            for standing in (True, False):
+                row.addWidget(LineField(thick, standing=standing))
+        words = label(
+            "Every line is 1 or 2 pixels of the screen. Where a field looks grey all over, shimmers or shows broad "
+            "bands, the system scales the picture: set the screen to its own resolution. All seventeen greys above "
+            "should differ.",
+            "body",
+            "text2",
+            wraps=True,
+        )
+        row.addWidget(words, 1)
+        return row
+
+    def _foot(self) -> QBoxLayout:
+        """Return the patch's interval and the offset, left of where the patch is."""
+        toggling = QVBoxLayout()
+        toggling.setSpacing(6)
+        toggling.addWidget(label("The patch toggles every, ms", "label", "text2"))
+        toggling.addWidget(self.interval)
+        self.why = label("", "label", "bad", wraps=True)
+        toggling.addWidget(self.why)
+        toggling.addStretch()
+        measured = QVBoxLayout()
+        measured.setSpacing(6)
+        measured.addWidget(label("Display offset", "card"))
+        measured.addWidget(self.offset)
+        row = QHBoxLayout()
+        row.setContentsMargins(0, 0, 120, 0)  # the patch's corner is nobody else's
+        row.setSpacing(48)
+        row.addLayout(toggling)
+        row.addLayout(measured, 1)
+        return row
+
+    def _connect(self) -> None:
+        self.leave.clicked.connect(self.close)
+        self.interval.entered.connect(self._set_interval)
+        self.interval.unread.connect(lambda _text: self._refuse_interval())
+        self.offset.kept.connect(self.kept)
+        self.offset.forgotten.connect(self.forgotten)
+
+    def open_on(self, screen: QScreen) -> None:
+        """Fill a screen and begin."""
+        self.setScreen(screen)
+        self.setGeometry(screen.geometry())
+        self.showFullScreen()
+        self.activateWindow()
+        self.begin()
+
+    def begin(self) -> None:
+        """Begin to paint and to count."""
+        self._toggled_ns = self._now_ns()
+        self.frames.start()
+        self.told.start()
+
+    def frame(self) -> None:
+        """Ask for a frame, as a session does; the patch toggles when its time has come."""
+        now_ns = self._now_ns()
+        if now_ns - self._toggled_ns >= 1e6 * self.interval_ms:
+            self._toggled_ns = now_ns
+            self.lit = not self.lit
+            self.toggles += 1
+        self._unpainted = True
+        self.update(self._patch())
+
+    def tell(self) -> None:
+        """Show what the frames come to."""
+        for value, words in zip(self.values, figures_words(self.times.figures(), self.times.refresh_hz), strict=True):
+            value.setText(words)
+
+    def show_offset(self, offset: DisplayOffset | None, screen: str) -> None:
+        """Show the offset that is kept."""
+        self.offset.show_offset(offset, screen)
+
+    def _patch(self) -> QRect:
+        return patch_place(self.width(), self.height()).toAlignedRect()
+
+    def _set_interval(self, value: float) -> None:
+        if not INTERVAL_MS[0] <= value <= INTERVAL_MS[1]:
+            self._refuse_interval()
+            return
+        self.interval_ms = value
+        self.interval.show_state("")
+        self.interval.show_text(write_number(value, 0))
+        self.why.setText("")
+
+    def _refuse_interval(self) -> None:
+        self.interval.show_state("refused")
+        self.why.setText(f"From {INTERVAL_MS[0]:g} to {INTERVAL_MS[1]:g} ms.")
+
+    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+        """Paint ground and patch, and keep the time of a frame that was asked for."""
+        painter = QPainter(self)
+        painter.fillRect(event.rect(), QColor(PARTICIPANT.window))
+        paint_patch(painter, patch_place(self.width(), self.height()), lit=self.lit)
+        painter.end()
+        if self._unpainted:
+            self._unpainted = False
+            self.times.add(self._now_ns())
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
+        """Leave on Esc."""
+        if event.key() == Qt.Key.Key_Escape:
+            self.close()
+        else:
+            super().keyPressEvent(event)
+
+    def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802 - Qt's name
+        """Stop painting."""
+        self.frames.stop()
+        self.told.stop()
+        super().closeEvent(event)
+        self.left.emit()
+
+
+def figures_words(found: Frames | None, refresh_hz: float) -> tuple[str, str, str, str]:
+    """Return the figures as they are shown; dashes until there are enough frames."""
+    if found is None:
+        return "–", "–", "–", "–"
+    return (
+        f"{found.rate_hz:.1f} of {refresh_hz:.1f} Hz",
+        f"{found.median_ms:.2f} ms",
+        f"{found.p99_ms:.2f} ms",
+        str(found.missed),
+    )
