@@ -62,17 +62,19 @@ class ParticipantWindow(QWidget):
     captures_pointer : hold and hide the pointer in the tank, because it is the device
     pilot : a coloured frame and the title say that this is no participant's session
     text_scale : how much larger than designed words must be at least, for this screen at this distance
+    on_card : whether the tank is drawn on a surface of the graphics card, in step with the screen
 
     While ``may_close`` is false, closing the window in the middle of a session is a pause.
     ``event`` carries the session's events; ``pointer`` the hand's place [m] and ``buttons`` the buttons' bits while the
-    pointer is captured; ``painted`` the time of the sample [ns] of every view, while it is drawn. ``painting`` is the
-    last thread that painted ahead.
+    pointer is captured; ``painted`` the time of the sample [ns] of every view, while it is drawn, and ``swapped`` comes
+    where a surface has just swapped. ``painting`` is the last thread that painted ahead.
     """
 
     event = Signal(object)  # type: ignore[assignment]  # hides QWidget.event() from Python, not from Qt
     pointer = Signal(float, float, float)
     buttons = Signal(int)
     painted = Signal(object)
+    swapped = Signal()
 
     def __init__(
         self,
@@ -83,9 +85,11 @@ class ParticipantWindow(QWidget):
         captures_pointer: bool = False,
         pilot: bool = False,
         text_scale: float = 1.0,
+        on_card: bool = False,
     ) -> None:
         super().__init__()
         load_fonts()
+        self._on_card = on_card
         self._words = said
         self._clock = clock
         self._text_scale = text_scale
@@ -240,8 +244,9 @@ class ParticipantWindow(QWidget):
         made: PageWidget
         match page:
             case TaskPage():
-                tank = TankWidget(page, said, self, text_scale=text)
+                tank = TankWidget(page, said, self, text_scale=text, on_card=self._on_card)
                 tank.painted.connect(self.painted)
+                tank.swapped.connect(self.swapped)
                 return tank
             case QuestionnairePage():
                 made = QuestionnaireWidget(page, said, clock, self, text_scale=text)

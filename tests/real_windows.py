@@ -1,0 +1,94 @@
+"""Real windows on a virtual X display: the display, and the program as a person meets it."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QPoint
+
+NEEDED = ("Xvfb", "xdotool")
+MISSING = [tool for tool in NEEDED if shutil.which(tool) is None]
+needs_display = pytest.mark.skipif(bool(MISSING), reason=f"not installed here: {', '.join(MISSING)}")
+
+
+@contextmanager
+def virtual_display() -> Iterator[str]:
+    """A virtual X display that nobody else uses."""
+    read_end, write_end = os.pipe()
+    words_of_xvfb = ["Xvfb", "-displayfd", str(write_end), "-screen", "0", "1920x1080x24", "-nolisten", "tcp"]
+    server = subprocess.Popen(
+        words_of_xvfb, pass_fds=(write_end,), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
+    os.close(write_end)
+    with os.fdopen(read_end) as numbers:
+        number = numbers.readline().strip()
+    yield f":{number}"
+    server.terminate()
+    server.wait(10)
+
+
+def wait_for(found: Callable[[], object], what: str, seconds: float = 60.0) -> None:
+    """Look again and again until ``found()``: another process offers no signal to wait for."""
+    deadline, pause = time.monotonic() + seconds, threading.Event()
+    while not found():
+        assert time.monotonic() < deadline, f"waited {seconds:g} s in vain for {what}"
+        pause.wait(0.05)
+
+
+class Program:
+    """The program as a person meets it: windows, keys, a mouse, and files that appear."""
+
+    def __init__(self, display: str, folder: Path) -> None:
+        self.folder = folder
+        self.environment = os.environ | {"DISPLAY": display, "QT_QPA_PLATFORM": "xcb"}
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "study_app"], cwd=folder, env=self.environment, stderr=subprocess.PIPE, text=True
+        )
+
+    def close(self) -> None:
+        self.process.kill()
+        self.process.communicate()
+
+    def xdotool(self, *arguments: str) -> str:
+        finished = subprocess.run(
+            ["xdotool", *arguments], env=self.environment, capture_output=True, text=True, check=False
+        )
+        return finished.stdout.strip()
+
+    def window(self, title: str) -> str:
+        def number() -> str:
+            assert self.process.poll() is None, self.process.stderr.read()  # type: ignore[union-attr]
+            return self.xdotool("search", "--onlyvisible", "--name", title)
+
+        wait_for(number, f"the window {title!r}")
+        return number().splitlines()[-1]
+
+    def size(self, window: str) -> tuple[int, int]:
+        geometry = dict(
+            line.split("=") for line in self.xdotool("getwindowgeometry", "--shell", window).splitlines() if "=" in line
+        )
+        return int(geometry["WIDTH"]), int(geometry["HEIGHT"])
+
+    def click(self, window: str, place: QPoint) -> None:
+        self.xdotool("mousemove", "--window", window, str(place.x()), str(place.y()), "click", "1")
+
+    def key(self, window: str, *keys: str) -> None:
+        self.xdotool("windowfocus", "--sync", window, "key", "--clearmodifiers", *keys)
+
+    def events(self, kind: str) -> list[dict[str, object]]:
+        found = list(self.folder.glob("results/rek2024/data/sub-P042/ses-01/journal.jsonl"))
+        whole = found[0].read_bytes().rpartition(b"\n")[0].splitlines() if found else []
+        return [event for event in map(json.loads, whole) if event["event"] == kind]
+
+    def wait_for_event(self, kind: str, count: int = 1) -> None:
+        wait_for(lambda: len(self.events(kind)) >= count, f"{count} × {kind!r} in the journal", 90.0)
