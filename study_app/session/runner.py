@@ -373,5 +373,11 @@ class Runner:
         if (pressed & BUTTON_STOP).any():
             self.post(ForceStopped(self._ports.clock(), "device"))
         pressed_since = pressed[samples["time_ns"] >= self._page_since_ns]
-        if (pressed_since & BUTTON_CONTINUE).any() and self._state.phase is Phase.READING and not self._stalls:
+        if (pressed_since & BUTTON_CONTINUE).any() and self._button_goes_on and not self._stalls:
             self.post(Continue(self._ports.clock()))
+
+    @property
+    def _button_goes_on(self) -> bool:
+        """Whether the device's button goes on: from a page to read, but a squeeze gives no consent."""
+        state = self._state
+        return state.phase is Phase.READING and self._protocol.pages[state.page_id].kind != "consent"

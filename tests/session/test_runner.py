@@ -317,10 +317,12 @@ def test_a_repeated_trial_keeps_both_attempts(practising: World) -> None:
     ]
 
 
-def test_the_first_button_goes_on_from_a_page_to_read_and_from_nothing_else(world: World) -> None:
+def test_the_first_button_goes_on_neither_from_a_consent_nor_from_a_task(world: World) -> None:
     world.runner.post(Begin(0.0))
     world.run(0.1, buttons=BUTTON_CONTINUE)
-    assert world.state.phase is Phase.TASK
+    assert world.state.phase is Phase.READING  # a squeeze of the grip is no consent
+    world.run(0.1)
+    world.runner.post(Continue(0.2))
     world.run(0.1)
     world.run(1.5, buttons=BUTTON_CONTINUE)
     assert world.state.phase is Phase.TASK  # the least time is over, but a squeeze is not a key
@@ -335,9 +337,12 @@ def test_a_button_held_down_is_one_press(world: World) -> None:
     assert world.state.phase is Phase.READING
     world.run(0.1, buttons=BUTTON_CONTINUE)
     assert world.runner.finished
-    again = World()
-    again.servo.run(0.1, buttons=BUTTON_CONTINUE)
-    again.runner.post(Begin(0.1))
+    again = at_block("seeing")
+    for _ in range(30):
+        if again.state.phase is Phase.READING:
+            break
+        step(again)
+        again.servo.run(0.01, buttons=BUTTON_CONTINUE)
     again.run(0.1, buttons=BUTTON_CONTINUE)  # pressed before the page was there
     assert again.state.phase is Phase.READING
 
