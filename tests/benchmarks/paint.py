@@ -1,7 +1,9 @@
-"""How long the participant's tank takes to paint, in software, at 1920 × 1080: run me, I print a table.
+"""How long the participant's pages take to paint, in software, at 1920 × 1080: run me, I print two tables.
 
-Whole frames are painted as after a change of page; dirty updates as between two frames of a moving ball in the ring
-whose dwell arc grows. Times are of the widget's painting including Qt's own share, without the transport to a screen.
+The tank: whole frames are painted as after a change of page; dirty updates as between two frames of a moving ball in
+the ring whose dwell arc grows. The changes of page: from the order to show a page until it is painted whole, each kind
+of page many times; the tank's still images are painted ahead while a text is read, as in a session. Times are of the
+widgets' work including Qt's own share, without the transport to a screen.
 """
 
 from __future__ import annotations
@@ -15,16 +17,21 @@ os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
 from PySide6.QtWidgets import QApplication
 
+from study_app.gui.participant import ParticipantWindow
 from study_app.gui.scene_view import TankWidget
+from study_app.protocol.load import load
+from study_app.protocol.model import Protocol
 from study_app.protocol.tasks import Reach
 from study_app.protocol.words import words
-from study_app.session.pages import Progress, TaskPage
+from study_app.session.pages import ItemView, Page, PausePage, Progress, QuestionnairePage, TaskPage, TextPage
 from study_app.session.runner import TankView
 from study_app.session.tasks import TaskView
 
 SIZE = (1920, 1080)
 FRAMES = 400
 LIMIT_MS = 4.0
+CHANGES = 20
+LIMIT_CHANGE_MS = 50.0
 
 
 def page() -> TaskPage:
@@ -63,9 +70,83 @@ def row(name: str, times_ms: list[float]) -> str:
     return f"{name:<28}{statistics.median(ordered):>9.2f}{p95:>9.2f}{ordered[-1]:>9.2f}"
 
 
+def pages() -> list[tuple[str, Page]]:
+    """Return the pages of the thesis' study in the order in which they follow each other, with a pause."""
+    study = load("rek2024")
+    asked = study.questionnaires["liquid"]
+    items = tuple(
+        ItemView(item.id, n, study.text(item.text, "en"), item.required) for n, item in enumerate(asked.items, 1)
+    )
+    answers = QuestionnairePage(
+        trial=6,
+        title="Liquid setting 1",
+        intro=study.text(asked.intro, "en"),
+        items=items,
+        labels=study.labels(asked.scale, "en"),
+        cannot_judge=None,
+        progress=Progress(1, 2, "Liquid setting 1", 1, 3),
+    )
+    return [
+        ("consent", text(study, "consent")),
+        ("instructions", text(study, "instructions")),
+        ("tank", page()),
+        ("questionnaire, nine items", answers),
+        ("pause over it", PausePage(force_off=False)),
+        ("questionnaire, back again", answers),
+    ]
+
+
+def text(study: Protocol, name: str) -> TextPage:
+    """Return a page of the study, with the tank coming after it."""
+    shown = study.pages[name]
+    paragraphs = study.paragraphs(shown.body, "en")
+    return TextPage(name, shown.kind, study.text(shown.title, "en"), paragraphs, "Continue", coming=page())
+
+
+def change_pages(app: QApplication) -> dict[str, list[float]]:
+    """Return how long each kind of page took from the order to show it until it was painted whole [ms]."""
+    window = ParticipantWindow(words("en"), clock=time.monotonic, windowed=True)
+    window.resize(*SIZE)
+    window.show()
+    app.processEvents()
+    took: dict[str, list[float]] = {name: [] for name, _ in pages()}
+    for _ in range(CHANGES):
+        for name, shown in pages():
+            if isinstance(shown, TaskPage):
+                read_until_painted(app, window)
+            start = time.perf_counter()
+            window.show_page(shown)
+            app.processEvents()
+            took[name].append(1e3 * (time.perf_counter() - start))
+    window.may_close = True
+    window.close()
+    return took
+
+
+def read_until_painted(app: QApplication, window: ParticipantWindow) -> None:
+    """Let the text be read until the tank after it is painted."""
+    until = time.monotonic() + 5
+    while window.painting is None and time.monotonic() < until:
+        app.processEvents()
+    if window.painting is not None:
+        window.painting.join()
+
+
 def main() -> None:
     """Paint and print."""
     app = QApplication.instance() or QApplication([])
+    assert isinstance(app, QApplication)
+    paint_tank(app)
+    print()
+    print(f"change of page, {CHANGES} of each [ms]")
+    print(f"{'':<28}{'first':>9}{'median':>9}{'p95':>9}{'most':>9}")
+    for name, times in change_pages(app).items():
+        print(f"{row(name, times)[:28]}{times[0]:>9.2f}{row(name, times)[28:]}")
+    print(f"limit for a change of page {LIMIT_CHANGE_MS:g} ms")
+
+
+def paint_tank(app: QApplication) -> None:
+    """Paint the tank and print how long it took."""
     tank = TankWidget(page(), words("en"))
     tank.resize(*SIZE)
     start = time.perf_counter()
