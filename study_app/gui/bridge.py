@@ -13,9 +13,10 @@ from functools import wraps
 from types import TracebackType
 from typing import Concatenate, ParamSpec
 
-from PySide6.QtCore import QObject, Qt, QTimer, Signal
+from PySide6.QtCore import QObject, QTimer, Signal
 
 from study_app.errors import SessionError, StudyError
+from study_app.gui.frames import Frames
 from study_app.gui.lookout import Lookout
 from study_app.gui.operator.view import OperatorView
 from study_app.gui.operator.window import OperatorWindow
@@ -96,19 +97,15 @@ class SessionBridge(QObject):
         self._gone = False
         self._stalled: str | None = None
         self._hook_before = sys.excepthook
-        self._timers = (
-            self._timer(max(4, round(1000 / refresh_hz)), self._frame, precise=True),
-            self._timer(TRACE_MS, self._traces),
-            self._timer(TILES_MS, self._tiles),
-        )
+        self._frames = Frames(refresh_hz, parent=self)
+        self._frames.due.connect(self._frame)
+        self._timers = (self._frames, self._timer(TRACE_MS, self._traces), self._timer(TILES_MS, self._tiles))
         self.runner.on_change(lambda _state: self._changed())
         self._connect()
 
-    def _timer(self, interval_ms: int, slot: Callable[[], None], *, precise: bool = False) -> QTimer:
+    def _timer(self, interval_ms: int, slot: Callable[[], None]) -> QTimer:
         timer = QTimer(self)
         timer.setInterval(interval_ms)
-        if precise:
-            timer.setTimerType(Qt.TimerType.PreciseTimer)
         timer.timeout.connect(slot)
         return timer
 
@@ -128,6 +125,7 @@ class SessionBridge(QObject):
         operator.escape.leave_to(participant)
         participant.event.connect(self._event)
         participant.painted.connect(self._painted)
+        participant.swapped.connect(self._frames.swapped)
         if self.parts.point_to is not None:
             participant.pointer.connect(self._point)
             participant.buttons.connect(self._press)

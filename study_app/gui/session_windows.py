@@ -9,6 +9,7 @@ from study_app.devices import is_simulated, kind_of, moves_by_itself
 from study_app.devices.hand_orders import HandOrders, hand_of
 from study_app.devices.mouse import MouseDevice
 from study_app.gui.bridge import SessionBridge
+from study_app.gui.graphics import has_card
 from study_app.gui.operator import OperatorWindow
 from study_app.gui.operator.progress import SessionProgress, progress_after, stages
 from study_app.gui.operator.view import Session
@@ -73,6 +74,7 @@ def open_windows(
         windowed=chosen.windowed,
         captures_pointer=by_mouse,
         pilot=chosen.pilot,
+        on_card=has_card(),
     )
     hand = hand_of(device)
     parts = Parts(
