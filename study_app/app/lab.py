@@ -30,7 +30,7 @@ from study_app.gui.lab.view import DeviceShown, LabView, Now
 from study_app.gui.new_session import DEVICE_WORDS
 from study_app.lab.presets import Choice, liquids_at_hand, preset_text, save, spoken
 from study_app.lab.programmes import TITLES
-from study_app.lab.workbench import Chance, Side, Workbench
+from study_app.lab.workbench import Chance, Setting, Side, Workbench
 
 if TYPE_CHECKING:
     from study_app.lab.live import Live
@@ -346,24 +346,26 @@ class LabVisit(QObject):
         if self.bench.blind:
             self.trouble = "while the comparison is blind no preset can be saved: end the blinding first"
             return
-        text = preset_text(self.bench.in_hand)
-        threading.Thread(target=self._write, args=(path, text), name="preset", daemon=True).start()
+        at_hand = tuple(it.source for it in self.liquids)
+        words = (path, self.bench.in_hand, at_hand)
+        threading.Thread(target=self._write, args=words, name="preset", daemon=True).start()
 
-    def _write(self, path: Path, text: str) -> None:
+    def _write(self, path: Path, setting: Setting, at_hand: tuple[str, ...]) -> None:
+        """Write a preset, and look which liquids there are then: in a thread of its own."""
         try:
-            save(path, text)
+            save(path, preset_text(setting))
+            found: object = liquids_at_hand(saved=(*at_hand, str(path)))
         except StudyError as error:
-            self._saved.emit(error)
-        else:
-            self._saved.emit(path)
+            found = error
+        self._saved.emit(found)
 
     @_guarded
-    def _hear_of_saving(self, what: Path | StudyError) -> None:
+    def _hear_of_saving(self, found: tuple[Choice, ...] | StudyError) -> None:
         """Offer the new preset as a liquid, or say why it could not be written; the force goes on."""
-        if isinstance(what, StudyError):
-            self.trouble = str(what)
-            return
-        self.liquids = liquids_at_hand(saved=(*(it.source for it in self.liquids), str(what)))
+        if isinstance(found, StudyError):
+            self.trouble = str(found)
+        else:
+            self.liquids = found
 
     def _let_go(self) -> None:
         """End with the device in the order of safety."""

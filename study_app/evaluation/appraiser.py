@@ -24,7 +24,6 @@ from study_app.errors import StudyError
 from study_app.haptics.scene import Scene
 
 NICEST: Final = 19
-PATIENCE_S: Final = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +77,7 @@ class Appraiser:
             encoding="utf-8",
         )
         self._asked = 0
+        self._closed = False
         self._told: SimpleQueue[Told] = SimpleQueue()
         self._listening = threading.Thread(target=self._listen, name="appraiser", daemon=True)
         self._listening.start()
@@ -85,7 +85,7 @@ class Appraiser:
     @property
     def works(self) -> bool:
         """Whether there still is somebody to ask."""
-        return self._process.poll() is None
+        return not self._closed and self._process.poll() is None
 
     def ask(self, scene: Scene) -> int:
         """Ask about a scene; return the number that its answers have. Answers to earlier questions may still come."""
@@ -106,24 +106,16 @@ class Appraiser:
         return found
 
     def close(self) -> None:
-        """End the process, whatever it is doing."""
+        """End the process, whatever it is doing; it is not waited for here."""
+        self._closed = True
         self._process.terminate()
-        try:
-            self._process.wait(PATIENCE_S)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait(PATIENCE_S)
-        self._listening.join(PATIENCE_S)
-        for pipe in (self._process.stdin, self._process.stdout):
-            if pipe is not None:
-                with suppress(OSError):
-                    pipe.close()
 
     def _listen(self) -> None:
-        """Read answers until there are no more, in a thread of its own."""
-        assert self._process.stdout is not None  # noqa: S101 - made so
-        for line in self._process.stdout:
-            self._told.put(_read(json.loads(line)))
+        """Read answers until there are no more, then see the process off: in a thread of its own."""
+        with self._process as process:  # which waits for its end and closes its pipes
+            assert process.stdout is not None  # noqa: S101 - made so
+            for line in process.stdout:
+                self._told.put(_read(json.loads(line)))
 
 
 def _read(told: dict[str, Any]) -> Told:

@@ -95,6 +95,8 @@ def test_the_process_answers_the_newest_question_and_ends_when_told() -> None:
     finally:
         appraiser.close()
     assert not appraiser.works
+    appraiser._listening.join(20.0)
+    assert appraiser._process.returncode is not None
     appraiser.ask(THESIS["honey"])
     assert appraiser.answers() == []
 
