@@ -47,6 +47,7 @@ if TYPE_CHECKING:
 LEAST_SIZE = QSize(1024, 640)
 WINDOWED_SIZE = QSize(1366, 768)
 PILOT_FRAME = 10
+WAITING_MS = 15
 AHEAD_MS = 100  # after a page came, what comes next is painted
 SETTLING_MS = 100  # from one of the program's windows to the next, none may have the keyboard for so long
 
@@ -99,15 +100,16 @@ class ParticipantWindow(QWidget):
         self.painting: Thread | None = None
         self.frame_px = PILOT_FRAME if pilot else 0
         self._page: Page | None = None
-        self._widget: PageWidget | TankWidget = ReadingPage(
-            ("clock", said.preparing, (), PARTICIPANT.accent), said, clock, parent=self, text_scale=text_scale
-        )
+        self._widget: PageWidget | TankWidget = self._wait_page(said.preparing)
         self._capture = PointerCapture(self)
         self._capture.moved.connect(self.pointer)
         self._capture.pressed.connect(self.buttons)
         self._settling = QTimer(self)
         self._settling.setInterval(SETTLING_MS)
         self._settling.timeout.connect(self._pause_if_left)
+        self._waiting = QTimer(self)
+        self._waiting.setInterval(WAITING_MS)
+        self._waiting.timeout.connect(self._show_if_painted)
         self._ahead = QTimer(self)
         self._ahead.setSingleShot(True)
         self._ahead.setInterval(AHEAD_MS)
@@ -157,15 +159,24 @@ class ParticipantWindow(QWidget):
     def show_page(self, page: Page) -> None:
         """Put a page in place of the present one, whole and at once."""
         self._capture.release()
+        self._waiting.stop()
         if isinstance(page, TextPage) and page.language != self._words.language:
             self._words = words(page.language)
             self._title()
+        self._page = page
+        if isinstance(page, TaskPage) and self.painting is not None and self.painting.is_alive():
+            self._waiting.start()
+            self._put(self._wait_page(self._words.trouble_title))
+        else:
+            self._put(self._make(page, self._widget))
+
+    def _put(self, made: PageWidget | TankWidget) -> None:
+        """Put a widget in place of the present one."""
         old = self._widget
-        made = self._make(page, old)
         made.setGeometry(self._room())
         if isinstance(made, TankWidget):
             made.prepare()
-        self._page, self._widget = page, made
+        self._widget = made
         made.show()
         made.raise_()
         if isinstance(made, TankWidget):
@@ -225,10 +236,21 @@ class ParticipantWindow(QWidget):
         painter.end()
 
     def _paint_ahead(self) -> None:
-        """While a text is read, paint the tank that comes after it."""
-        if isinstance(self._page, TextPage) and self._page.coming is not None:
+        """While a text or a pause is read, paint the tank that comes after it."""
+        if isinstance(self._page, TextPage | PausePage) and self._page.coming is not None:
             size, ratio = self._room().size(), self.devicePixelRatioF()
             self.painting = paint_ahead(self._page.coming, self._words, self._text_scale, size, ratio)
+
+    def _wait_page(self, words_said: str) -> ReadingPage:
+        """Return a page that asks for a moment's patience."""
+        column = ("clock", words_said, (), PARTICIPANT.accent)
+        return ReadingPage(column, self._words, self._clock, parent=self, text_scale=self._text_scale)
+
+    def _show_if_painted(self) -> None:
+        """Put the tank in place of the page that asks to wait, once it is painted."""
+        if isinstance(self._page, TaskPage) and self.painting is not None and not self.painting.is_alive():
+            self._waiting.stop()
+            self._put(self._make(self._page, self._widget))
 
     def _title(self) -> None:
         title = self._words.window_title

@@ -26,7 +26,8 @@ def page(state: SessionState) -> Page:
         case Phase.ANSWERING:
             return _questionnaire_page(state)
         case Phase.PAUSED:
-            return PausePage(force_off=state.force_off, held=state.held)
+            paused = _task_page(state, state.step) if isinstance(state.step, Trial) else None
+            return PausePage(force_off=state.force_off, held=state.held, coming=paused)
         case Phase.TROUBLE:
             return TroublePage(_words(state).trouble_title, _words(state).trouble_body)
         case Phase.COMPLETE:

@@ -5,7 +5,7 @@ Texts are already in the participant's language. Lengths are metres in the hand 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
 from study_app.protocol.model import Explore, Reach
@@ -93,11 +93,13 @@ class QuestionnairePage:
 class PausePage:
     """The session waits; ``force_off`` says that the force was stopped and fades in only when asked for.
 
-    ``held`` says what the operator stopped: then the operator alone resumes, and there is nothing to press.
+    ``held`` says what the operator stopped: then the operator alone resumes, and there is nothing to press. ``coming``
+    is the task that may come after it, so that it can be made ready.
     """
 
     force_off: bool
     held: Literal["pause", "force"] | None = None
+    coming: TaskPage | None = field(default=None, compare=False, repr=False)
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator
 from typing import Any
 
@@ -187,3 +188,39 @@ def test_another_language_changes_every_page_that_follows(window: ParticipantWin
     assert quest.button.text() == words("ar").continue_
     window.show_page(text_page("break"))
     assert window.widget.layoutDirection() == Qt.LayoutDirection.LeftToRight
+
+
+def test_a_tank_that_is_still_being_painted_is_waited_for_on_a_page_that_says_so(
+    window: ParticipantWindow, qtbot: Any
+) -> None:
+    done = threading.Event()
+    window.painting = threading.Thread(target=done.wait)
+    window.painting.start()
+    pictures = change(window, task_page(explore()))
+    assert len(pictures) == 2
+    assert window.tank is None
+    assert window.widget.accessibleName() == words("en").trouble_title
+    window.show_view(view(lit=None, elapsed_s=40.0))
+    QTest.keyClick(window, Qt.Key.Key_Space)  # neither view nor key does anything yet
+    assert window.tank is None
+    done.set()
+    qtbot.waitUntil(lambda: window.tank is not None)
+    assert not window._waiting.isActive()
+
+
+def test_a_page_that_comes_while_a_tank_is_waited_for_is_shown_at_once(window: ParticipantWindow) -> None:
+    done = threading.Event()
+    window.painting = threading.Thread(target=done.wait)
+    window.painting.start()
+    window.show_page(task_page())
+    window.show_page(PausePage(force_off=True))
+    done.set()
+    window.painting.join()
+    window._show_if_painted()
+    assert window.tank is None
+    assert window.page == PausePage(force_off=True)
+
+
+def test_a_pause_paints_the_tank_that_it_interrupted(window: ParticipantWindow, qtbot: Any) -> None:
+    window.show_page(PausePage(force_off=False, coming=task_page()))
+    qtbot.waitUntil(lambda: window.painting is not None)
