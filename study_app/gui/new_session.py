@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QGuiApplication, QIntValidator
+from PySide6.QtGui import QIntValidator
 from PySide6.QtWidgets import (
     QDialog,
     QFileDialog,
@@ -17,18 +17,20 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from study_app.devices import list_devices
-from study_app.errors import StoreError
+from study_app.devices import kind_of, list_devices
+from study_app.errors import DeviceError, StoreError
 from study_app.gui.cards import Icon, Rule
 from study_app.gui.choices import NewSession, draw_seed, study_results
 from study_app.gui.controls import ActionButton, Check, Choice, Number
 from study_app.gui.home.facts import LANGUAGES, StudyFacts
 from study_app.gui.labels import label, set_ink
+from study_app.gui.screens import screens_shown
 from study_app.gui.theme import LIGHT, Theme, font
 from study_app.gui.themed import wear
 from study_app.store.abandoned import abandoned
 from study_app.store.description import check_study
 from study_app.store.layout import MAX_SESSION, StudyFolder, check_participant, check_unused, suggest_id
+from study_app.store.machine import DEFAULTS, MachineSettings
 
 DEVICE_WORDS = {
     "mouse": "Mouse (seen, not felt)",
@@ -37,6 +39,7 @@ DEVICE_WORDS = {
     "scripted": "Scripted hand (moves by itself)",
     "falcon-emulated": "Emulated Falcon (moves by itself)",
 }
+NEEDS_FIRMWARE = "falcon"
 
 
 class NewSessionDialog(QDialog):
@@ -48,18 +51,27 @@ class NewSessionDialog(QDialog):
         The protocol to run.
     results
         Folder that holds the studies' folders; the study's own is suggested.
+    machine
+        What is set for this machine: device, firmware and screen to begin with.
     """
 
     def __init__(
-        self, facts: StudyFacts, results: Path, *, theme: Theme = LIGHT, parent: QWidget | None = None
+        self,
+        facts: StudyFacts,
+        results: Path,
+        *,
+        machine: MachineSettings = DEFAULTS,
+        theme: Theme = LIGHT,
+        parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
         self.facts = facts
+        self._machine = machine
         self.setWindowTitle("New session")
         self.setModal(True)
         self.setMinimumWidth(640)
         self._all_results = results
-        self._suggested = str(study_results(results, facts.protocol.study.name, list_devices()[0]))
+        self._suggested = str(study_results(results, facts.protocol.study.name, _known(machine.device)))
         self.results = _field("Results folder of this study")
         self.results.setText(self._suggested)
         self.participant = _field("Participant")
@@ -68,6 +80,7 @@ class NewSessionDialog(QDialog):
         self.operator = _field("Operator")
         self.language = Choice()
         self.device = Choice()
+        self.firmware = _field("Falcon's firmware")
         self.screen_choice = Choice()
         self.windowed = Check("In a window instead of full-screen")
         self.pilot = Check("Pilot: in a window with a frame, kept apart from the data")
@@ -94,14 +107,16 @@ class NewSessionDialog(QDialog):
         self.operator.setMaxLength(40)
         for code in study.languages:
             self.language.addItem(LANGUAGES.get(code, code), code)
-        for name in list_devices():
+        preferred = _known(self._machine.device)
+        for name in dict.fromkeys((*list_devices(), preferred)):
             self.device.addItem(DEVICE_WORDS.get(name, name), name)
-        screens = QGuiApplication.screens()
-        for number, screen in enumerate(screens, start=1):
-            size = screen.size()
-            words = f"Screen {number}: {size.width()} × {size.height()}, {screen.refreshRate():.0f} Hz"
-            self.screen_choice.addItem(words, number)
-        self.screen_choice.setCurrentIndex(len(screens) - 1)
+        self.device.setCurrentIndex(self.device.findData(preferred))
+        self.firmware.setText(self._machine.firmware or "")
+        self.firmware.setPlaceholderText("Where it is switched on already: none")
+        screens = screens_shown()
+        for screen in screens:
+            self.screen_choice.addItem(f"Screen {screen.number}: {screen.words}", screen.number)
+        self.screen_choice.setCurrentIndex(self._machine.screen_among([screen.name for screen in screens]) - 1)
         self.windowed.setChecked(len(screens) == 1)
         for name, widget in (("Language", self.language), ("Device", self.device), ("Screen", self.screen_choice)):
             widget.setAccessibleName(name)
@@ -115,7 +130,8 @@ class NewSessionDialog(QDialog):
         )
         for field in fields:
             field.setFont(font("body"))
-        self.device.currentIndexChanged.connect(self._suggest_folder)
+        self.device.currentIndexChanged.connect(self._choose_device)
+        self.firmware.textChanged.connect(self._check)
         self.pilot.toggled.connect(self._choose_pilot)
         self.participant.textChanged.connect(self._check)
         self.session.valueChanged.connect(self._check)
@@ -176,6 +192,17 @@ class NewSessionDialog(QDialog):
         both.addWidget(self.pilot)
         grid.addLayout(both, 8, 1, 2, 1, Qt.AlignmentFlag.AlignBottom)
         _put(grid, 10, 0, "Results folder of this study", _beside(self.results, change), across=2)
+        find = ActionButton("", "Choose …", height=40)
+        find.setAutoDefault(False)
+        find.clicked.connect(self._choose_firmware)
+        self._firmware_row = QWidget()
+        inside = QGridLayout(self._firmware_row)
+        inside.setContentsMargins(0, 0, 0, 0)
+        inside.setVerticalSpacing(6)
+        hint = "loaded only where it needs it"
+        _put(inside, 1, 0, "Falcon's firmware", _beside(self.firmware, find), hint=hint)
+        grid.addWidget(self._firmware_row, 12, 0, 1, 2)
+        self._firmware_row.setVisible(self._takes_firmware)
         column.addLayout(grid)
         column.addSpacing(10)
         column.addWidget(Rule())
@@ -192,6 +219,23 @@ class NewSessionDialog(QDialog):
         chosen = QFileDialog.getExistingDirectory(self, "Results folder of this study", self.results.text())
         if chosen:
             self.results.setText(chosen)
+
+    def _choose_firmware(self) -> None:
+        chosen, _ = QFileDialog.getOpenFileName(
+            self, "Falcon's firmware", self.firmware.text(), "Firmware (*.bin);;All files (*)"
+        )
+        if chosen:
+            self.firmware.setText(chosen)
+
+    @property
+    def _takes_firmware(self) -> bool:
+        return kind_of(self.device.currentData()) == NEEDS_FIRMWARE
+
+    def _choose_device(self) -> None:
+        """Ask for firmware where the device may need it, and for another folder where nobody feels it."""
+        self._firmware_row.setVisible(self._takes_firmware)
+        self._suggest_folder()
+        self._check()
 
     def _suggest_folder(self) -> None:
         """Keep pilots and a simulated hand's sessions apart, unless the operator chose a folder."""
@@ -228,6 +272,9 @@ class NewSessionDialog(QDialog):
             check_unused(folder, participant, self.session.value())
         except StoreError as error:
             return str(error)
+        firmware = self.firmware.text().strip()
+        if self._takes_firmware and firmware and not Path(firmware).is_file():
+            return f"there is no firmware in {firmware}: choose the file, or leave the field empty"
         return "" if self.seed.hasAcceptableInput() else "the seed is a whole number from 0 to 2147483647"
 
     def _offer_ways(self) -> None:
@@ -266,7 +313,17 @@ class NewSessionDialog(QDialog):
             screen=self.screen_choice.currentData(),
             results=Path(self.results.text().strip()),
             pilot=self.pilot.isChecked(),
+            firmware=Path(firmware) if self._takes_firmware and (firmware := self.firmware.text().strip()) else None,
         )
+
+
+def _known(device: str) -> str:
+    """Return the device to begin with: the preferred one, or the default where nobody knows it."""
+    try:
+        kind_of(device)
+    except DeviceError:
+        return list_devices()[0]
+    return device
 
 
 def _field(name: str) -> QLineEdit:

@@ -7,9 +7,12 @@ from pathlib import Path
 import pytest
 from PySide6.QtCore import Qt
 
+from study_app.gui import new_session
 from study_app.gui.choices import MAX_SEED, draw_seed
 from study_app.gui.home.facts import study_facts
 from study_app.gui.new_session import NewSessionDialog
+from study_app.gui.screens import ScreenShown
+from study_app.store.machine import MachineSettings
 
 # The platform without a screen cannot limit or raise windows, and says so.
 
@@ -164,3 +167,39 @@ def test_enter_begins_only_what_can_begin(dialog, qtbot):
 def test_every_field_has_a_name_for_those_who_cannot_see_it(dialog):
     fields = (dialog.participant, dialog.session, dialog.seed, dialog.operator, dialog.language, dialog.device)
     assert all(field.accessibleName() for field in (*fields, dialog.screen_choice, dialog.results))
+
+
+def begun_with(qtbot, results, **settings):
+    made = NewSessionDialog(study_facts("rek2024"), results, machine=MachineSettings(**settings))
+    qtbot.addWidget(made)
+    made.open()
+    return made
+
+
+def test_a_session_begins_with_what_is_set_for_this_machine(qtbot, results, tmp_path, monkeypatch):
+    screens = tuple(ScreenShown(n, name, 1920, 1080, 60.0, 1.0, 0, 0) for n, name in ((1, "A"), (2, "B"), (3, "C")))
+    monkeypatch.setattr(new_session, "screens_shown", lambda: screens)
+    firmware = tmp_path / "firmware.bin"
+    firmware.write_bytes(b"x")
+    made = begun_with(qtbot, results, device="falcon", screen="B", screen_number=2, firmware=str(firmware))
+    assert made.firmware.isVisible()
+    chosen = made.chosen()
+    assert (chosen.device, chosen.screen, chosen.firmware) == ("falcon", 2, firmware)
+    made.device.setCurrentIndex(made.device.findData("mouse"))
+    assert not made.firmware.isVisible()
+    assert made.chosen().firmware is None
+
+
+def test_a_falcon_by_its_serial_number_can_be_preferred_and_nobody_knows_a_hammer(qtbot, results):
+    assert begun_with(qtbot, results, device="falcon:FT123").chosen().device == "falcon:FT123"
+    assert begun_with(qtbot, results, device="scripted").chosen().results.name == "rek2024-scripted"
+    assert begun_with(qtbot, results, device="hammer").chosen().device == "mouse"
+
+
+def test_firmware_that_is_not_there_is_refused_as_it_is_typed(qtbot, results, tmp_path):
+    made = begun_with(qtbot, results, device="falcon", firmware=str(tmp_path / "gone.bin"))
+    assert not made.begin.isEnabled()
+    assert "gone.bin" in made.verdict.text()
+    made.firmware.clear()
+    assert made.begin.isEnabled()
+    assert made.chosen().firmware is None

@@ -11,7 +11,8 @@ from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout
 
 from study_app.gui.cards import SHADOW, Card, Chip, Icon
 from study_app.gui.controls import ActionButton
-from study_app.gui.labels import label
+from study_app.gui.devices.view import DeviceShown
+from study_app.gui.labels import label, set_ink
 from study_app.gui.theme import RADIUS_CARD, TANK, font
 
 PICTURE = 56
@@ -19,25 +20,24 @@ WAKE_POINTS = 48
 
 
 class DeviceCard(Card):
-    """What is there to feel with, and the screens."""
+    """What sessions begin with, whether it can be felt with now, and the screens."""
 
     devices_asked = Signal()
     display_asked = Signal()
 
-    def __init__(self, screens: tuple[str, ...]) -> None:
+    def __init__(self) -> None:
         super().__init__(padding=20, gap=8)
-        self.icon = Icon("mouse", "text2", 22)
-        self.name = label("Mouse", "card")
-        self.state = Chip("ok", "check", "Ready", small=True)
+        self.icon = Icon("device", "text2", 22)
+        self.name = label("", "card")
+        self.state = Chip(small=True)
         row = QHBoxLayout()
         row.setSpacing(10)
         row.addWidget(self.icon)
         row.addWidget(self.name, 1)
         row.addWidget(self.state)
         self.column.addLayout(row)
-        self.about = label("Its force is seen, not felt: the ball lags and coasts.", "label", "text2", wraps=True)
-        lines = [self.about, *(label(words, "label", "text2", wraps=True) for words in screens)]
-        for line in lines:
+        self.about, self.why, self.screens = (label("", "label", "text2", wraps=True) for _ in range(3))
+        for line in (self.about, self.why, self.screens):
             line.setFont(font("label", weight=400, tabular=True))
             self.column.addWidget(line)
         self.devices = ActionButton("", "Devices", height=38)
@@ -50,6 +50,20 @@ class DeviceCard(Card):
         buttons.addWidget(self.display, 1)
         self.column.addSpacing(4)
         self.column.addLayout(buttons)
+
+    def show_device(self, shown: DeviceShown) -> None:
+        """Show the device that sessions begin with, as it was found."""
+        self.icon.show_icon(shown.icon, "text2")
+        self.name.setText(shown.title)
+        self.state.show_state(shown.tone, shown.sign, shown.word)
+        for line, words in ((self.about, shown.can), (self.why, shown.why)):
+            line.setText(words)
+            line.setVisible(bool(words))
+        set_ink(self.why, "warn" if shown.tone == "warn" else "bad" if shown.tone == "bad" else "text2")
+
+    def show_screens(self, lines: tuple[str, ...]) -> None:
+        """Show a line for each screen."""
+        self.screens.setText("\n".join(lines))
 
 
 class LabCard(Card):

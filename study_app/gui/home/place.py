@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
@@ -9,10 +10,12 @@ from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QBoxLayout, QFileDialog, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
 
+from study_app.devices import kind_of
 from study_app.errors import StudyError
 from study_app.gui.cards import SHADOW
 from study_app.gui.choices import resumed
 from study_app.gui.controls import ActionButton
+from study_app.gui.devices.view import DeviceShown, looking
 from study_app.gui.home.banner import ResumeBanner
 from study_app.gui.home.beside import DeviceCard, LabCard
 from study_app.gui.home.cards import BrokenCard, CardGrid, StudyCard
@@ -30,8 +33,10 @@ from study_app.gui.home.table import SessionsCard
 from study_app.gui.labels import label
 from study_app.gui.new_session import NewSessionDialog
 from study_app.gui.place import Place
+from study_app.gui.screens import screens_shown
 from study_app.gui.sessions.facts import sessions
 from study_app.gui.themed import dress
+from study_app.store.machine import DEFAULTS, MachineSettings
 
 STACKED_BELOW = 1080
 BESIDE = 326
@@ -51,13 +56,14 @@ class HomePlace(Place):
     def __init__(self, results: Path) -> None:
         super().__init__()
         self.results = results
+        self.machine = DEFAULTS
         self.dialog: NewSessionDialog | RehearsalDialog | None = None
         self._sources = list(sources())
         self._facts: list[StudyFacts | BrokenFacts] = []
         self.banner = ResumeBanner()
         self.grid = CardGrid()
         self.sessions = SessionsCard()
-        self.device = DeviceCard(_screens(self))
+        self.device = DeviceCard()
         self.lab = LabCard()
         self.open_protocol = ActionButton("file", "Open protocol …")
         self._lay_out()
@@ -68,9 +74,17 @@ class HomePlace(Place):
         self.device.display_asked.connect(lambda: self.go_asked.emit("machine"))
         self.lab.lab_asked.connect(lambda: self.go_asked.emit("lab"))
         self.show_studies()
+        self.show_machine(DEFAULTS, looking(DEFAULTS.device))
+
+    def show_machine(self, settings: MachineSettings, device: DeviceShown) -> None:
+        """Begin sessions with what is set for this machine; ``device`` is the preferred one as it was found."""
+        self.machine = settings
+        self.device.show_device(device)
+        self.device.show_screens(_screens(settings))
 
     def enter(self) -> None:
-        """Read the results folder again, once the window stands."""
+        """Read the results folder again, once the window stands; screens may have come and gone."""
+        self.device.show_screens(_screens(self.machine))
         QTimer.singleShot(0, self, self.show_sessions)
 
     def _lay_out(self) -> None:
@@ -140,15 +154,22 @@ class HomePlace(Place):
 
     def ask_for_session(self, facts: StudyFacts) -> None:
         """Open the questions before a session; ``session_asked`` carries the answers."""
-        dialog = NewSessionDialog(facts, self.results, theme=self.theme, parent=self)
+        dialog = NewSessionDialog(facts, self.results, machine=self.machine, theme=self.theme, parent=self)
         self._open(dialog)
         dialog.accepted.connect(lambda: self.session_asked.emit(dialog.chosen()))
 
     def _resume(self, session: Interrupted) -> None:
         """Ask to go on with a session as it was begun, on the screens there are now."""
         try:
-            alone = len(self.screen().virtualSiblings()) == 1
-            self.session_asked.emit(resumed(session.folder, protocol=session.source, windowed=alone))
+            names = [screen.name for screen in screens_shown()]
+            chosen = resumed(
+                session.folder,
+                protocol=session.source,
+                windowed=len(names) == 1,
+                screen=self.machine.screen_among(names),
+            )
+            real = kind_of(chosen.device) == "falcon"
+            self.session_asked.emit(replace(chosen, firmware=self.machine.firmware_file if real else None))
         except StudyError as error:
             self.told.emit("The session cannot go on", f"{error}.")
 
@@ -186,11 +207,14 @@ class HomePlace(Place):
         self._arrange()
 
 
-def _screens(window: QWidget) -> tuple[str, ...]:
-    """Return a line for each screen: size, rate and scaling."""
-    screens = window.screen().virtualSiblings()
+def _screens(settings: MachineSettings) -> tuple[str, ...]:
+    """Return a line for each screen: whose it is, size, rate and scaling."""
+    screens = screens_shown()
+    participants = settings.screen_among([screen.name for screen in screens])
     return tuple(
-        f"Screen {number}: {screen.size().width()} × {screen.size().height()}, {screen.refreshRate():.0f} Hz, "
-        f"{screen.devicePixelRatio():.0%}".replace("%", " %")
-        for number, screen in enumerate(screens, start=1)
+        f"{_whose(screen.number, participants, alone=len(screens) == 1)}: {screen.words}" for screen in screens
     )
+
+
+def _whose(number: int, participants: int, *, alone: bool) -> str:
+    return f"Participant's screen {number}" if number == participants and not alone else f"Screen {number}"

@@ -6,6 +6,8 @@ import pytest
 from PySide6.QtCore import QPoint, QProcess, Qt
 from PySide6.QtWidgets import QLabel, QPushButton
 
+from study_app.devices.backends import NONE, Backend
+from study_app.gui.devices.view import devices_shown
 from study_app.gui.home import HomePlace
 from study_app.gui.home.cards import BrokenCard, StudyCard
 from study_app.gui.home.facts import study_facts
@@ -14,6 +16,7 @@ from study_app.gui.main_window import LEAST, MainWindow
 from study_app.gui.theme import DARK
 from study_app.protocol.load import load, source_bytes
 from study_app.store.exclusions import exclude
+from study_app.store.machine import MachineSettings
 from study_app.store.session import begin
 
 # The platform without a screen cannot limit or raise windows, and says so.
@@ -217,3 +220,13 @@ def test_cancelling_a_rehearsal_stops_it(qtbot, tmp_path, monkeypatch):
     qtbot.mouseClick(dialog.cancel, Qt.MouseButton.LeftButton)
     assert dialog.process.state() == QProcess.ProcessState.NotRunning
     assert not dialog.isVisible()
+
+
+def test_the_preferred_device_is_shown_as_it_was_found_and_sessions_begin_with_it(home, qtbot):
+    (falcon,) = devices_shown([Backend("falcon", "libusb 1.0", NONE, "felt, up to 8 N", "plug its cable in")])
+    home.show_machine(MachineSettings(device="falcon"), falcon)
+    card = home.device
+    assert (card.name.text(), card.icon.name, card.state.word) == ("Novint Falcon", "device", "Not connected")
+    assert (card.about.text(), card.why.text()) == ("Felt, up to 8 N.", "Plug its cable in.")
+    qtbot.mouseClick(study_cards(home)[0].new, Qt.MouseButton.LeftButton)
+    assert home.dialog.chosen().device == "falcon"
