@@ -452,7 +452,8 @@ def test_the_preflight_is_told_before_anything_is_created(short_demo, results):
     person.deleteLater()
     names = [line[9:25].strip() for line, _ in told]
     assert names == [
-        "Device", "Servo rate", "Servo lateness", "Visual delay", "Screen", "Results folder", "Free space", "Blinding"
+        "Device", "Servo rate", "Servo lateness", "Priority", "Visual delay", "Screen", "Results folder", "Free space",
+        "Blinding",
     ]  # fmt: skip
     assert not any(there for _, there in told)
 
