@@ -49,7 +49,8 @@ def changed(scene: Scene, name: str, value: Value) -> Scene:
         if value == read(scene, name):
             return scene
         return override_all(scene, {f"liquid.{place}": _begun(scene, str(value))})
-    return override_all(scene, {name: value})
+    by_hand = _named(scene) if name == "drag.law" else {}  # the gate would choose another
+    return override_all(scene, by_hand | {name: value})
 
 
 def _checked(it: Parameter, value: Value) -> Value:

@@ -216,7 +216,7 @@ def value_of(scene: Scene, name: str) -> Value:
         if not field:
             return AUTO if liquid.effects == "auto" else ON
         return ON if field in resolve(scene).liquids[0].effects else OFF
-    found = read(scene, name)
+    found = resolve(scene).liquids[0].drag.law if name == "drag.law" else read(scene, name)
     if found is None and name == "local_wake.reach_m":
         return scene.body.diameter_m
     if found is None and place == "motion":
