@@ -6,7 +6,7 @@ It draws an ``OperatorView`` and two plots, and says what the operator asks for;
 from __future__ import annotations
 
 from PySide6.QtCore import QSize, Signal
-from PySide6.QtGui import QCloseEvent
+from PySide6.QtGui import QCloseEvent, QGuiApplication
 from PySide6.QtWidgets import QMainWindow
 
 from study_app.gui.dialogs import Notice
@@ -174,6 +174,7 @@ class OperatorWindow(QMainWindow):
         """Say something in one sentence, with one button."""
         notice = Notice(self, self.theme, title, sentence)
         notice.finished.connect(notice.deleteLater)
+        notice.finished.connect(self._take_keyboard)
         notice.show()
 
     def ask_to_end(self) -> None:
@@ -210,6 +211,12 @@ class OperatorWindow(QMainWindow):
         if self.question is not None:
             self.question.deleteLater()
         self.question = None
+        self._take_keyboard()
+
+    def _take_keyboard(self) -> None:
+        """Take the keyboard where a dialog left it to nobody: Esc must be heard, with no window manager too."""
+        if QGuiApplication.focusWindow() is None:
+            self.activateWindow()
 
     def _change_theme(self) -> None:
         self.theme = LIGHT if self.theme.dark else DARK

@@ -135,6 +135,18 @@ def test_a_question_that_goes_with_the_press_ends_no_hold(bridge: Bridge, world:
     qtbot.waitUntil(lambda: not world.force_is_on)
 
 
+@pytest.mark.parametrize("open_", [ending, told], ids=lambda one: one.__name__)
+def test_a_dialog_that_goes_leaves_the_keyboard_to_somebody(
+    bridge: Bridge, world: World, qtbot: Any, open_: Callable[[Bridge], QWidget]
+) -> None:
+    begin_trial(bridge, world)
+    in_focus(open_(bridge), qtbot)
+    QTest.keyClick(QGuiApplication.focusWindow(), ESC)
+    qtbot.waitUntil(lambda: QGuiApplication.focusWindow() is not None)
+    QTest.keyPress(QGuiApplication.focusWindow(), ESC)
+    qtbot.waitUntil(lambda: not world.force_is_on)
+
+
 def test_a_window_that_comes_forward_ends_no_hold(bridge: Bridge, world: World, qtbot: Any) -> None:
     begin_trial(bridge, world)
     handle = in_focus(bridge.participant, qtbot)
