@@ -21,6 +21,7 @@ from study_app.gui.lab.readings import CostCard, ErrorCard, LimiterCard
 from study_app.gui.lab.switch import KEY
 from study_app.gui.lab.tank import LabTank
 from study_app.gui.lab.view import LabView
+from study_app.gui.place import Place
 from study_app.gui.theme import SPACE
 
 FORM_WIDTH, FORM_WIDTH_NARROW, SIDE_WIDTH = 404, 380, 300
@@ -30,7 +31,7 @@ GAP = 14
 SUFFIX = ".toml"
 
 
-class LabPlace(QWidget):
+class LabPlace(Place):
     """The lab as a place of the operator's window.
 
     ``changed(name, value, held)`` is a parameter of the felt side in SI, ``held`` while its slider is dragged;
@@ -195,6 +196,10 @@ class LabPlace(QWidget):
         if event.type() == QEvent.Type.WindowDeactivate:
             self.tank.let_go()
         return super().event(event)
+
+    def wants_narrow_rail(self) -> bool:
+        """Return that it does: parameters, tank and readings stand side by side."""
+        return True
 
     def showEvent(self, event: QShowEvent) -> None:  # noqa: N802 - Qt's name
         """Watch for Esc held, whichever part has the focus, and say that the lab is entered."""
