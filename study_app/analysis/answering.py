@@ -1,0 +1,224 @@
+"""What the analyst's process does with an order; what it finds it tells piece by piece, the quickest first."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
+
+from study_app.analysis.analyst import (
+    Answer,
+    Done,
+    FigureDrawn,
+    FindStudies,
+    LeaveOut,
+    OpenKey,
+    Order,
+    Progress,
+    ReadStudy,
+    SessionsFound,
+    Stopped,
+    StudiesFound,
+    StudyAt,
+    StudyFound,
+    WriteReport,
+    WriteTables,
+)
+from study_app.errors import StoreError
+from study_app.store import blinding, receipt
+from study_app.store.atomic import cannot_read
+from study_app.store.exclusions import exclude, exclusions
+from study_app.store.layout import StudyFolder
+from study_app.store.participants import participants
+
+if TYPE_CHECKING:
+    from study_app.analysis.questions import Block
+    from study_app.analysis.tables import Study
+
+# The libraries of an evaluation are loaded where they are needed: sessions are listed before.
+
+Tell: TypeAlias = Callable[[Answer], object]
+
+TITLES: Final = {"recognition": "What each liquid was named", "movement": "Reaching over added delay"}
+EVALUATION: Final = 0.7
+"""The share of an evaluation in what comes after the first figures; the rest is drawing."""
+
+
+def carry_out(order: Order, tell: Tell, stop: Callable[[], bool]) -> Done:
+    """Carry out an order; ``stop`` is asked again and again whether to give up.
+
+    Raises
+    ------
+    StudyError
+        It cannot be carried out, or was given up; nothing was half-done.
+    """
+    match order:
+        case FindStudies():
+            tell(StudiesFound(tuple(_studies(order.results))))
+        case ReadStudy():
+            _read(order.folder, tell, stop)
+        case LeaveOut():
+            exclude(order.folder, order.participant, order.session, trial=order.trial, by=order.by, reason=order.reason)
+        case OpenKey():
+            blinding.reveal(order.folder, by=order.by, reason=order.reason)
+        case WriteTables():
+            return _write_tables(order, tell, stop)
+        case WriteReport():
+            return _write_report(order, tell, stop)
+    return Done()
+
+
+def _studies(results: Path) -> Iterator[StudyAt]:
+    """Yield the studies' folders under ``results``, which need not exist."""
+    try:
+        folders = sorted(path for path in results.iterdir() if (path / "data").is_dir())
+    except FileNotFoundError:
+        return
+    except OSError as error:
+        raise cannot_read(results, error) from error
+    for folder in folders:
+        sessions = StudyFolder(folder).sessions()
+        first: dict[str, Any] = {}
+        if sessions:
+            with contextlib.suppress(StoreError):  # said when the study is read
+                first = receipt.read(sessions[0].receipt)
+        begun = [_changed(session.path) for session in sessions]
+        yield StudyAt(folder, bool(first.get("simulated")), bool(first.get("pilot")), max(begun, default=0.0))
+
+
+def _changed(path: Path) -> float:
+    with contextlib.suppress(OSError):
+        return path.stat().st_mtime
+    return 0.0
+
+
+def _read(folder: Path, tell: Tell, stop: Callable[[], bool]) -> None:
+    """Tell of the sessions, then of the study, then draw; once the key is open, evaluate and draw the rest."""
+    from study_app.analysis.tables import load_study  # noqa: PLC0415
+
+    tell(Progress("reading sessions", 0.0))
+    opened = blinding.reveals(folder)
+    rows = tuple(participants(StudyFolder(folder)))
+    tell(SessionsFound(folder, rows, exclusions(folder), opened[-1] if opened else None))
+    _go_on(stop)
+    tell(Progress("reading answers", 0.1))
+    study = load_study(folder)
+    tell(_study_found(study))
+    _go_on(stop)
+    from study_app.analysis import captions, figures  # noqa: PLC0415
+
+    for number, block in enumerate(study.blocks):
+        tell(Progress("drawing", 0.3 + 0.7 * number / len(study.blocks)))
+        if len(study.answers(block)):
+            svg = figures.render(study, block, "svg")
+            tell(FigureDrawn(_name(study, block), captions.title(block), captions.caption(study, block), svg))
+        else:
+            tell(FigureDrawn(_name(study, block), captions.title(block), "No completed session has answers here yet."))
+        _go_on(stop)
+    if study.revealed and study.n:
+        _evaluate(study, tell, stop)
+
+
+def _study_found(study: Study) -> StudyFound:
+    from study_app.analysis import style  # noqa: PLC0415
+
+    trials: dict[tuple[str, int], dict[int, str]] = {}
+    main = study.trials[study.trials["phase"] == "main"]
+    titles = {block.id: (block.title, {one.code: block.name(one) for one in block.settings}) for block in study.blocks}
+    for participant, session, trial, block, code in main[
+        ["participant", "session", "trial", "block", "code"]
+    ].itertuples(index=False):
+        title, names = titles.get(block, (block, {}))
+        trials.setdefault((str(participant), int(session)), {})[int(trial)] = f"{title}, {names.get(code, code)}"
+    return StudyFound(
+        name=study.name,
+        title=study.title,
+        n=study.n,
+        blocks=len(study.blocks),
+        revealed=study.revealed,
+        trials={session: tuple(sorted(held.items())) for session, held in trials.items()},
+        doubts=tuple(map(str, study.doubts)),
+        colours={
+            "text": style.TEXT,
+            "text2": style.TEXT_SOFT,
+            "text3": style.AXIS,
+            "grid": style.GRID,
+            "border": style.BORDER,
+            "accent": style.ACCENT,
+            "band": style.BAND,
+            "ctl": style.PARTICIPANT,
+            "warn": style.WARN,
+            "warn_bg": style.WARN_GROUND,
+            "sunk": style.SEALED_GROUND,
+            "hover": "#f4f6f8",
+        },
+    )
+
+
+def _evaluate(study: Study, tell: Tell, stop: Callable[[], bool]) -> None:
+    """Test everything, then draw again what that adds to, and what only then can be drawn."""
+    from study_app.analysis.evaluate import evaluate  # noqa: PLC0415
+    from study_app.analysis.report.pictures import pictures  # noqa: PLC0415
+
+    def going(what: str, share: float) -> None:
+        _go_on(stop)
+        tell(Progress(what, share))
+
+    going("testing", 0.0)
+    results = evaluate(study, progress=lambda what, share: going(what, EVALUATION * share))
+    for drawn, picture in enumerate(pictures(study, results), start=1):
+        title = _title(study, picture.name)
+        tell(FigureDrawn(picture.name, title, picture.caption, picture.files["svg"]))
+        going("drawing", EVALUATION + (1 - EVALUATION) * min(1.0, drawn / 4))
+
+
+def _title(study: Study, name: str) -> str:
+    from study_app.analysis import captions  # noqa: PLC0415
+
+    blocks = {_name(study, block): captions.title(block) for block in study.blocks}
+    return blocks.get(name) or TITLES.get(name.partition("-")[0], name.capitalize())
+
+
+def _name(study: Study, block: Block) -> str:
+    """Return the name of a block's figure of answers, as a report's files have it."""
+    return f"{block.kind}-{block.id}" if len(study.blocks_of(block.kind)) > 1 else block.kind
+
+
+def _write_tables(order: WriteTables, tell: Tell, stop: Callable[[], bool]) -> Done:
+    """Do what ``analysis.export.export`` does, and ask between its steps whether to give up."""
+    from study_app.analysis import spss  # noqa: PLC0415
+    from study_app.analysis.export import export_files  # noqa: PLC0415
+    from study_app.analysis.output import write_files  # noqa: PLC0415
+    from study_app.analysis.tables import load_study  # noqa: PLC0415
+
+    if "sav" in order.extras:
+        spss.require()
+    tell(Progress("reading", 0.0))
+    study = load_study(order.folder)
+    _go_on(stop)
+    tell(Progress("making the tables", 0.3))
+    files = export_files(study, order.extras)
+    _go_on(stop)
+    tell(Progress("writing", 0.9))
+    warnings: list[str] = []
+    written = write_files(order.to, files)
+    study.tell_doubts(warnings.append)
+    return Done(written, tuple(warnings))
+
+
+def _write_report(order: WriteReport, tell: Tell, stop: Callable[[], bool]) -> Done:
+    from study_app.analysis.report.writing import report  # noqa: PLC0415
+
+    warnings: list[str] = []
+
+    def going(what: str, share: float) -> None:
+        _go_on(stop)
+        tell(Progress(what, share))
+
+    return Done(report(order.folder, order.to, progress=going, warn=warnings.append), tuple(warnings))
+
+
+def _go_on(stop: Callable[[], bool]) -> None:
+    if stop():
+        raise Stopped("stopped; nothing was written")

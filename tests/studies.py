@@ -1,0 +1,24 @@
+"""Small rehearsed studies with journals, receipts and a sealed key, made without a servo."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from study_app.protocol.load import load
+from study_app.session.answers_only import rehearse_answers
+from study_app.session.feelings import Feelings, Felt
+
+
+def made_up(name: str) -> Feelings:
+    """What every condition of a study feels like, told apart by force and delay alone."""
+    study = load(name)
+    return {
+        (block.id, condition): (Felt(0.5 + 0.4 * number, 4.0, 0.1, 0.02, 0.03, study.delay_s(condition)),)
+        for block in study.blocks.values()
+        for number, condition in enumerate(block.conditions)
+    }
+
+
+def rehearsed(results: Path, name: str = "demo", *, people: int = 3) -> Path:
+    """Rehearse answers of a study under a results folder; return the study's folder."""
+    return rehearse_answers(name, participants=people, seed=1, results=results / name, felt=made_up(name))
