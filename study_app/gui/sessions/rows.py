@@ -28,8 +28,8 @@ STATUS: dict[str, tuple[Tone, str, str]] = {
     "unfinished": ("warn", "clock", "Interrupted"),
     "withdrawn": ("neutral", "cross", "Withdrawn"),
     "aborted": ("neutral", "cross", "Ended early"),
-    "broken": ("bad", "warning", "Stopped by fault"),
-    "damaged": ("bad", "warning", "Journal damaged"),
+    "broken": ("bad", "warning", "Fault"),
+    "damaged": ("bad", "warning", "Damaged"),
 }
 VALIDITY: dict[str | None, tuple[Tone, str, str]] = {
     "valid": ("ok", "check", "Valid"),
@@ -98,13 +98,22 @@ class SessionLine(Themed, QWidget):
         }
         grid = columns_of(self, columns)
         for place, column in enumerate(columns):
-            grid.addWidget(made[column.name](), 0, place)
+            cell = made[column.name]()
+            if isinstance(cell, Chip):  # aligned: or its width would hold its column's
+                grid.addWidget(cell, 0, place, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
+            else:
+                grid.addWidget(cell, 0, place)
         words = (facts.participant, facts.study, facts.kind, self.status.word, self.validity.word)
         self.setAccessibleName(", ".join([*filter(None, words), f"{self.answers.text()} answers"]))
         if chosen_from:
             self.setToolTip(f"{facts.name}: began {started_words(facts.started, now)}, {facts.answers} answers")
             self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
             self.setCursor(Qt.CursorShape.PointingHandCursor)
+
+    @property
+    def chosen(self) -> bool:
+        """Whether it is the row that is chosen."""
+        return self._chosen
 
     def choose(self, yes: bool) -> None:
         """Be the row that is chosen, or not any more; the keyboard comes to the chosen one."""
@@ -164,12 +173,17 @@ class SessionRows(Themed, QWidget):
         The sentence in place of rows where there are none.
     chosen_from
         Whether a row can be chosen, by the pointer and by Up and Down.
+    after
+        What Tab leads to the rows from.
     """
 
     picked = Signal(object)
 
-    def __init__(self, columns: Sequence[Column], none: str, *, chosen_from: bool = False) -> None:
+    def __init__(
+        self, columns: Sequence[Column], none: str, *, chosen_from: bool = False, after: QWidget | None = None
+    ) -> None:
         super().__init__()
+        self._after = after
         self._columns = columns
         self._chosen_from = chosen_from
         self._waiting: list[SessionFacts] = []
@@ -215,7 +229,7 @@ class SessionRows(Themed, QWidget):
     @property
     def chosen(self) -> SessionFacts | None:
         """The session whose row is chosen; None where none is."""
-        return next((line.facts for line in self.lines if line._chosen), None)  # noqa: SLF001 - its own rows
+        return next((line.facts for line in self.lines if line.chosen), None)
 
     def show_rows(self, found: Sequence[SessionFacts], now: datetime) -> None:
         """Show these sessions in place of those before."""
@@ -231,7 +245,7 @@ class SessionRows(Themed, QWidget):
         self._matches = matches
         for line in self.lines:
             line.setVisible(matches(line.facts))
-        self._say_none()
+        self._tell_rows()
 
     def _make_more(self) -> None:
         """Make the next rows; the others follow once the window has answered."""
@@ -243,15 +257,21 @@ class SessionRows(Themed, QWidget):
             dress(line, self.theme)
             self._rows.insertWidget(len(self.lines), line)
             line.setVisible(self._matches(facts))
+            before = self.lines[-1] if self.lines else self._after
+            if before is not None:
+                QWidget.setTabOrder(before, line)
             self.lines.append(line)
-        if self._chosen_from and made and self.lines[0].facts is made[0]:
-            self.lines[0].setFocusPolicy(Qt.FocusPolicy.StrongFocus)  # the keyboard's way in
-        self._say_none()
+        self._tell_rows()
         if self._waiting:
             self._later.start(0)
 
-    def _say_none(self) -> None:
-        self.none.setVisible(not self._waiting and not any(not line.isHidden() for line in self.lines))
+    def _tell_rows(self) -> None:
+        """Keep a way in for the keyboard among the rows that are shown; where there is none, say so."""
+        shown = [line for line in self.lines if not line.isHidden()]
+        self.none.setVisible(not self._waiting and not shown)
+        reached = any(line.focusPolicy() & Qt.FocusPolicy.TabFocus for line in shown)
+        if self._chosen_from and shown and not reached:
+            shown[0].setFocusPolicy(Qt.FocusPolicy.StrongFocus)
 
     def _choose(self, chosen: SessionLine) -> None:
         for line in self.lines:

@@ -1,0 +1,63 @@
+"""Values that the results window is tested with."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from study_app.gui.results.view import FigureShown, LeftOut, ResultsView, StudyChoice
+from study_app.gui.sessions.facts import SessionFacts
+
+COLOURS = {"text": "#13202c", "accent": "#0b65a3", "grid": "#e6ebef", "band": "#c8dded"}
+SVG = b"""<?xml version="1.0"?>
+<svg xmlns="http://www.w3.org/2000/svg" width="200pt" height="100pt" viewBox="0 0 200 100" version="1.1">
+<path d="M 0 0 L 200 0 L 200 100 L 0 100 z" id="paper" style="fill: #ffffff"/>
+<path d="M 0 20 L 200 20" style="fill: none; stroke: #e6ebef"/>
+<path d="M 0 30 L 200 30" style="fill: none; stroke: #0b65a3"/>
+<path d="M 50 40 L 150 40 L 150 60 L 50 60 z" id="level7" style="fill: #02256d; stroke: #ffffff"/>
+<path d="M 50 70 L 150 70 L 150 90 L 50 90 z" id="shade" style="fill: #0b65a3; fill-opacity: 0.3"/>
+<text x="60" y="55" style="font-family: 'Inter', sans-serif; fill: #ffffff" id="white">7</text>
+<text x="5" y="15" style="font-family: 'Inter', sans-serif; fill: #13202c" id="ink">A</text>
+</svg>
+"""
+STUDY = Path("results/rek2024")
+
+
+def facts(participant: str, **changes: Any) -> SessionFacts:
+    held: dict[str, Any] = {
+        "participant": participant,
+        "session": 1,
+        "study": "rek2024",
+        "started": datetime(2026, 11, 18, 9, 30, tzinfo=UTC),
+        "status": "completed",
+        "validity": "valid",
+        "answers": 62,
+        "answers_of": None,
+        "simulated": True,
+        "pilot": False,
+        "folder": STUDY / participant,
+        "excluded": None,
+    }
+    return SessionFacts(**(held | changes))
+
+
+def view(**changes: Any) -> ResultsView:
+    people = [facts("P007", status="unfinished", validity=None), *(facts(f"P{number:03d}") for number in range(1, 7))]
+    held: dict[str, Any] = {
+        "studies": (StudyChoice(STUDY, "simulated"), StudyChoice(Path("results/demo"))),
+        "chosen": STUDY,
+        "sessions": tuple(people),
+        "sealed": True,
+        "trials": {("P001", 1): ((2, "Part 1, L2"), (3, "Part 1, L1"))},
+        "figures": (
+            FigureShown("liquids", "Agreement for each setting", "Agreement with nine statements.", SVG),
+            FigureShown("delays", "Answers by delay setting", "Agreement with five statements.", SVG),
+        ),
+        "colours": COLOURS,
+        "exclusions_file": STUDY / "exclusions.csv",
+    }
+    return ResultsView(**(held | changes))
+
+
+LEFT_OUT = LeftOut("P003, trial 4", "AK", "phone rang", datetime(2026, 11, 19, tzinfo=UTC))
