@@ -53,6 +53,7 @@ class Opened:
         return [event.value for event in self.told if isinstance(event, Chosen)]
 
     def close(self) -> None:
+        QTest.mouseMove(self.window, QPoint(1, 1))  # or the next test's page comes with the mouse on a cell
         self.window.may_close = True
         self.window.close()
 
@@ -144,6 +145,20 @@ def test_all_is_answered_by_touch_alone(opened: Opened, finger: QPointingDevice)
     tap(finger, opened.page.button)
     assert opened.values == [*GIVEN, 2]
     assert isinstance(opened.told[-1], Submitted)
+
+
+def test_a_finger_that_is_lifted_points_at_nothing(opened: Opened, finger: QPointingDevice) -> None:
+    fixed = opened.page.heading
+    tap(finger, opened.page.rows[2].cells[1])
+    assert opened.page.heading == fixed
+    assert not any(cell._pointed for row in opened.page.rows for cell in row.cells)
+
+
+def test_a_click_leaves_the_label_of_the_column_that_the_mouse_is_on(opened: Opened) -> None:
+    cell = opened.page.rows[4].cells[1]
+    QTest.mouseMove(cell)
+    QTest.mouseClick(cell, Qt.MouseButton.LeftButton)
+    assert "Mostly disagree" in opened.page.heading
 
 
 def test_touch_names_what_is_missing_and_goes_from_part_to_part(qtbot: Any, finger: QPointingDevice) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QEvent, QPoint, QRectF, Qt, Signal
-from PySide6.QtGui import QColor, QEnterEvent, QFontMetricsF, QPainter, QPaintEvent, QPen
+from PySide6.QtGui import QColor, QEnterEvent, QFontMetricsF, QInputDevice, QMouseEvent, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QRadioButton, QWidget
 
 from study_app.gui.icons import draw_icon
@@ -65,6 +65,12 @@ class Cell(QRadioButton):
         """Tell that it is no longer."""
         super().leaveEvent(event)
         self.left.emit()
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:  # noqa: N802
+        """Let a finger that is lifted point at nothing any more."""
+        super().mouseReleaseEvent(event)
+        if event.device().type() == QInputDevice.DeviceType.TouchScreen:
+            self.left.emit()
 
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802
         """Draw the cell."""

@@ -261,6 +261,8 @@ class Row(QGroupBox):
         say(self.cells[self._wandering], self.cells[self._wandering].accessibleName())
 
     def _wander(self, column: int) -> None:
+        if column == self._wandering:
+            return
         self._wandering = column
         for cell in self.cells:
             cell.point(cell.column == column)
