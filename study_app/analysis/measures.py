@@ -119,7 +119,10 @@ def by_participant(answers: pd.DataFrame, participants: Sequence[str], codes: Se
     values = np.full((len(participants), len(codes)), np.nan)
     rows = {participant: row for row, participant in enumerate(participants)}
     columns = {code: column for column, code in enumerate(codes)}
-    for key, group in chosen.groupby(["participant", "code"]):
-        participant, code = (str(part) for part in key)
-        values[rows[participant], columns[code]] = np.median(group["response"].to_numpy(dtype=float))
+    places = [
+        np.array([rows[str(one)] for one in chosen["participant"]], dtype=np.int64),
+        np.array([columns[str(one)] for one in chosen["code"]], dtype=np.int64),
+    ]
+    medians = pd.Series(chosen["response"].to_numpy(dtype=float)).groupby(places).median()
+    values[medians.index.get_level_values(0), medians.index.get_level_values(1)] = medians.to_numpy()
     return values
