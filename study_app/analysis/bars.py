@@ -95,15 +95,12 @@ def draw(
     _legend(sheet, labels, left_pt)
     for place, panel in enumerate(panels):
         row, column = divmod(place, PANELS_A_ROW)
-        top = TOP_PT + row * (row_pt + 12) + HEADER_PT
+        top, x = TOP_PT + row * (row_pt + 12) + HEADER_PT, left_pt + column * panel_pt
         if column == 0:
-            _row_labels(sheet, wrapped, top)
-            sheet.text(MARGIN_PT, top + plot_pt + 10, "counts of answers", size=6.5, colour=style.TEXT_SOFT)
+            _row_labels(sheet, wrapped, top, plot_pt)
         else:
-            x = left_pt + column * panel_pt
             sheet.line((x, x), (top - 14, top + plot_pt + 10), color=style.BORDER, linewidth=0.5)
-        middle = left_pt + column * panel_pt + (panel_pt - widths.total) / 2
-        _panel(sheet, panel, widths, middle, top, plot_pt)
+        _panel(sheet, panel, widths, x + (panel_pt - widths.total) / 2, top, plot_pt)
     return sheet
 
 
@@ -164,11 +161,12 @@ def legend_labels(labels: Sequence[str]) -> list[str]:
     return short if len(set(short[:3])) == 3 and len(set(short[4:])) == 3 else list(labels)
 
 
-def _row_labels(sheet: Sheet, wrapped: Sequence[Sequence[str]], top: float) -> None:
+def _row_labels(sheet: Sheet, wrapped: Sequence[Sequence[str]], top: float, plot_pt: float) -> None:
     for row, lines in enumerate(wrapped):
         middle = top + (row + 0.5) * ROW_PT + 2.7
         for number, line in enumerate(lines):
             sheet.text(MARGIN_PT, middle + (number - (len(lines) - 1) / 2) * 8.4, line, size=LABEL_SIZE)
+    sheet.text(MARGIN_PT, top + plot_pt + 10, "counts of answers", size=6.5, colour=style.TEXT_SOFT)
 
 
 def _panel(sheet: Sheet, panel: Panel, widths: _Widths, x: float, top: float, plot_pt: float) -> None:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from study_app import __version__
-from study_app.analysis.evaluate import evaluate
+from study_app.analysis.evaluate import Progress, evaluate
 from study_app.analysis.export import export_files
 from study_app.analysis.output import write_files
 from study_app.analysis.report import conduct_section, listing, sections, short
@@ -54,26 +55,33 @@ def report(
     StoreError
         The key was opened, and is now missing or changed; or ``exclusions.csv`` cannot be read.
     """
-
-    def going(what: str, share: float) -> None:
-        if cancelled is not None and cancelled():
-            raise AnalysisError("the report was cancelled; nothing was written")
-        if progress is not None:
-            progress(what, share)
-
+    going = partial(_going, progress, cancelled)
     going("reading", 0.0)
     study = load_study(folder)
     if not study.blocks:
         raise AnalysisError(f"{folder}: the study {study.name!r} asks no statements, so there is nothing to report")
     results = evaluate(study, progress=lambda what, share: going(what, 0.1 + 0.6 * share))
-    drawn = []
-    for picture in pictures(study, results):
-        drawn.append(picture)
-        going(f"drawing: {picture.name}", 0.7 + 0.2 * min(1.0, len(drawn) / 4))
+    drawn = list(_drawn(study, results, going))
     going("writing", 0.95)
     written = write_files(Path(to), _files(study, results, drawn))
     study.tell_doubts(warn)
     return written
+
+
+def _going(
+    progress: Callable[[str, float], object] | None, cancelled: Callable[[], bool] | None, what: str, share: float
+) -> None:
+    """Tell what is being done, unless it is to be given up."""
+    if cancelled is not None and cancelled():
+        raise AnalysisError("the report was cancelled; nothing was written")
+    if progress is not None:
+        progress(what, share)
+
+
+def _drawn(study: Study, results: Results, going: Progress) -> Iterator[Picture]:
+    for number, picture in enumerate(pictures(study, results), start=1):
+        going(f"drawing: {picture.name}", 0.7 + 0.2 * min(1.0, number / 4))
+        yield picture
 
 
 def _files(study: Study, results: Results, drawn: Sequence[Picture]) -> dict[str, bytes]:

@@ -110,12 +110,10 @@ def recognition(names: ArrayLike, truth: Sequence[int | None], labels: int, *, s
         Names and truth do not fit together.
     """
     given = _names(names, truth, labels)
-    answered = given != UNANSWERED
-    used = answered.any(axis=1)
+    used = (given != UNANSWERED).any(axis=1)
     right = np.array([UNANSWERED - 1 if label is None else label for label in truth])
     hits = int((given == right).sum())
     chance = total(_chance(row, right) for row in given)
-    table = np.array([[int((column == label).sum()) for label in _columns(labels)] for column in given.T])
     effect, interval, reason = _kappa(given, right, labels, seed)
     n = int(used.sum())
     return Recognition(
@@ -133,11 +131,11 @@ def recognition(names: ArrayLike, truth: Sequence[int | None], labels: int, *, s
         no_interval=reason,
         note=_note(n, int((given == UNDECIDED).sum()), chance.highest),
         expected=chance.mean if n else None,
-        table=tuple(tuple(int(count) for count in row) for row in table),
+        table=tuple(tuple(int((column == label).sum()) for label in _columns(labels)) for column in given.T),
         rates=tuple(_rate(given, setting, label) for setting, label in enumerate(truth) if label is not None),
         decided=int((given >= 0).sum()),
         undecided=int((given == UNDECIDED).sum()),
-        unanswered=int((~answered).sum()),
+        unanswered=int((given == UNANSWERED).sum()),
     )
 
 
