@@ -127,6 +127,10 @@ class ResultsPlace(Place):
         whole.setContentsMargins(0, 0, 0, 0)
         whole.addWidget(self._area)
 
+    def hand_to(self, folder: Path) -> None:
+        """Suggest another folder to write into from now on."""
+        self._handed_to = folder
+
     def enter(self) -> None:
         """Look again at what there is."""
         self.entered.emit()

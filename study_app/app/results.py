@@ -1,0 +1,388 @@
+"""Results: where their place meets the process that reads and evaluates studies.
+
+The process lives while the place is shown; reports and tables are written by one of their own. Nothing here waits.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from datetime import datetime
+from functools import partial
+from pathlib import Path
+from typing import Any, Final
+
+from PySide6.QtCore import QObject, QTimer, QUrl
+from PySide6.QtGui import QDesktopServices
+
+from study_app.analysis.analyst import (
+    Analyst,
+    Answer,
+    Done,
+    FigureDrawn,
+    FindStudies,
+    LeaveOut,
+    OpenKey,
+    Order,
+    Progress,
+    ReadStudy,
+    Refused,
+    SessionsFound,
+    StudiesFound,
+    StudyFound,
+    WriteReport,
+    WriteTables,
+)
+from study_app.gui.results.place import ResultsPlace
+from study_app.gui.results.view import (
+    FigureShown,
+    Going,
+    LeftOut,
+    Opened,
+    ResultsView,
+    StudyChoice,
+    Trouble,
+)
+from study_app.gui.sessions.facts import session_facts
+from study_app.store.exclusions import Exclusion
+from study_app.store.layout import StudyFolder
+
+LISTEN_MS: Final = 40
+PATIENCE_S: Final = 0.3
+"""What takes longer than this says that it goes on."""
+NO_SAV: Final = "Files for SPSS need the package pyreadstat: pip install 'liquid-study[spss]'"
+MISTAKE: Final = Trouble(
+    "The evaluation was ended by a mistake in the program", "The terminal shows where.", "Look again", "again"
+)
+
+
+def open_here(path: Path) -> None:
+    """Open a file or a folder with the program that the system has for it."""
+    QDesktopServices.openUrl(QUrl.fromLocalFile(str(path.resolve())))
+
+
+class ResultsDesk(QObject):
+    """Gives the place of results what it shows, and carries out what is asked for there.
+
+    Parameters
+    ----------
+    results
+        Folder that holds the studies' folders; it need not exist.
+    opener
+        What opens a file or folder for the operator.
+    analyst
+        What begins a process that reads and evaluates.
+    """
+
+    def __init__(
+        self,
+        results: Path,
+        *,
+        opener: Callable[[Path], object] = open_here,
+        analyst: Callable[[], Analyst] = Analyst,
+    ) -> None:
+        super().__init__()
+        self._analyst = analyst
+        self.results = results
+        no_sav = "" if importlib.util.find_spec("pyreadstat") else NO_SAV
+        self.place = ResultsPlace(handed_to=results.resolve().parent, no_sav=no_sav)
+        self.view = ResultsView()
+        self._opener = opener
+        self._reader: Analyst | None = None
+        self._writer: Analyst | None = None
+        self._orders: dict[int, Order] = {}
+        self._since_s = 0.0
+        self._going: Going | None = None
+        self._redrawn: set[str] = set()
+        self._blocks = 0
+        self._listed = False
+        self._listening = QTimer(self)
+        self._listening.setInterval(LISTEN_MS)
+        self._listening.timeout.connect(self._listen)
+        self._connect()
+
+    def _connect(self) -> None:
+        place = self.place
+        place.entered.connect(self.look)
+        place.left.connect(self.close)
+        place.study_asked.connect(self._choose)
+        place.remedy_asked.connect(self._mend)
+        place.leave_out_asked.connect(self._leave_out)
+        place.unblind_asked.connect(self._unblind)
+        place.tables_asked.connect(self._write_tables)
+        place.report_asked.connect(self._write_report)
+        place.stop_asked.connect(self._stop_writing)
+        place.open_asked.connect(self._open)
+
+    @property
+    def busy(self) -> bool:
+        """Whether something was asked for and has not come to its end."""
+        return bool(self._orders) or self._writer is not None
+
+    def show_results(self, results: Path) -> None:
+        """Look for studies elsewhere from now on."""
+        self.results = results
+        self.view = ResultsView()
+        self.place.hand_to(results.resolve().parent)
+        if self._reader is not None:
+            self.look()
+
+    def look(self) -> None:
+        """Look which studies there are, and read the chosen one again."""
+        self._ask(FindStudies(self.results), "looking for studies")
+
+    def close(self) -> None:
+        """End the processes, whatever they are doing."""
+        self._listening.stop()
+        for process in (self._reader, self._writer):
+            if process is not None:
+                process.close()
+        self._reader = self._writer = None
+        self._orders = {}
+        if self.place.writing is not None:
+            self.place.writing.stopped()
+        self._show(drawing=None, testing=None)
+
+    def _ask(self, order: Order, what: str) -> None:
+        if self._reader is None or not self._reader.works:
+            if self._reader is not None:
+                self._reader.close()
+            self._reader = self._analyst()
+            self._orders = {}
+        self._orders[self._reader.order(order)] = order
+        self._since_s = time.monotonic()
+        self._going = Going(what, 0.0)
+        self._listening.start()
+
+    def _listen(self) -> None:
+        """Take what was told since, of the last thing that was asked for; say what goes on where that takes long."""
+        if self._reader is not None and self._orders:
+            works = self._reader.works  # asked before: what a process told before it ended is still heard
+            for number, answer in self._reader.answers():
+                self._take(number, answer)
+            if not works and self._orders:
+                self._orders = {}
+                self._show(trouble=MISTAKE, figures=(), drawing=None, testing=None)
+            elif self._orders and time.monotonic() - self._since_s > PATIENCE_S:
+                self._show_going()
+        self._listen_to_writer()
+        if not self.busy:
+            self._listening.stop()
+
+    def _take(self, number: int, answer: Answer) -> None:
+        order = self._orders.get(number)
+        if order is None:
+            return
+        newest = number == max(self._orders)
+        match answer:
+            case Done():
+                del self._orders[number]
+                self._end(order, newest=newest)
+            case Refused():
+                del self._orders[number]
+                if newest or isinstance(order, (LeaveOut, OpenKey)):
+                    self._refused(order, answer)
+            case Progress() if newest:
+                self._going = Going(answer.what, answer.share)
+            case StudiesFound() if newest:
+                self._take_studies(answer)
+            case SessionsFound() if newest:
+                self._take_sessions(answer)
+            case StudyFound() if newest:
+                self._take_study(answer)
+            case FigureDrawn() if newest:
+                self._take_figure(answer)
+
+    def _take_studies(self, found: StudiesFound) -> None:
+        kinds = {True: "simulated", False: ""}
+        studies = tuple(
+            StudyChoice(one.folder, "pilot" if one.pilot else kinds[one.simulated])  # type: ignore[arg-type]
+            for one in found.studies
+        )
+        there = [one.folder for one in found.studies]
+        chosen = self.view.chosen if self.view.chosen in there else None
+        if chosen is None and there:
+            chosen = max(found.studies, key=lambda one: one.newest_s).folder
+        if chosen is None:
+            sentence = f"The first session of a study makes its folder in {self.results}."
+            self.view = ResultsView(trouble=Trouble("No study yet", sentence, "Go to home", "home"))
+            self.place.show_view(self.view)
+            return
+        self._show(studies=studies)
+        self._read(chosen)
+
+    def _choose(self, folder: Path) -> None:
+        if folder != self.view.chosen:
+            self._read(folder)
+
+    def _read(self, folder: Path) -> None:
+        """Read a study; what is shown of it stays until it is known anew."""
+        if folder != self.view.chosen:
+            self.view = ResultsView(studies=self.view.studies, chosen=folder)
+            self._blocks = 0
+        self._redrawn = set()
+        self._listed = False
+        self._show(trouble=None, untested=False)
+        self._ask(ReadStudy(folder), f"reading {folder.name}")
+
+    def _take_sessions(self, found: SessionsFound) -> None:
+        facts = session_facts(found.folder, found.rows, found.exclusions, {})
+        self._listed = True
+        facts.sort(key=lambda one: (not one.needs_care, one.participant, one.session))
+        reveal = found.reveal
+        self._show(
+            sessions=tuple(facts),
+            left_out=tuple(map(_left_out, found.exclusions)),
+            exclusions_file=StudyFolder(found.folder).exclusions,
+            sealed=reveal is None,
+            opened=None if reveal is None else Opened(_time(reveal.get("at")), *_by_and_why(reveal)),
+        )
+
+    def _take_study(self, found: StudyFound) -> None:
+        self._blocks = found.blocks
+        nothing = Trouble("Nothing to draw", "This study asks no statements.", "Look again", "again")
+        self._show(
+            trials=found.trials,
+            doubts=found.doubts,
+            colours=found.colours,
+            trouble=None if found.blocks else nothing,
+        )
+
+    def _take_figure(self, drawn: FigureDrawn) -> None:
+        """Show a figure in the place of the one before of its name, or below the others."""
+        self._redrawn.add(drawn.name)
+        new = FigureShown(drawn.name, drawn.title, drawn.caption, drawn.svg)
+        there = [figure.name for figure in self.view.figures]
+        figures = [new if figure.name == drawn.name else figure for figure in self.view.figures]
+        self._show(figures=tuple(figures if drawn.name in there else [*figures, new]))
+
+    def _end(self, order: Order, *, newest: bool) -> None:
+        """Show what is there now that an order was carried out."""
+        if isinstance(order, (LeaveOut, OpenKey)):
+            self._read(order.folder)
+        elif isinstance(order, ReadStudy) and newest:
+            kept = tuple(figure for figure in self.view.figures if figure.name in self._redrawn)
+            self._show(figures=kept, drawing=None, testing=None)
+
+    def _refused(self, order: Order, refused: Refused) -> None:
+        sentence = f"{refused.sentence}."
+        if isinstance(order, (LeaveOut, OpenKey)):
+            title = "It was not left out" if isinstance(order, LeaveOut) else "The study is still blinded"
+            self.place.told.emit(title, sentence)
+            self._read(order.folder)  # it may have changed meanwhile, and what was being read was given up
+        elif refused.stopped:
+            all_drawn = self._blocks and len(self._redrawn) >= self._blocks
+            trouble = None if all_drawn else Trouble("Stopped", "The figures are not drawn yet.", "Go on", "read")
+            self._show(untested=bool(all_drawn), trouble=trouble, drawing=None, testing=None)
+        elif isinstance(order, FindStudies):
+            trouble = Trouble("The results folder cannot be read", sentence, "Look again", "again")
+            self.view = ResultsView(trouble=trouble)
+            self.place.show_view(self.view)
+        elif self._listed and not self.view.sessions:
+            sentence = "Results appear once the first session has begun."
+            trouble = Trouble("No session yet", sentence, "Go to home", "home")
+            self._show(trouble=trouble, figures=(), drawing=None, testing=None)
+        else:
+            trouble = Trouble("The study cannot be read", sentence, "Look again", "again")
+            self._show(trouble=trouble, figures=(), drawing=None, testing=None)
+
+    def _show_going(self) -> None:
+        if self._blocks and len(self._redrawn) >= self._blocks:
+            self._show(testing=self._going, drawing=None)
+        else:
+            self._show(drawing=self._going, testing=None)
+
+    def _show(self, **changes: Any) -> None:
+        view = replace(self.view, **changes)
+        if view != self.view:
+            self.view = view
+            self.place.show_view(view)
+
+    def _mend(self, remedy: str) -> None:
+        if remedy == "stop":
+            if self._reader is not None:
+                self._reader.stop()
+        elif remedy == "read" and self.view.chosen is not None:
+            self._read(self.view.chosen)
+        else:
+            self._show(trouble=None)
+            self.look()
+
+    def _leave_out(self, asked: tuple[str, int, int | None, str, str]) -> None:
+        if self.view.chosen is not None:
+            self._ask(LeaveOut(self.view.chosen, *asked), "leaving out")
+
+    def _unblind(self, by: str, reason: str) -> None:
+        if self.view.chosen is not None:
+            self._ask(OpenKey(self.view.chosen, by, reason), "opening the key")
+
+    def _write_tables(self, to: Path, extras: tuple[str, ...]) -> None:
+        if self.view.chosen is not None:
+            self._write(WriteTables(self.view.chosen, to, extras))
+
+    def _write_report(self, to: Path, _extras: tuple[str, ...]) -> None:
+        if self.view.chosen is not None:
+            self._write(WriteReport(self.view.chosen, to))
+
+    def _write(self, order: WriteTables | WriteReport) -> None:
+        self._writer = self._analyst()
+        self._writer.order(order)
+        self._opens = partial(_what_to_open, order)
+        self._listening.start()
+
+    def _stop_writing(self) -> None:
+        if self._writer is not None:
+            self._writer.stop()
+
+    def _listen_to_writer(self) -> None:
+        """Pass on how far it is; where it has come to its end, end the process."""
+        dialog = self.place.writing
+        if self._writer is None:
+            return
+        works = self._writer.works
+        last: Done | Refused | None = None if works else Refused("the program that writes was ended by a mistake in it")
+        for _, answer in self._writer.answers():
+            if isinstance(answer, Progress) and dialog is not None:
+                dialog.show_progress(answer.what, answer.share)
+            elif isinstance(answer, (Done, Refused)):
+                last = answer
+        if last is None:
+            return
+        self._writer.close()
+        self._writer = None
+        if dialog is None:
+            return
+        if isinstance(last, Done):
+            dialog.show_written(last.files, self._opens(last.files), last.warnings)
+        elif last.stopped:
+            dialog.stopped()
+        else:
+            dialog.show_refused(last.sentence)
+
+    def _open(self, path: Path) -> None:
+        self._opener(path)
+
+
+def _what_to_open(order: WriteTables | WriteReport, files: tuple[Path, ...]) -> Path:
+    """Return the page of a report, or the folder of tables."""
+    return files[0] if isinstance(order, WriteReport) else order.to
+
+
+def _left_out(row: Exclusion) -> LeftOut:
+    name = row.participant if row.session == 1 else f"{row.participant}, session {row.session}"
+    what = name if row.trial is None else f"{name}, trial {row.trial}"
+    return LeftOut(what, row.rule_or_person, row.reason, _time(row.excluded_at))
+
+
+def _by_and_why(reveal: Mapping[str, str]) -> tuple[str, str]:
+    return str(reveal.get("by", "somebody")), str(reveal.get("reason", "no reason given"))
+
+
+def _time(told: object) -> datetime | None:
+    """Return a time that a file tells, None where it tells none: people may have changed it."""
+    try:
+        return datetime.fromisoformat(str(told))
+    except ValueError:
+        return None

@@ -1,0 +1,335 @@
+"""Results with their real place: rehearsed studies read, unblinded, left out of, exported and reported."""
+
+from __future__ import annotations
+
+import multiprocessing
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from PySide6.QtCore import Qt
+from pytestqt.qtbot import QtBot
+
+from study_app.analysis.analyst import Analyst, Answer, Order, Refused
+from study_app.analysis.answering import carry_out
+from study_app.app.results import ResultsDesk
+from study_app.errors import StudyError
+from study_app.gui.main_window import MainWindow
+from study_app.gui.place import Place
+from study_app.store.blinding import reveals
+from study_app.store.exclusions import exclude, exclusions
+from study_app.store.layout import StudyFolder
+from tests.studies import rehearsed
+
+SOON_MS = 120_000
+"""A process loads its libraries anew, on machines that do other things too."""
+
+
+class Here:
+    """Carries out orders here and at once, in place of a process; tells the answers when it is asked."""
+
+    def __init__(self) -> None:
+        self.told: list[tuple[int, Answer]] = []
+        self.number = 0
+        self.works = True
+        self.stops = False
+        self.closed = False
+
+    def order(self, order: Order) -> int:
+        self.number += 1
+        number = self.number
+        try:
+            last: Answer = carry_out(order, lambda answer: self.told.append((number, answer)), lambda: self.stops)
+        except StudyError as error:
+            last = Refused(str(error), stopped=self.stops)
+        self.told.append((number, last))
+        return number
+
+    def stop(self) -> None:
+        self.stops = True
+
+    def answers(self) -> list[tuple[int, Answer]]:
+        told, self.told = self.told, []
+        return told
+
+    def close(self) -> None:
+        self.closed = True
+
+
+class Opened:
+    """A main window with results, and what was opened from there."""
+
+    def __init__(self, qtbot: QtBot, results: Path, analyst: Callable[[], Any] = Here) -> None:
+        self.qtbot = qtbot
+        self.files: list[Path] = []
+        self.desk = ResultsDesk(results, opener=self.files.append, analyst=analyst)
+        self.place = self.desk.place
+        self.window = MainWindow({"home": Place, "results": lambda: self.place})
+        qtbot.addWidget(self.window)
+        self.window.show()
+        self.window.go("results")
+        self.wait()
+
+    def wait(self) -> None:
+        self.qtbot.waitUntil(lambda: not self.desk.busy, timeout=SOON_MS)
+        cards = self.place.figures.cards
+        self.qtbot.waitUntil(lambda: all(card.drawing is None or card.drawing.settled for card in cards))
+
+    def click(self, button: Any) -> None:
+        self.qtbot.mouseClick(button, Qt.MouseButton.LeftButton)
+
+    def decide(self, button: Any, by: str, reason: str) -> None:
+        self.click(button)
+        dialog: Any = self.place.dialog
+        dialog.by.setText(by)
+        dialog.reason.setText(reason)
+        self.click(dialog.go_on)
+        self.wait()
+
+    @property
+    def titles(self) -> list[str]:
+        return [card.figure.title for card in self.place.figures.cards]
+
+    @property
+    def chips(self) -> list[str]:
+        return [chip.word for chip in self.place.chips]
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return rehearsed(tmp_path_factory.mktemp("results")).parent
+
+
+@pytest.fixture
+def results(whole: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(whole, tmp_path / "results"))
+
+
+@pytest.fixture
+def shown(qtbot: QtBot, results: Path) -> Iterator[Opened]:
+    opened = Opened(qtbot, results)
+    yield opened
+    opened.window.close()
+
+
+def test_a_blinded_study_is_shown_by_code(shown: Opened) -> None:
+    assert shown.chips == ["Simulated participants", "Blinded: shown by code"]
+    assert shown.titles == ["Agreement for each setting", "Answers by delay setting"]
+    drawn = b"".join(card.figure.svg for card in shown.place.figures.cards)
+    assert b">L1<" in drawn
+    assert b">Thick<" not in drawn
+    assert [line.facts.participant for line in shown.place.sessions.rows.lines] == ["P001", "P002", "P003"]
+    assert shown.place.sessions.head.text() == "3 of 3 sessions in the figures"
+    assert shown.desk.view.testing is None
+
+
+def test_unblinding_is_recorded_and_shows_names_at_once(shown: Opened, results: Path) -> None:
+    shown.decide(shown.place.unblind, "AK", "collection closed")
+    (record,) = reveals(results / "demo")
+    assert (record["by"], record["reason"]) == ("AK", "collection closed")
+    assert shown.chips[1].endswith("by AK: collection closed")
+    assert not shown.place.unblind.isVisible()
+    assert shown.titles[:2] == ["Agreement for each liquid", "Answers over added delay"]
+    assert b">Thick<" in shown.place.figures.cards[0].figure.svg
+
+
+def test_leaving_out_changes_foot_figures_and_list(shown: Opened, results: Path) -> None:
+    before = shown.place.figures.cards[0].figure
+    shown.click(shown.place.sessions.rows.lines[1])
+    shown.decide(shown.place.exclusions.leave_out, "AK", "fell asleep")
+    assert [one.what for one in exclusions(results / "demo")] == [("P002", 1, None)]
+    assert shown.place.sessions.head.text() == "2 of 3 sessions in the figures"
+    assert shown.place.sessions.why.text() == "P002 is excluded."
+    assert "fell asleep" in shown.place.exclusions.lines[0].accessibleName()
+    assert shown.place.figures.cards[0].figure != before
+    assert "1 session is excluded (fell asleep)" in shown.place.figures.cards[0].figure.caption
+
+
+def test_what_the_store_refuses_is_said(shown: Opened, results: Path) -> None:
+    exclude(results / "demo", "P001", 1, by="BC", reason="late")  # meanwhile, by another program
+    shown.click(shown.place.sessions.rows.lines[0])
+    shown.decide(shown.place.exclusions.leave_out, "AK", "fell asleep")
+    assert shown.window.notice is not None
+    assert shown.window.notice.windowTitle() == "It was not left out"
+    assert len(exclusions(results / "demo")) == 1
+    assert shown.place.sessions.why.text() == "P001 is excluded."
+
+
+def test_tables_are_written_and_their_folder_opened(shown: Opened, tmp_path: Path) -> None:
+    shown.click(shown.place.export)
+    dialog: Any = shown.place.writing
+    assert Path(dialog.to.text()) == tmp_path / "demo-tables"
+    dialog.extras["wide"].click()
+    shown.click(dialog.go_on)
+    shown.wait()
+    assert (tmp_path / "demo-tables" / "study-demo_description-wide_data.csv").is_file()
+    shown.click(dialog.go_on)
+    assert shown.files == [tmp_path / "demo-tables"]
+    shown.click(dialog.cancel)
+    assert shown.place.writing is None
+
+
+def test_what_cannot_be_written_is_said_in_the_dialog(shown: Opened, tmp_path: Path) -> None:
+    (tmp_path / "taken").write_text("x")
+    shown.click(shown.place.report)
+    dialog: Any = shown.place.writing
+    dialog.to.setText(str(tmp_path / "taken"))
+    shown.click(dialog.go_on)
+    shown.wait()
+    assert "cannot be written" in dialog.said.text()
+    assert dialog.to.isVisible()
+    dialog.reject()
+
+
+def test_with_no_study_there_is_one_sentence_and_the_way_home(qtbot: QtBot, tmp_path: Path) -> None:
+    opened = Opened(qtbot, tmp_path / "none")
+    assert opened.desk.view.trouble is not None
+    assert opened.place.figures.trouble.title.text() == "No study yet"
+    opened.click(opened.place.figures.trouble.button)
+    assert opened.window.here == "home"
+    assert not (tmp_path / "none").exists()
+
+
+def test_a_results_folder_that_is_none_is_told_and_looked_at_again(qtbot: QtBot, results: Path) -> None:
+    aside = results.rename(results.with_name("aside"))
+    results.write_text("x")
+    opened = Opened(qtbot, results)
+    assert opened.place.figures.trouble.title.text() == "The results folder cannot be read"
+    results.unlink()
+    aside.rename(results)
+    opened.click(opened.place.figures.trouble.button)
+    opened.wait()
+    assert len(opened.titles) == 2
+    assert not opened.place.figures.trouble.isVisible()
+
+
+def test_a_study_without_a_session_says_so(qtbot: QtBot, tmp_path: Path) -> None:
+    (tmp_path / "results" / "new" / "data").mkdir(parents=True)
+    opened = Opened(qtbot, tmp_path / "results")
+    assert opened.place.figures.trouble.title.text() == "No session yet"
+    assert not opened.place.report.isEnabled()
+
+
+def test_one_participant_is_enough_for_figures(qtbot: QtBot, tmp_path: Path) -> None:
+    rehearsed(tmp_path / "results", people=1)
+    opened = Opened(qtbot, tmp_path / "results")
+    assert opened.desk.view.trouble is None
+    assert all(card.drawing is not None for card in opened.place.figures.cards)
+    opened.decide(opened.place.unblind, "AK", "closed")
+    assert opened.desk.view.trouble is None
+    assert opened.titles[0] == "Agreement for each liquid"
+
+
+def test_a_damaged_session_is_named_and_the_others_stay_listed(qtbot: QtBot, results: Path) -> None:
+    table = StudyFolder(results / "demo").session("P002", 1).table("demo", "responses")
+    table.write_bytes(table.read_bytes()[:-120])
+    opened = Opened(qtbot, results)
+    trouble = opened.place.figures.trouble
+    assert trouble.title.text() == "The study cannot be read"
+    assert "P002" in trouble.sentence.text()
+    assert len(opened.place.sessions.rows.lines) == 3
+    assert opened.titles == []
+
+
+def test_a_damaged_list_of_exclusions_is_told(qtbot: QtBot, results: Path) -> None:
+    (results / "demo" / "exclusions.csv").write_text("what\n")
+    opened = Opened(qtbot, results)
+    assert opened.place.figures.trouble.title.text() == "The study cannot be read"
+    assert "exclusions.csv" in opened.place.figures.trouble.sentence.text()
+
+
+def test_the_newest_study_is_shown_first_and_another_can_be_chosen(qtbot: QtBot, results: Path) -> None:
+    shutil.copytree(results / "demo", results / "demo-rehearsal-1")
+    for session in (results / "demo" / "data").glob("sub-*/ses-*"):
+        session.touch()
+    opened = Opened(qtbot, results)
+    assert opened.place.study.currentText() == "demo  ·  simulated"
+    assert opened.place.study.count() == 2
+    opened.place.study.setFocus()
+    qtbot.keyClick(opened.place.study, Qt.Key.Key_Down)
+    opened.wait()
+    assert opened.desk.view.chosen == results / "demo-rehearsal-1"
+    opened.window.go("home")
+    opened.window.go("results")
+    opened.wait()
+    assert opened.desk.view.chosen == results / "demo-rehearsal-1", "one comes back to where one was"
+
+
+def test_what_is_stopped_can_be_gone_on_with(qtbot: QtBot, results: Path) -> None:
+    made: list[Here] = []
+
+    def stopping() -> Here:
+        made.append(Here())
+        made[-1].stops = len(made) == 1
+        return made[-1]
+
+    opened = Opened(qtbot, results, stopping)
+    assert opened.place.figures.trouble.title.text() == "Stopped"
+    made[0].stops = False
+    opened.click(opened.place.figures.trouble.button)
+    opened.wait()
+    assert len(opened.titles) == 2
+
+
+def test_leaving_ends_what_reads(shown: Opened) -> None:
+    reader: Any = shown.desk._reader
+    shown.window.go("home")
+    assert reader.closed
+    assert shown.desk._reader is None
+    shown.window.go("results")
+    shown.wait()
+    assert len(shown.titles) == 2
+
+
+def test_other_results_can_be_looked_at(shown: Opened, tmp_path: Path) -> None:
+    rehearsed(tmp_path / "others", people=1)
+    shown.desk.show_results(tmp_path / "others")
+    shown.wait()
+    assert shown.desk.view.chosen == tmp_path / "others" / "demo"
+    assert shown.place.sessions.head.text() == "1 of 1 session in the figures"
+
+
+def nobody_left() -> bool:
+    return not any(child.name == "analyst" for child in multiprocessing.active_children())
+
+
+def test_a_report_by_processes_of_its_own_is_cancelled_then_written_and_none_is_left(
+    qtbot: QtBot, results: Path, tmp_path: Path
+) -> None:
+    opened = Opened(qtbot, results, Analyst)
+    assert opened.titles == ["Agreement for each setting", "Answers by delay setting"]
+    assert not nobody_left()
+    opened.click(opened.place.report)
+    dialog: Any = opened.place.writing
+    dialog.to.setText(str(tmp_path / "report"))
+    opened.click(dialog.go_on)
+    opened.click(dialog.cancel)
+    qtbot.waitUntil(lambda: opened.place.writing is None, timeout=SOON_MS)
+    assert not (tmp_path / "report").exists()
+    opened.click(opened.place.report)
+    dialog = opened.place.writing
+    dialog.to.setText(str(tmp_path / "report"))
+    opened.click(dialog.go_on)
+    opened.wait()
+    opened.click(dialog.go_on)
+    assert opened.files == [tmp_path / "report" / "report.html"]
+    assert opened.files[0].is_file()
+    dialog.reject()
+    opened.window.close()
+    qtbot.waitUntil(nobody_left, timeout=SOON_MS)
+
+
+def test_a_process_that_ends_by_itself_is_told_and_begun_again(qtbot: QtBot, results: Path) -> None:
+    opened = Opened(qtbot, results, Analyst)
+    reader: Any = opened.desk._reader
+    opened.desk.look()
+    reader._process.kill()
+    opened.wait()
+    assert "mistake in the program" in opened.place.figures.trouble.title.text()
+    opened.click(opened.place.figures.trouble.button)
+    opened.wait()
+    assert len(opened.titles) == 2
+    opened.window.close()
+    qtbot.waitUntil(nobody_left, timeout=SOON_MS)
