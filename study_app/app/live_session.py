@@ -14,17 +14,22 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from PySide6.QtCore import QEventLoop, QObject, Qt, QTimer, Signal
+from PySide6.QtGui import QScreen
 from PySide6.QtWidgets import QApplication
 
+from study_app.app.devices import diagnosis
+from study_app.app.machine import described, screen_number, settings_here, text_scale_on
+from study_app.devices import is_falcon, kind_of
 from study_app.errors import SessionError, StudyError
 from study_app.gui.application import application_here
 from study_app.gui.beginning import Ready, measured, open_store
 from study_app.gui.choices import NewSession
 from study_app.gui.collector import collecting_here
+from study_app.gui.dialogs import Notice
 from study_app.gui.ending import ended_from_outside
 from study_app.gui.machine import Machine, open_machine
 from study_app.gui.opening import OpeningWindow
-from study_app.gui.screens import choose_screens, describe_screen, place
+from study_app.gui.screens import choose_screens, place
 from study_app.gui.theme import LIGHT, Theme
 from study_app.protocol.load import load, parse, source_bytes
 from study_app.protocol.schedule import build_schedule
@@ -39,6 +44,10 @@ if TYPE_CHECKING:
 CANCELLED = 130
 BUG = 1
 OPENING_PATIENCE_S = 20.0
+NOT_EXAMINED = (
+    "There is nothing to examine",
+    "Only a Falcon has a driver, firmware and motors to look over.",
+)
 
 
 def hold(chosen: NewSession, tell: Callable[[str], object] | None) -> int:
@@ -76,6 +85,7 @@ class LiveSession(QObject):
         self._asks = asks
         self.preflight: Preflight | None = None
         self.theme = theme
+        self.settings, self._unread = settings_here()
         self.code = 0
         self.error: StudyError | None = None
         self.bridge: SessionBridge | None = None
@@ -92,6 +102,8 @@ class LiveSession(QObject):
         """Show the note, and make device and servo ready beside it."""
         from study_app.gui.session_windows import who  # noqa: PLC0415 - pyqtgraph: only once it is needed
 
+        if self._unread and self._tell is not None:
+            self._tell(self._unread)
         self.note = OpeningWindow(f"Preparing {Path(self.chosen.source).stem}", who(self.chosen), theme=self.theme)
         self.note.cancelled.connect(self._cancel)
         place(self.note, self.note.screen(), corner=False)
@@ -155,7 +167,7 @@ class LiveSession(QObject):
         from study_app.app.preflight import Preflight  # noqa: PLC0415 - pyqtgraph: only once it is needed
         from study_app.gui.session_windows import who  # noqa: PLC0415
 
-        shown_on, _ = choose_screens(self.chosen.screen)
+        shown_on, _ = self._screens()
         asked = Preflight(self.chosen, load(self.chosen.source), made, shown_on, who(self.chosen), self.theme)
         asked.started.connect(lambda ready: self._go_on(self._open_windows, ready))
         asked.failed.connect(lambda error: self._go_on(self._open_windows, error))
@@ -174,21 +186,44 @@ class LiveSession(QObject):
         source = source_bytes(chosen.source)
         protocol = parse(source, chosen.source)
         schedule = build_schedule(protocol, chosen.participant, chosen.seed)
-        shown_on, operated_on = choose_screens(chosen.screen)
+        shown_on, operated_on = self._screens()
         found = checks(made.facts_with(shown_on), protocol)
         self._pass_checks(found)
-        screens = {"participant": describe_screen(shown_on), "operator": describe_screen(operated_on)}
+        screens = described(self.settings, shown_on, operated_on)
         self._store = open_store(chosen, protocol, source, machine, screens)
         self._store.append("preflight", checks=[check.entry for check in found])
         start = FIRST if chosen.resumes is None else resume_at(protocol, schedule, self._store.lines)
-        self.bridge = open_windows(chosen, protocol, schedule, self._store, machine, self.theme, start)
+        text_scale = text_scale_on(self.settings, shown_on)
+        self.bridge = open_windows(
+            chosen, protocol, schedule, self._store, machine, self.theme, start, text_scale=text_scale
+        )
         self.bridge.done.connect(self._finished)
+        self.bridge.diagnose_asked.connect(self._diagnose)
         self._close_note()
         self._close_preflight()
         self.bridge.start()
 
+    def _screens(self) -> tuple[QScreen, QScreen]:
+        """Return the participant's and the operator's screen: as chosen, or as set for this machine."""
+        chosen = self.chosen.screen
+        return choose_screens(chosen if chosen is not None else screen_number(self.settings))
+
+    def _diagnose(self) -> None:
+        """Open the diagnosis of what is felt with over the operator's window; the bridge has stopped the force."""
+        assert self.bridge is not None  # noqa: S101 - it has just asked
+        name = self.chosen.device
+        if not is_falcon(name):
+            notice = Notice(self.bridge.operator, self.bridge.operator.theme, *NOT_EXAMINED)
+            notice.finished.connect(notice.deleteLater)
+            notice.show()
+            return
+        held = kind_of(name) == "falcon"
+        diagnosis(self.bridge.operator, self.bridge.operator.theme, name, self.settings, held=held).show()
+
     def _say(self, line: str) -> None:
         """Tell what the device asks for while it is being opened."""
+        if self.settings.sound:
+            QApplication.beep()
         if self._tell is not None:
             self._tell(line)
         if self.note is not None:

@@ -26,9 +26,12 @@ class MainWindow(QMainWindow):
     ----------
     makers
         What makes each place, by its name; the first is where one begins.
+
+    ``closed`` comes when the operator is done, ``theme_changed`` with the `Theme` that was asked for here.
     """
 
     closed = Signal()
+    theme_changed = Signal(object)
 
     def __init__(self, makers: Mapping[str, Callable[[], Place]], *, theme: Theme = LIGHT) -> None:
         super().__init__()
@@ -103,9 +106,15 @@ class MainWindow(QMainWindow):
         self.notice = notice
         notice.show()
 
+    def show_theme(self, theme: Theme) -> None:
+        """Wear a theme from now on."""
+        if theme is not self.theme:
+            self.theme = theme
+            wear(self, theme)
+
     def _change_theme(self) -> None:
-        self.theme = LIGHT if self.theme.dark else DARK
-        wear(self, self.theme)
+        self.show_theme(LIGHT if self.theme.dark else DARK)
+        self.theme_changed.emit(self.theme)
 
     def _arrange(self) -> None:
         self.rail.narrow(self.width() < NARROW_BELOW or self.place(self._here).wants_narrow_rail())

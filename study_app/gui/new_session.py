@@ -69,7 +69,7 @@ class NewSessionDialog(QDialog):
         self._machine = machine
         self.setWindowTitle("New session")
         self.setModal(True)
-        self.setMinimumWidth(640)
+        self.setMinimumWidth(720)
         self._all_results = results
         self._suggested = str(study_results(results, facts.protocol.study.name, _known(machine.device)))
         self.results = _field("Results folder of this study")
@@ -83,7 +83,7 @@ class NewSessionDialog(QDialog):
         self.firmware = _field("Falcon's firmware")
         self.screen_choice = Choice()
         self.windowed = Check("In a window instead of full-screen")
-        self.pilot = Check("Pilot: in a window with a frame, kept apart from the data")
+        self.pilot = Check("Pilot: framed, kept apart from the data")
         self.verdict_icon = Icon("check", "ok", 18)
         self.verdict = label("", "label", "ok", wraps=True)
         self._free = 1, ""

@@ -52,10 +52,13 @@ def open_windows(
     machine: Machine,
     theme: Theme,
     start: Start = FIRST,
+    *,
+    text_scale: float = 1.0,
 ) -> SessionBridge:
     """Open the operator's and the participant's window; the bridge returned is to be started.
 
-    ``start`` is where a resumed session goes on.
+    ``start`` is where a resumed session goes on, ``text_scale`` how much larger than designed the participant's words
+    must be at least.
     """
     clock, device, servo = store.clock.seconds, machine.device, machine.servo
     journal = WatchedJournal(store, progress_after(SessionProgress(protocol, schedule), store.lines), clock)
@@ -75,6 +78,7 @@ def open_windows(
         captures_pointer=by_mouse,
         pilot=chosen.pilot,
         on_card=has_card(),
+        text_scale=text_scale,
     )
     hand = hand_of(device)
     parts = Parts(

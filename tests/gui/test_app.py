@@ -28,6 +28,8 @@ from study_app.gui.preflight import PreflightWindow
 from study_app.gui.theme import PARTICIPANT
 from study_app.protocol.load import source_bytes
 from study_app.session.pages import EndPage, PausePage, QuestionnairePage, TaskPage, TextPage
+from study_app.store import machine
+from study_app.store.machine import MachineSettings
 from study_app.store.open_session import SessionStore
 from tests.compiled import needs_servo
 
@@ -211,6 +213,19 @@ def test_what_cannot_begin_leaves_nothing_behind(short_demo, results, wrong, ref
         app.run(short_demo, **{"participant": "P001", "windowed": True, "results": results} | wrong)
     assert "\n" not in str(error.value)
     assert not results.exists()
+
+
+def test_the_receipt_says_what_is_set_for_the_machine_and_words_are_as_large_as_it_asks(short_demo, results):
+    machine.save(MachineSettings(viewing_distance_mm=1200, screen_width_mm=150))
+    scales = []
+    person = Person(once=lambda participant: scales.append(participant._text_scale))
+    assert app.run(short_demo, participant="P001", windowed=True, device="scripted", results=results) == 0
+    assert person.answered
+    told = json.loads((results / "data" / "sub-P001" / "ses-01" / "receipt.json").read_text())["screens"]
+    assert (told["participant"]["viewing_distance_mm"], told["participant"]["width_mm"]) == (1200, 150)
+    assert told["participant"]["display_offset"] is None
+    assert scales[0] > 1
+    assert told["participant"]["text_scale"] == pytest.approx(scales[0], abs=0.001)
 
 
 def test_a_results_folder_that_cannot_be_one_is_named(short_demo, tmp_path):

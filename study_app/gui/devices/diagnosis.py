@@ -51,6 +51,8 @@ class DiagnosisDialog(QDialog):
         Which Falcon: as ``--device`` takes it.
     firmware
         File of its program, where it needs one.
+    note
+        What else should be known, in a sentence.
     begin
         What examines; it takes name and firmware.
     """
@@ -64,6 +66,7 @@ class DiagnosisDialog(QDialog):
         name: str,
         *,
         firmware: Path | None = None,
+        note: str = "",
         begin: Begin = Examination,
     ) -> None:
         super().__init__(parent)
@@ -77,6 +80,8 @@ class DiagnosisDialog(QDialog):
         self.report: Report | None = None
         self.rows = [FindingRow(finding) for finding in findings_of(Facts())]
         self.step = label(PREPARING, "body", "text2", wraps=True)
+        self.note = label(note, "label", "warn", wraps=True)
+        self.note.setVisible(bool(note))
         self.seen = label("", "label", "text2", wraps=True)
         self.seen.setFont(font("label", weight=400, tabular=True))
         self.bar = QProgressBar()
@@ -131,6 +136,7 @@ class DiagnosisDialog(QDialog):
         column.setSpacing(12)
         column.addLayout(head)
         column.addWidget(self.bar)
+        column.addWidget(self.note)
         column.addWidget(self.seen)
         column.addWidget(card, 1)
         column.addWidget(Rule())

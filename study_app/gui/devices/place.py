@@ -84,13 +84,14 @@ class DevicesPlace(Place):
     """Every device with its state.
 
     ``look_asked`` where the machine is to be looked at again; ``chosen`` carries the name of the device that sessions
-    begin with; ``firmware_chosen`` a path or None; ``diagnose_asked`` the name of a Falcon.
+    begin with; ``firmware_chosen`` a path or None; ``diagnose_asked`` a Falcon's name; ``left`` comes with `leave`.
     """
 
     look_asked = Signal()
     chosen = Signal(str)
     firmware_chosen = Signal(object)
     diagnose_asked = Signal(str)
+    left = Signal()
 
     def __init__(self) -> None:
         super().__init__()
@@ -150,6 +151,10 @@ class DevicesPlace(Place):
     def enter(self) -> None:
         """Look at the machine again: something may have been plugged in."""
         self.look_asked.emit()
+
+    def leave(self) -> None:
+        """Say so: what examines a device must let go of it."""
+        self.left.emit()
 
     def show_devices(self, shown: tuple[DeviceShown, ...], preferred: str) -> None:
         """Show what was found, and which device sessions begin with."""

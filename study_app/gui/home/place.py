@@ -123,6 +123,11 @@ class HomePlace(Place):
         row.setContentsMargins(0, 0, 0, 0)
         row.addWidget(self._area)
 
+    def show_results(self, results: Path) -> None:
+        """Show the sessions of another folder from now on."""
+        self.results = results
+        self.show_sessions()
+
     def show_studies(self) -> None:
         """Show a card for each protocol at hand."""
         self._facts = [study_facts(source) for source in self._sources]

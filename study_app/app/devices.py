@@ -1,0 +1,136 @@
+"""The devices: where their place, a look at the machine in a thread, and a Falcon's diagnosis meet."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Sequence
+
+from PySide6.QtCore import QObject, Qt, Signal
+from PySide6.QtWidgets import QApplication, QWidget
+
+from study_app.app.machine import MachineDesk
+from study_app.devices import kind_of
+from study_app.devices.backends import Backend, backends
+from study_app.gui.devices.diagnosis import DiagnosisDialog
+from study_app.gui.devices.place import DevicesPlace
+from study_app.gui.devices.view import DeviceShown, device_named, devices_shown
+from study_app.gui.theme import Theme
+from study_app.store.machine import MachineSettings
+
+PATIENCE_S = 5.0
+HELD = (
+    "This session holds the device, so that it cannot be claimed a second time: that is to be expected. To have "
+    "everything looked at, end the session first; it can go on later."
+)
+
+
+class DevicesDesk(QObject):
+    """Looks at the machine when it is asked, one look at a time, and shows what was found.
+
+    ``looked`` comes with what was found of every device; ``troubled(title, sentence)`` where one could not look.
+
+    Parameters
+    ----------
+    desk
+        What is set for this machine.
+    look
+        What looks, as ``devices.backends.backends`` does.
+    """
+
+    looked = Signal(object)
+    troubled = Signal(str, str)
+    _done = Signal(object)
+
+    def __init__(self, desk: MachineDesk, look: Callable[[], Sequence[Backend]] = backends) -> None:
+        super().__init__()
+        self._desk, self._look = desk, look
+        self._thread: threading.Thread | None = None
+        self.shown: tuple[DeviceShown, ...] = ()
+        self.place: DevicesPlace | None = None
+        self.dialog: DiagnosisDialog | None = None
+        self._done.connect(self._end, Qt.ConnectionType.QueuedConnection)
+        desk.changed.connect(self._show)
+
+    @property
+    def preferred(self) -> DeviceShown:
+        """The device that sessions begin with, as it was found."""
+        return device_named(self._desk.settings.device, self.shown)
+
+    def make_place(self) -> DevicesPlace:
+        """Return the devices' place."""
+        place = self.place = DevicesPlace()
+        place.look_asked.connect(self.look)
+        place.chosen.connect(lambda name: self._desk.change({"device": name}))
+        place.firmware_chosen.connect(lambda path: self._desk.change({"firmware": path}))
+        place.diagnose_asked.connect(self.diagnose)
+        place.left.connect(self.end_diagnosis)
+        self._show()
+        return place
+
+    def look(self) -> None:
+        """Look at the machine, beside the windows."""
+        if self._thread is not None:
+            return
+        if self.place is not None:
+            self.place.show_looking(True)
+        self._thread = threading.Thread(target=self._see, name="looking for devices", daemon=True)
+        self._thread.start()
+
+    def wait(self) -> None:
+        """Wait for a look that is under way."""
+        if self._thread is not None:
+            self._thread.join(PATIENCE_S)
+
+    def diagnose(self, name: str) -> None:
+        """Open the diagnosis of a Falcon; a serial number that is preferred is taken along."""
+        settings = self._desk.settings
+        asked = settings.device if settings.device.partition(":")[0] == name else name
+        assert self.place is not None  # noqa: S101 - it has just asked
+        self.end_diagnosis()
+        self.dialog = diagnosis(self.place.window(), self.place.theme, asked, settings)
+        self.dialog.finished.connect(self._forget_dialog)
+        self.dialog.show()
+
+    def end_diagnosis(self) -> None:
+        """Close the diagnosis, which ends it."""
+        if self.dialog is not None:
+            self.dialog.reject()
+
+    def _forget_dialog(self) -> None:
+        self.dialog = None
+
+    def _see(self) -> None:
+        try:
+            made: object = devices_shown(self._look())
+        except Exception as error:  # noqa: BLE001 - handed over, not swallowed: a thread has nobody to raise it to
+            made = error
+        self._done.emit(made)
+
+    def _end(self, made: object) -> None:
+        self._thread = None
+        if self.place is not None:
+            self.place.show_looking(False)
+        if isinstance(made, Exception):
+            self.troubled.emit("This machine could not be looked at", f"{made}.")
+            return
+        assert isinstance(made, tuple)  # noqa: S101 - what _see makes
+        self.shown = made
+        self._show()
+        self.looked.emit(made)
+
+    def _show(self) -> None:
+        if self.place is not None:
+            self.place.show_devices(self.shown, self._desk.settings.device)
+            self.place.show_firmware(self._desk.settings.firmware)
+
+
+def diagnosis(
+    parent: QWidget, theme: Theme, name: str, settings: MachineSettings, *, held: bool = False
+) -> DiagnosisDialog:
+    """Return the diagnosis of a Falcon, begun; ``held`` where a session has it open."""
+    firmware = settings.firmware_file if kind_of(name) == "falcon" else None
+    made = DiagnosisDialog(parent, theme, name, firmware=firmware, note=HELD if held else "")
+    made.finished.connect(made.deleteLater)
+    if settings.sound:
+        made.over.connect(lambda _well: QApplication.beep())
+    return made

@@ -1,0 +1,137 @@
+"""What is set for this machine: where its place, its file and the windows that follow it meet."""
+
+from __future__ import annotations
+
+from datetime import date
+from pathlib import Path
+from typing import Any, Final
+
+from PySide6.QtCore import QObject, Signal
+from PySide6.QtGui import QScreen
+
+from study_app.devices import kind_of
+from study_app.errors import DeviceError, StoreError
+from study_app.gui.screens import describe_screen, screen_shown, screens_shown
+from study_app.gui.settings.place import MachinePlace
+from study_app.gui.theme import DARK, LIGHT, Theme
+from study_app.store import machine
+from study_app.store.machine import DEFAULTS, DisplayOffset, MachineSettings
+
+CALLED: Final = {
+    "screen": "participant's screen",
+    "viewing_distance_mm": "viewing distance",
+    "screen_width_mm": "screen width",
+    "display_offset": "display offset",
+    "device": "device",
+    "firmware": "firmware",
+    "results": "results folder",
+    "theme": "theme",
+    "sound": "sound",
+}
+
+
+def settings_here() -> tuple[MachineSettings, str]:
+    """Return what is set, and in a line why it is the defaults where the file cannot be used ("" where it can)."""
+    settings, trouble = machine.load_or_default()
+    try:
+        kind_of(settings.device)
+    except DeviceError as error:
+        return settings.model_copy(update={"device": DEFAULTS.device}), f"{machine.settings_file()}: {error}"
+    return settings, trouble
+
+
+def theme_named(name: str) -> Theme:
+    """Return the theme of the operator's windows by its name."""
+    return DARK if name == DARK.name else LIGHT
+
+
+def screen_number(settings: MachineSettings) -> int:
+    """Return which screen is the participant's, from 1."""
+    return settings.screen_among([screen.name for screen in screens_shown()])
+
+
+def text_scale_on(settings: MachineSettings, screen: QScreen) -> float:
+    """Return how much larger than designed the participant's words must be on a screen."""
+    shown = screen_shown(screen)
+    return settings.text_scale(shown.width_px, shown.width_mm)
+
+
+def described(settings: MachineSettings, participant: QScreen, operator: QScreen) -> dict[str, Any]:
+    """Return what the receipt says of the screens: what the system tells, and what was measured of the first."""
+    shown = screen_shown(participant)
+    return {
+        "participant": describe_screen(participant) | settings.describe(shown.name, shown.width_px, shown.width_mm),
+        "operator": describe_screen(operator),
+    }
+
+
+class MachineDesk(QObject):
+    """Holds the settings, keeps them at once, and takes the last change back.
+
+    ``changed`` comes when something else is set; ``troubled(title, sentence)`` where they cannot be read or kept.
+    """
+
+    changed = Signal(object)
+    troubled = Signal(str, str)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.settings, self.trouble = settings_here()
+        self._before: list[tuple[str, MachineSettings]] = []
+        self.place: MachinePlace | None = None
+
+    def make_place(self) -> MachinePlace:
+        """Return the machine's place, which shows what is set from now on."""
+        place = self.place = MachinePlace()
+        place.changed.connect(self.change)
+        place.offset_measured.connect(self.measured)
+        place.undo_asked.connect(self.undo)
+        self._show()
+        return place
+
+    def change(self, values: dict[str, Any]) -> None:
+        """Set values by their names, and keep them."""
+        made = MachineSettings.model_validate(_plain(self.settings) | values)
+        if made == self.settings:
+            self._show()
+            return
+        self._before.append((CALLED[next(iter(values))], self.settings))
+        self._keep(made)
+
+    def measured(self, mean_ms: float, spread_ms: float, how: str, screen: str) -> None:
+        """Set the display offset that was measured today on a screen."""
+        offset = {"mean_ms": mean_ms, "spread_ms": spread_ms, "how": how, "screen": screen}
+        self.change({"display_offset": DisplayOffset.model_validate(offset | {"measured": date.today().isoformat()})})
+
+    def undo(self) -> None:
+        """Take the last change back."""
+        if self._before:
+            self._keep(self._before.pop()[1])
+
+    @property
+    def undo_called(self) -> str:
+        """What can be taken back; nothing where nothing can."""
+        return self._before[-1][0] if self._before else ""
+
+    def _keep(self, settings: MachineSettings) -> None:
+        self.settings = settings
+        try:
+            machine.save(settings)
+        except StoreError as error:
+            self.troubled.emit("This machine's settings could not be kept", f"{error}.")
+        self._show()
+        self.changed.emit(settings)
+
+    def _show(self) -> None:
+        if self.place is not None:
+            self.place.show_settings(
+                self.settings,
+                results=str(Path(self.settings.results_folder).absolute()),
+                undo=self.undo_called,
+                kept_in=str(machine.settings_file()),
+            )
+
+
+def _plain(settings: MachineSettings) -> dict[str, Any]:
+    """Return the values by their names, the offset as it is."""
+    return {name: getattr(settings, name) for name in MachineSettings.model_fields}

@@ -1,0 +1,231 @@
+"""What is set for this machine: kept at once, taken back, told in the receipt; and devices looked for in a thread."""
+
+from __future__ import annotations
+
+import threading
+from datetime import date
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QGuiApplication
+
+from study_app.app.devices import DevicesDesk
+from study_app.app.machine import MachineDesk, described, settings_here, text_scale_on
+from study_app.app.visit import Visit
+from study_app.devices.backends import NONE, READY, Backend
+from study_app.gui.theme import DARK, LIGHT
+from study_app.store import machine
+from study_app.store.machine import DEFAULTS, DisplayOffset, MachineSettings, load, save, settings_file
+
+MOUSE = Backend("mouse", "the window", READY, "seen, not felt")
+FALCON = Backend("falcon", "libusb 1.0", NONE, "felt, up to 8 N", "plug its cable in")
+
+
+@pytest.fixture
+def desk(qapp):
+    return MachineDesk()
+
+
+def test_what_is_set_is_kept_at_once_and_taken_back(desk, qtbot):
+    assert not settings_file().exists()
+    with qtbot.waitSignal(desk.changed):
+        desk.change({"viewing_distance_mm": 620.0})
+    assert load().viewing_distance_mm == 620.0
+    desk.change({"screen": "DP-1", "screen_number": 2})
+    assert desk.undo_called == "participant's screen"
+    desk.undo()
+    assert load() == MachineSettings(viewing_distance_mm=620.0)
+    assert desk.undo_called == "viewing distance"
+    desk.undo()
+    assert load() == DEFAULTS
+    desk.undo()
+    assert desk.undo_called == ""
+
+
+def test_what_is_set_already_is_no_change(desk, qtbot):
+    with qtbot.assertNotEmitted(desk.changed):
+        desk.change({"sound": False})
+    assert desk.undo_called == ""
+
+
+def test_an_offset_has_its_day_and_its_screen(desk):
+    desk.measured(23.5, 1.2, "photodiode", "DP-1")
+    assert load().display_offset == DisplayOffset(
+        mean_ms=23.5, spread_ms=1.2, measured=date.today().isoformat(), screen="DP-1"
+    )
+
+
+def test_settings_that_cannot_be_kept_are_told_and_count_all_the_same(desk, qtbot):
+    settings_file().parent.write_text("")  # a file where the folder should be
+    with qtbot.waitSignal(desk.troubled) as told:
+        desk.change({"theme": "dark"})
+    assert "could not be kept" in told.args[0]
+    assert desk.settings.theme == "dark"
+    settings_file().parent.unlink()
+
+
+def test_a_device_that_nobody_knows_is_told_and_the_mouse_stands_in(qapp):
+    save(MachineSettings(device="hammer", theme="dark"))
+    settings, trouble = settings_here()
+    assert (settings.device, settings.theme) == ("mouse", "dark")
+    assert "'hammer'" in trouble
+    assert "\n" not in trouble
+
+
+def test_the_place_shows_what_is_set_and_sets_what_is_typed(desk, qtbot):
+    desk.change({"device": "scripted"})
+    place = desk.make_place()
+    qtbot.addWidget(place)
+    place.show()
+    assert place.sessions.device.currentData() == "scripted"
+    qtbot.mouseClick(place.windows.sound, Qt.MouseButton.LeftButton)
+    assert load().sound
+    qtbot.mouseClick(place.undo, Qt.MouseButton.LeftButton)
+    assert not load().sound
+    assert not place.windows.sound.isChecked()
+    assert place.kept_in.accessibleName() == f"Kept in {settings_file()}"
+
+
+def test_the_receipt_says_distance_width_and_offset_of_the_participants_screen(qapp):
+    screen = QGuiApplication.primaryScreen()
+    offset = DisplayOffset(mean_ms=20, spread_ms=1, measured="2026-11-20", screen=screen.name())
+    settings = MachineSettings(viewing_distance_mm=600, screen_width_mm=300, display_offset=offset)
+    screens = described(settings, screen, screen)
+    assert screens["participant"]["viewing_distance_mm"] == 600
+    assert screens["participant"]["display_offset"]["mean_ms"] == 20
+    assert screens["participant"]["text_scale"] == pytest.approx(text_scale_on(settings, screen), abs=0.001)
+    assert "viewing_distance_mm" not in screens["operator"]
+
+
+def test_devices_are_looked_for_beside_the_windows_one_look_at_a_time(desk, qtbot):
+    looks, may_end, where = [], threading.Event(), []
+
+    def look():
+        where.append(threading.current_thread())
+        assert may_end.wait(20)
+        looks.append(1)
+        return [MOUSE, FALCON]
+
+    devices = DevicesDesk(desk, look)
+    place = devices.make_place()
+    qtbot.addWidget(place)
+    place.enter()
+    place.enter()
+    assert not place.refresh.isEnabled()
+    assert devices.preferred.word == "Looking …"
+    with qtbot.waitSignal(devices.looked):
+        may_end.set()
+    assert (len(looks), place.refresh.isEnabled()) == (1, True)
+    assert where[0] is not threading.main_thread()
+    assert devices.preferred.word == "Ready"
+    place.chosen.emit("falcon")
+    assert (load().device, devices.preferred.word) == ("falcon", "Not connected")
+    place.firmware_chosen.emit("/there/firmware.bin")
+    assert load().firmware == "/there/firmware.bin"
+
+
+def test_a_look_that_fails_is_told(desk, qtbot):
+    def look():
+        raise OSError("no bus")
+
+    devices = DevicesDesk(desk, look)
+    with qtbot.waitSignal(devices.troubled) as told:
+        devices.look()
+    assert "no bus" in told.args[1]
+    devices.wait()
+
+
+@pytest.fixture
+def visit(qtbot, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    made = Visit()
+    qtbot.addWidget(made.window)
+    return made
+
+
+def test_the_main_window_follows_what_is_set(visit, qtbot, tmp_path):
+    visit.window.show()
+    home = visit.window.place("home")
+    assert visit.window.theme is LIGHT
+    visit.machine.change({"theme": "dark"})
+    assert visit.window.theme is DARK
+    visit.window.rail.theme_asked.emit()
+    assert load().theme == "light"
+    visit.machine.change({"results": str(tmp_path / "elsewhere")})
+    assert home.results == visit.results == tmp_path / "elsewhere"
+    visit.machine.change({"device": "scripted"})
+    assert home.device.name.text() == "Scripted hand"
+
+
+def test_a_folder_asked_for_by_command_counts_for_this_stay(qtbot, tmp_path):
+    save(MachineSettings(results=str(tmp_path / "set")))
+    asked = Visit(tmp_path / "asked")
+    qtbot.addWidget(asked.window)
+    assert asked.results == tmp_path / "asked"
+    asked.machine.change({"results": str(tmp_path / "other")})
+    assert asked.results == tmp_path / "asked"
+    following = Visit()
+    qtbot.addWidget(following.window)
+    assert following.results == tmp_path / "other"
+
+
+def test_the_display_test_is_one_click_from_home(visit, qtbot):
+    visit.window.show()
+    qtbot.mouseClick(visit.window.place("home").device.display, Qt.MouseButton.LeftButton)
+    assert visit.window.here == "machine"
+    test = visit.machine.place.test
+    assert test.isVisible()
+    with qtbot.waitSignal(test.left):
+        qtbot.keyClick(test, Qt.Key.Key_Escape)
+
+
+def test_a_damaged_file_is_told_when_the_window_opens(qtbot, tmp_path, monkeypatch):
+    monkeypatch.setattr(machine, "load_or_default", lambda: (DEFAULTS, "the file is no JSON"))
+    made = Visit(tmp_path)
+    qtbot.addWidget(made.window)
+    made.devices._look = lambda: [MOUSE]
+    with qtbot.waitSignal(made.devices.looked):
+        made.open()
+    assert made.window.notice.isVisible()
+    assert made.window.place("home").device.state.word == "Ready"
+
+
+def test_a_diagnosis_ends_when_the_place_is_left(visit, qtbot, monkeypatch):
+    begun = []
+
+    class Examined:
+        def __init__(self, name, firmware):
+            self.asked = name, firmware
+            self.closed = False
+            begun.append(self)
+
+        def said(self):
+            return []
+
+        def close(self):
+            self.closed = True
+
+    monkeypatch.setattr("study_app.app.devices.DiagnosisDialog", _with(Examined))
+    visit.machine.change({"device": "falcon:FT1", "firmware": "/there/firmware.bin"})
+    visit.devices._look = lambda: [MOUSE, FALCON]
+    visit.window.show()
+    visit.window.go("devices")
+    with qtbot.waitSignal(visit.devices.looked):
+        visit.devices.look()
+    row = visit.devices.place.people.rows["falcon"]
+    qtbot.mouseClick(row.diagnose, Qt.MouseButton.LeftButton)
+    assert [(name, str(firmware)) for name, firmware in (one.asked for one in begun)] == [
+        ("falcon:FT1", "/there/firmware.bin")
+    ]
+    visit.window.go("home")
+    qtbot.waitUntil(lambda: begun[0].closed)
+    assert visit.devices.dialog is None
+
+
+def _with(begin):
+    from study_app.gui.devices.diagnosis import DiagnosisDialog
+
+    def made(*words, **options):
+        return DiagnosisDialog(*words, **options, begin=begin)
+
+    return made
