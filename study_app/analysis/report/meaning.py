@@ -106,7 +106,7 @@ def _as_lowest(found: BlockFound, delay_ms: float) -> Iterator[str]:
     if below:
         told += f" For {listed(below)} a trend shows already below {ms(delay_ms)}."
     if at:
-        told += f" For {listed(at)} it is the lowest delay up to which these {people} suffice to show a trend."
+        told += f" For {listed(at)} it is the lowest delay up to which the answers of these {people} show a trend."
     yield (
         f"As a limit.{told or ' No statement has its lowest delay with a trend here.'} Such a delay depends on how "
         "many take part: more participants tend to find a lower one. It is an upper bound of what is noticed, and says "

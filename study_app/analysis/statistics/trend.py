@@ -185,8 +185,8 @@ def _note(first: Step, lowest: float | None) -> str:
             "that is not evidence that there is none"
         )
     return (
-        f"{lowest:g} ms is an upper bound: the lowest delay at which {told(first.page.n)} suffice to show a "
-        "trend; shorter delays may be noticed too"
+        f"{lowest:g} ms is an upper bound: the lowest delay at which the answers of {told(first.page.n)} show a trend; "
+        "shorter delays may be noticed too"
     )
 
 
