@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QPoint, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPaintEvent, QPen, QWheelEvent
+from PySide6.QtGui import QColor, QFont, QFontMetricsF, QKeyEvent, QPainter, QPaintEvent, QPen, QWheelEvent
 from PySide6.QtWidgets import (
     QAbstractButton,
     QCheckBox,
@@ -22,7 +22,18 @@ from study_app.gui.theme import Theme, font
 from study_app.gui.themed import Themed
 
 
-class ActionButton(Themed, QPushButton):
+class PressedByEnter(QPushButton):
+    """A button that Enter presses as Space does, in a dialog too, where it would else press the default one."""
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
+        """Press on Enter; the keyboard's own repetition presses nothing."""
+        if event.key() not in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
+            super().keyPressEvent(event)
+        elif not event.isAutoRepeat():
+            self.click()
+
+
+class ActionButton(Themed, PressedByEnter):
     """A button with an icon before its words and, where a key does the same, the key's cap behind them."""
 
     def __init__(self, icon: str, text: str, *, key: str = "", role: str = "", height: int = 44) -> None:

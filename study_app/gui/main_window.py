@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from PySide6.QtCore import QSize, Qt, Signal
-from PySide6.QtGui import QCloseEvent, QResizeEvent
+from PySide6.QtGui import QCloseEvent, QKeySequence, QResizeEvent, QShortcut
 from PySide6.QtWidgets import QHBoxLayout, QMainWindow, QStackedWidget, QWidget
 
 from study_app.gui.dialogs import Notice
@@ -55,6 +55,7 @@ class MainWindow(QMainWindow):
         whole.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
         self.rail.theme_asked.connect(self._change_theme)
         self.rail.go_asked.connect(self.go)
+        QShortcut(QKeySequence("Ctrl+Q"), self, self.close)  # not every window has a frame whose keys close it
         wear(self, theme)
         self.resize(FULL)
         self.go(self._here)

@@ -7,9 +7,10 @@ from typing import NamedTuple
 
 from PySide6.QtCore import QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
-from PySide6.QtWidgets import QHBoxLayout, QPushButton, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
 from study_app.gui.cards import Logo
+from study_app.gui.controls import PressedByEnter
 from study_app.gui.icons import draw_icon
 from study_app.gui.labels import label
 from study_app.gui.theme import RADIUS_CONTROL, Theme, font
@@ -36,7 +37,7 @@ DESTINATIONS = (
 )
 
 
-class RailButton(Themed, QPushButton):
+class RailButton(Themed, PressedByEnter):
     """A place to go, or a switch, in the rail: icon and word; beside each other when wide, one below the other else."""
 
     def __init__(self, icon: str, word: str, short: str) -> None:

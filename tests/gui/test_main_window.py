@@ -54,10 +54,16 @@ def test_one_begins_at_the_first_place_and_goes_by_the_rail(main, log, qtbot):
 
 def test_places_are_reached_by_the_keyboard_alone(main, qtbot):
     main.rail.buttons["home"].setFocus()
-    for _ in range(2):
+    for key, place in ((Qt.Key.Key_Space, "results"), (Qt.Key.Key_Return, "lab")):
         qtbot.keyClick(main.focusWidget(), Qt.Key.Key_Tab)
-    qtbot.keyClick(main.focusWidget(), Qt.Key.Key_Space)
-    assert main.here == "lab"
+        qtbot.keyClick(main.focusWidget(), key)
+        assert main.here == place
+
+
+def test_the_window_closes_by_the_keyboard_where_no_frame_has_a_way(main, qtbot):
+    with qtbot.waitSignal(main.closed):
+        qtbot.keyClick(main, Qt.Key.Key_Q, Qt.KeyboardModifier.ControlModifier)
+    assert not main.isVisible()
 
 
 def test_a_place_may_ask_for_another_and_have_something_said(main):

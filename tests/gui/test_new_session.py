@@ -203,3 +203,14 @@ def test_firmware_that_is_not_there_is_refused_as_it_is_typed(qtbot, results, tm
     made.firmware.clear()
     assert made.begin.isEnabled()
     assert made.chosen().firmware is None
+
+
+def test_enter_presses_the_button_that_has_the_keyboard_and_no_other(dialog, qtbot):
+    dialog.cancel.setFocus()
+    with qtbot.waitSignal(dialog.rejected):
+        qtbot.keyClick(dialog.cancel, Qt.Key.Key_Return)
+
+
+def test_enter_in_a_field_begins(dialog, qtbot):
+    with qtbot.waitSignal(dialog.accepted):
+        qtbot.keyClick(dialog.participant, Qt.Key.Key_Return)
