@@ -5,23 +5,32 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QEventLoop, QObject
+from PySide6.QtCore import QEventLoop, QObject, QTimer
 
+from study_app.app.devices import DevicesDesk
 from study_app.app.live_session import BUG, LiveSession
+from study_app.app.machine import MachineDesk, theme_named
 from study_app.gui.application import application_here
 from study_app.gui.choices import NewSession
 from study_app.gui.collector import collecting_here
 from study_app.gui.ending import ended_from_outside
-from study_app.gui.home import HomePlace
+from study_app.gui.home.place import HomePlace
 from study_app.gui.main_window import MainWindow
+from study_app.store.machine import MachineSettings
+
+LOOK_AFTER_MS = 300  # the window stands by then
 
 if TYPE_CHECKING:
+    from study_app.app.lab import LabVisit
     from study_app.app.results import ResultsDesk
+    from study_app.gui.lab.place import LabPlace
     from study_app.gui.results.place import ResultsPlace
 
 
 def home(results: Path | None = None) -> int:
-    """Open the home window on the results folder (default ``results``); return the exit code when it is closed.
+    """Open the home window on the results folder; return the exit code when it is closed.
+
+    By default the folder is the one that is set for this machine, else ``results``.
 
     Raises
     ------
@@ -29,10 +38,11 @@ def home(results: Path | None = None) -> int:
         A window cannot be opened here.
     """
     application = application_here()
-    visit = Visit(results if results is not None else Path("results"))
+    visit = Visit(results)
     with collecting_here(), ended_from_outside(visit.end_by_signal):
-        visit.window.show()
+        visit.open()
         visit.loop.exec()
+    visit.end()
     application.processEvents()
     return visit.code
 
@@ -40,26 +50,87 @@ def home(results: Path | None = None) -> int:
 class Visit(QObject):
     """The home window's stay: one session at a time, and home again after it."""
 
-    def __init__(self, results: Path) -> None:
+    def __init__(self, results: Path | None = None) -> None:
         super().__init__()
-        self.results = results
-        self.window = MainWindow({"home": self._home, "results": self._results})
+        self.machine = MachineDesk()
+        self.devices = DevicesDesk(self.machine)
+        self._home_place: HomePlace | None = None
+        self._follows_machine = results is None
+        self.results = results if results is not None else self.machine.settings.results_folder
+        self.window = MainWindow(
+            {
+                "home": self._home,
+                "results": self._results,
+                "lab": self._lab,
+                "devices": self.devices.make_place,
+                "machine": self.machine.make_place,
+            },
+            theme=theme_named(self.machine.settings.theme),
+        )
         self.loop = QEventLoop()
         self.code = 0
         self.live: LiveSession | None = None
         self.desk: ResultsDesk | None = None
+        self.lab: LabVisit | None = None
         self.window.closed.connect(self._leave)
+        self.window.theme_changed.connect(lambda theme: self.machine.change({"theme": theme.name}))
+        self.machine.changed.connect(self._machine_changed)
+        self.devices.looked.connect(lambda _shown: self._show_machine())
+        for desk in (self.machine, self.devices):
+            desk.troubled.connect(self.window.tell)
+
+    def open(self) -> None:
+        """Show the window, and look at the machine once it stands."""
+        self.window.show()
+        if self.machine.trouble:
+            self.window.tell("This machine's settings are the defaults", f"{self.machine.trouble}.")
+        QTimer.singleShot(LOOK_AFTER_MS, self.devices, self.devices.look)
 
     def _home(self) -> HomePlace:
         made = HomePlace(self.results)
         made.session_asked.connect(self._start)
+        made.device.display_asked.connect(self._test_display)
+        made.show_machine(self.machine.settings, self.devices.preferred)
+        self._home_place = made
         return made
+
+    def _show_machine(self) -> None:
+        """Let home say what is set, and what the preferred device is like."""
+        if self._home_place is not None:
+            self._home_place.show_machine(self.machine.settings, self.devices.preferred)
+
+    def _machine_changed(self, settings: MachineSettings) -> None:
+        """Follow what is set for this machine, as far as nothing else was asked for by command."""
+        self.window.show_theme(theme_named(settings.theme))
+        if self._follows_machine and settings.results_folder != self.results and self._home_place is not None:
+            self.results = settings.results_folder
+            self._home_place.show_results(self.results)
+        self._show_machine()
+
+    def _test_display(self) -> None:
+        """Open the display test; home has gone to the machine's place."""
+        if self.machine.place is not None:
+            self.machine.place.open_test()
 
     def _results(self) -> ResultsPlace:
         from study_app.app.results import ResultsDesk  # noqa: PLC0415 - only once it is needed
 
         self.desk = ResultsDesk(self.results)
         return self.desk.place
+
+    def _lab(self) -> LabPlace:
+        from study_app.app.lab import compose_lab  # noqa: PLC0415 - pyqtgraph: only once it is needed
+        from study_app.gui.lab.place import LabPlace  # noqa: PLC0415
+
+        made = LabPlace()
+        self.lab = compose_lab(made)
+        return made
+
+    def end(self) -> None:
+        """Let go of what the places hold, and wait for what is under way in other threads."""
+        if self.lab is not None:
+            self.lab.end()
+        self.devices.wait()
 
     def end_by_signal(self, number: int) -> None:
         """End because the program is being ended from outside."""
