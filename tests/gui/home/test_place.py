@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QLabel, QPushButton
 
 from study_app.devices.backends import NONE, Backend
 from study_app.gui.devices.view import devices_shown
-from study_app.gui.home import HomePlace
+from study_app.gui.home.place import HomePlace
 from study_app.gui.home.cards import BrokenCard, StudyCard
 from study_app.gui.home.facts import study_facts
 from study_app.gui.home.rehearsal import RehearsalDialog, rehearsal_folder
