@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from threading import Thread
 from typing import TYPE_CHECKING
 
@@ -26,7 +27,7 @@ from study_app.gui.pages.notices import NoticeWidget, PauseWidget
 from study_app.gui.pages.questionnaire import QuestionnaireWidget
 from study_app.gui.pages.reading import ReadingPage
 from study_app.gui.pages.text import TextWidget
-from study_app.gui.pointer import PointerCapture
+from study_app.gui.pointer import BUTTONS, PointerCapture
 from study_app.gui.scene_view import TankWidget, paint_ahead
 from study_app.gui.theme import PARTICIPANT, font, load_fonts, stylesheet
 from study_app.protocol.words import Words, words
@@ -103,7 +104,7 @@ class ParticipantWindow(QWidget):
         self._widget: PageWidget | TankWidget = self._wait_page(said.preparing)
         self._capture = PointerCapture(self)
         self._capture.moved.connect(self.pointer)
-        self._capture.pressed.connect(self.buttons)
+        self._capture.pressed.connect(self._press)
         self._settling = QTimer(self)
         self._settling.setInterval(SETTLING_MS)
         self._settling.timeout.connect(self._pause_if_left)
@@ -266,7 +267,8 @@ class ParticipantWindow(QWidget):
         made: PageWidget
         match page:
             case TaskPage():
-                tank = TankWidget(page, said, self, text_scale=text, on_card=self._on_card)
+                by_click = replace(said, continue_now=said.click_now) if self._captures else said
+                tank = TankWidget(page, by_click, self, text_scale=text, on_card=self._on_card)
                 tank.painted.connect(self.painted)
                 tank.swapped.connect(self.swapped)
                 return tank
@@ -291,6 +293,13 @@ class ParticipantWindow(QWidget):
 
     def _may_leave_tank(self) -> bool:
         return self.tank is not None and self.tank.may_leave
+
+    def _press(self, bits: int) -> None:
+        """Take a click of the mouse that is the device: it goes on where Space would, and is a button anywhere else."""
+        if bits & BUTTONS[Qt.MouseButton.LeftButton] and self._may_leave_tank():
+            self.event.emit(Continue(self._clock()))
+        else:
+            self.buttons.emit(bits)
 
     def _pause_if_left(self) -> None:
         """Pause where the pointer is the device and went to another program; the operator's window is none."""

@@ -35,6 +35,7 @@ class Words:
     seconds_left: str  # {seconds}
     continue_in: str  # {seconds}
     continue_now: str
+    click_now: str  # where the mouse is the device
     pause_hint: str
 
     # questionnaire

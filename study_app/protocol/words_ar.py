@@ -17,6 +17,7 @@ ARABIC = Words(
     seconds_left="بقي {seconds} ث",
     continue_in="يمكنك المتابعة بعد {seconds} ث",
     continue_now="اضغط على مفتاح المسافة للمتابعة",
+    click_now="انقر أو اضغط على مفتاح المسافة للمتابعة",
     pause_hint="إيقاف مؤقت · اضغط مطولاً لإيقاف القوة",
     please_answer="يرجى الإجابة",
     press_keys="اضغط من 1 إلى 7",

@@ -17,6 +17,7 @@ GERMAN = Words(
     seconds_left="noch {seconds} s",
     continue_in="In {seconds} s können Sie weitergehen",
     continue_now="Drücken Sie die Leertaste, um weiterzugehen",
+    click_now="Klicken Sie oder drücken Sie die Leertaste, um weiterzugehen",
     pause_hint="Pause · gedrückt halten, um die Kraft auszuschalten",
     please_answer="Bitte antworten",
     press_keys="1 bis 7 drücken",

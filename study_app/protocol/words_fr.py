@@ -17,6 +17,7 @@ FRENCH = Words(
     seconds_left="encore {seconds} s",
     continue_in="Vous pourrez continuer dans {seconds} s",
     continue_now="Appuyez sur la barre d'espace pour continuer",
+    click_now="Cliquez ou appuyez sur la barre d'espace pour continuer",
     pause_hint="Pause · maintenir pour couper la force",
     please_answer="Réponse attendue",
     press_keys="touches 1 à 7",

@@ -211,6 +211,21 @@ def test_space_leaves_an_exploration_after_its_least_time(opened: Opened) -> Non
     assert opened.kinds == [Continue]
 
 
+def test_a_click_leaves_an_exploration_where_the_mouse_is_the_device(captured: Opened, qtbot: Any) -> None:
+    captured.window.show_page(task_page(task=explore()))
+    tank = captured.window.tank
+    assert tank is not None
+    captured.window.show_view(view(elapsed_s=29.9))
+    qtbot.mouseClick(tank, Qt.MouseButton.LeftButton)
+    assert (captured.kinds, captured.buttons) == ([], [1, 0])
+    captured.window.show_view(view(elapsed_s=30.0))
+    qtbot.mouseClick(tank, Qt.MouseButton.RightButton)
+    assert captured.kinds == []
+    qtbot.mouseClick(tank, Qt.MouseButton.LeftButton)
+    assert captured.kinds == [Continue]
+    assert not any(bits & 1 for bits in captured.buttons[2:])  # it is no answer to the page that comes next
+
+
 def test_painted_views_are_told(opened: Opened, qtbot: Any) -> None:
     opened.window.show_page(task_page())
     with qtbot.waitSignal(opened.window.painted, timeout=2000) as told:
