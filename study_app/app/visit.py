@@ -105,6 +105,8 @@ class Visit(QObject):
         if self._follows_machine and settings.results_folder != self.results and self._home_place is not None:
             self.results = settings.results_folder
             self._home_place.show_results(self.results)
+            if self.desk is not None:
+                self.desk.show_results(self.results)
         self._show_machine()
 
     def _test_display(self) -> None:
