@@ -9,6 +9,7 @@ from study_app.devices import is_simulated, kind_of, moves_by_itself
 from study_app.devices.hand_orders import HandOrders, hand_of
 from study_app.devices.mouse import MouseDevice
 from study_app.gui.bridge import SessionBridge
+from study_app.gui.devices.view import TITLES
 from study_app.gui.graphics import has_card
 from study_app.gui.operator import OperatorWindow
 from study_app.gui.operator.progress import SessionProgress, progress_after, stages
@@ -34,15 +35,6 @@ if TYPE_CHECKING:
     from study_app.haptics.servo import Servo
     from study_app.store.open_session import SessionStore
 
-DEVICE_NAMES = {
-    "mouse": "Mouse",
-    "falcon": "Novint Falcon",
-    "spacemouse": "SpaceMouse",
-    "scripted": "Scripted hand",
-    "falcon-emulated": "Emulated Falcon",
-    "falcon-socket": "Falcon behind a socket",
-}
-
 
 def open_windows(
     chosen: NewSession,
@@ -54,11 +46,12 @@ def open_windows(
     start: Start = FIRST,
     *,
     text_scale: float = 1.0,
+    refresh_hz: float | None = None,
 ) -> SessionBridge:
     """Open the operator's and the participant's window; the bridge returned is to be started.
 
     ``start`` is where a resumed session goes on, ``text_scale`` how much larger than designed the participant's words
-    must be at least.
+    must be at least. With ``refresh_hz`` there are so many frames a second by the clock, whatever the screen's rate is.
     """
     clock, device, servo = store.clock.seconds, machine.device, machine.servo
     journal = WatchedJournal(store, progress_after(SessionProgress(protocol, schedule), store.lines), clock)
@@ -77,7 +70,7 @@ def open_windows(
         windowed=chosen.windowed,
         captures_pointer=by_mouse,
         pilot=chosen.pilot,
-        on_card=has_card(),
+        on_card=refresh_hz is None and has_card(),
         text_scale=text_scale,
     )
     hand = hand_of(device)
@@ -98,7 +91,7 @@ def open_windows(
         hand_for=_hands(hand, chosen, clock) if hand is not None and moves_by_itself(device.name) else None,
     )
     shown_on, operated_on = choose_screens(chosen.screen)
-    bridge = SessionBridge(parts, participant, operator, refresh_hz=shown_on.refreshRate() or 60.0)
+    bridge = SessionBridge(parts, participant, operator, refresh_hz=refresh_hz or shown_on.refreshRate() or 60.0)
     place(operator, operated_on, corner=shown_on is operated_on)
     operator.show()
     participant.open_on(shown_on)
@@ -131,7 +124,7 @@ def _facts(chosen: NewSession, protocol: Protocol, schedule: Schedule, machine: 
         expected_s=expected_duration_s(protocol),
         answers_of=protocol.responses_per_participant(),
         lateness_limit_s=protocol.limits.lateness_ms / 1000,
-        device_name=DEVICE_NAMES[kind_of(chosen.device)],
+        device_name=TITLES[kind_of(chosen.device)],
         device_kind="mouse" if seen_alone else "simulated" if nobody else "falcon",
         device_rows=(
             ("Priority", str(machine.servo.describe()["priority"]).partition(" (")[0]),

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QBoxLayout, QButtonGroup, QFileDialog, QHBoxLayout
 
 from study_app.gui.cards import SHADOW, Card
 from study_app.gui.controls import ActionButton
-from study_app.gui.devices.rows import DeviceList
+from study_app.gui.devices.rows import LEAST_WORDS, DeviceList
 from study_app.gui.devices.view import DeviceShown
 from study_app.gui.labels import Elided, label
 from study_app.gui.place import Place
@@ -38,6 +38,7 @@ class FirmwareCard(Card):
             wraps=True,
         )
         about.setFont(font("label", weight=400))
+        about.setMinimumWidth(LEAST_WORDS)
         self.file = Elided("label", "text")
         self.choose = ActionButton("file", "Choose file …", height=38)
         self.forget = ActionButton("", "Forget", height=38)
@@ -77,6 +78,7 @@ class HelpCard(Card):
         ):
             line = label(words, "label", "text2", wraps=True)
             line.setFont(font("label", weight=400))
+            line.setMinimumWidth(LEAST_WORDS)
             self.column.addWidget(line)
 
 

@@ -11,6 +11,7 @@ from study_app.gui.devices.view import DeviceShown
 from study_app.gui.labels import label, set_ink
 from study_app.gui.theme import font
 
+LEAST_WORDS = 280  # narrower, wrapped words would ask for room that they do not need
 INSET = 30  # behind a radio's mark
 
 
@@ -113,4 +114,5 @@ class DeviceList(Card):
 def _words(ink: str, *, small: bool = False) -> QLabel:
     made = label("", "small" if small else "label", ink, wraps=True)  # type: ignore[arg-type]
     made.setFont(font("small" if small else "label", weight=400))
+    made.setMinimumWidth(LEAST_WORDS)
     return made

@@ -12,7 +12,7 @@ from study_app.gui.controls import ActionButton, Choice, Radio, Toggle
 from study_app.gui.devices.view import TITLES
 from study_app.gui.labels import Elided, label
 from study_app.gui.screens import ScreenShown
-from study_app.gui.settings.measure import Measure
+from study_app.gui.settings.measure import LEAST_WORDS, Measure
 from study_app.gui.settings.offset import OffsetForm
 from study_app.gui.theme import PARTICIPANT, RADIUS_CONTROL, font
 from study_app.store.machine import DISTANCE_MM, LEAST_X_HEIGHT_DEG, WIDTH_MM, MachineSettings
@@ -32,6 +32,7 @@ class ScreensCard(Card):
         super().__init__("Participant's screen", gap=10)
         self.radios: list[Radio] = []
         self.note = label("", "label", "warn", wraps=True)
+        self.note.setMinimumWidth(LEAST_WORDS)
         self.identify = ActionButton("eye", "Identify", height=38)
         self.test = ActionButton("screen", "Display test …", height=38)
         self.identify.clicked.connect(self.identify_asked)
@@ -83,6 +84,7 @@ def _screen_row(screen: ScreenShown) -> tuple[QWidget, Radio]:
     size = f"{screen.width_mm:.0f} × {screen.height_mm:.0f} mm" if screen.width_mm > 0 else "its size is not told"
     about = label(f"{screen.words}  ·  {size}", "label", "text2", wraps=True)
     about.setFont(font("label", weight=400, tabular=True))
+    about.setMinimumWidth(LEAST_WORDS)
     radio.setAccessibleName(f"Screen {screen.number}, {screen.name}, {screen.words}")
     name = Elided("label", "text2")
     name.show_text(screen.name)
@@ -147,6 +149,7 @@ class SeenCard(Card):
         self.sample = TextSample()
         self.said = label("", "label", "text2", wraps=True)
         self.said.setFont(font("label", weight=400, tabular=True))
+        self.said.setMinimumWidth(LEAST_WORDS)
         self.distance.entered.connect(lambda value: self.changed.emit("viewing_distance_mm", value))
         self.width_mm.entered.connect(lambda value: self.changed.emit("screen_width_mm", value))
         for part in (self.distance, self.width_mm, self.sample, self.said):

@@ -9,6 +9,8 @@ from study_app.gui.fields import NumberField, write_number
 from study_app.gui.labels import label, set_ink
 from study_app.gui.theme import font
 
+LEAST_WORDS = 280  # narrower, wrapped words would ask for room that they do not need
+
 
 class Measure(QWidget):
     """A name, a field and a unit, and a line below; ``entered`` carries the number, None where it was emptied."""
@@ -38,6 +40,7 @@ class Measure(QWidget):
         column.addLayout(row)
         column.addWidget(self.below)
         self.below.setFont(font("small"))
+        self.below.setMinimumWidth(LEAST_WORDS)
         self.field.entered.connect(self._take)
         self.field.unread.connect(self._unread)
         self.field.abandoned.connect(lambda: self._say("", bad=False))

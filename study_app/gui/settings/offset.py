@@ -9,6 +9,7 @@ from study_app.gui.cards import Icon
 from study_app.gui.controls import ActionButton, Choice
 from study_app.gui.fields import NumberField, read_number, write_number
 from study_app.gui.labels import label
+from study_app.gui.settings.measure import LEAST_WORDS
 from study_app.gui.theme import font
 from study_app.store.machine import OFFSET_MS, SPREAD_MS, DisplayOffset
 
@@ -33,6 +34,7 @@ class OffsetForm(QWidget):
             self.how.addItem(way.capitalize(), way)
         self.said = label("", "label", "text2", wraps=True)
         self.said.setFont(font("label", weight=400, tabular=True))
+        self.said.setMinimumWidth(LEAST_WORDS)
         self.sign = Icon("warning", "bad", 16)
         self.why = label("", "label", "bad", wraps=True)
         self.keep = ActionButton("save", "Keep offset", height=38)
