@@ -147,4 +147,6 @@ def _number(us: float) -> str:
 
 
 def _ratio(ratio: float) -> str:
-    return f"{ratio:.2f}" if ratio < 10 else f"{ratio:,.0f}"
+    if ratio >= 1000:
+        return "> 1,000"
+    return f"{ratio:.2f}" if ratio < 10 else f"{ratio:.0f}"

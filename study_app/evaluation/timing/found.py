@@ -109,25 +109,30 @@ class Timed:
             return ()
         above_us = servo.late_us(50) - bare.late_us(50)
         ratio = self.ratio(servo, 99)
-        fewer = thread.late_share / servo.late_share if servo.late else float("inf")
-        times = "none against " + f"{thread.late}" if not servo.late else f"{fewer:.1f} times"
         took_us = servo.busy_us(99)
-        return (
-            Promise(
-                level,
-                f"median {above_us:+.1f} µs against the bare loop (promised: at most +{MEDIAN_US:g} µs)",
-                above_us <= MEDIAN_US,
-            ),
-            Promise(level, f"p99 {ratio:.2f} times the bare loop's (at most {TAIL_RATIO:g})", ratio <= TAIL_RATIO),
-            Promise(
-                level,
-                f"turns over 1 ms late {times} fewer than of a Python thread (at least {FEWER_LATE:g} times)"
-                if servo.late
-                else f"turns over 1 ms late: {times} of a Python thread (at least {FEWER_LATE:g} times fewer)",
-                thread.late_share >= FEWER_LATE * servo.late_share,
-            ),
-            Promise(level, f"a turn took {took_us:.1f} µs at p99 (at most {BUSY_US:g})", took_us <= BUSY_US),
+        late = (
+            f"{servo.late:,} turns over 1 ms late, {_fewer(thread, servo)} than of a Python thread "
+            f"(at least {FEWER_LATE:g} times fewer; the bare loop: {_fewer(thread, bare)})"
         )
+        return tuple(
+            Promise(level, said, held)
+            for said, held in (
+                (
+                    f"median {above_us:+.1f} µs against the bare loop (at most +{MEDIAN_US:g} µs)",
+                    above_us <= MEDIAN_US,
+                ),
+                (f"p99 {ratio:.2f} times the bare loop's (at most {TAIL_RATIO:g})", ratio <= TAIL_RATIO),
+                (late, thread.late_share >= FEWER_LATE * servo.late_share),
+                (f"a turn took {took_us:.1f} µs at p99 (at most {BUSY_US:g} µs)", took_us <= BUSY_US),
+            )
+        )
+
+
+def _fewer(thread: Lane, other: Lane) -> str:
+    """Return in words how many times fewer turns over 1 ms late one lane has than a Python thread."""
+    if other.late == 0:
+        return f"{thread.late:,} fewer"
+    return f"{thread.late_share / other.late_share:.1f} times fewer"
 
 
 def lane(kind: Kind, grant: Grant, parts: Sequence[Taken]) -> Lane:
