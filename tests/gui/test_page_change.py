@@ -170,6 +170,27 @@ def test_tab_goes_round_on_the_page_and_never_to_the_window(window: ParticipantW
     assert quest.rows[0].hasFocus()
 
 
+def test_the_page_in_another_language_begins_with_the_keyboard_where_it_begins(window: ParticipantWindow) -> None:
+    window.activateWindow()
+    pages = {code: text_page("consent", languages=("en", "nl"), language=code) for code in ("en", "nl")}
+
+    def answer(event: Any) -> None:
+        if isinstance(event, LanguageChosen):
+            window.show_page(pages[event.language])
+
+    window.event.connect(answer)
+    window.show_page(pages["en"])
+    for keys, language in (
+        ((Qt.Key.Key_Tab, Qt.Key.Key_Right), "nl"),
+        ((Qt.Key.Key_Tab, Qt.Key.Key_Left), "en"),
+    ):
+        for key in keys:
+            QTest.keyClick(QApplication.focusWidget() or window, key)
+        QApplication.processEvents()
+        assert window.page == pages[language]
+        assert QApplication.focusWidget() is window.widget
+
+
 def test_another_language_changes_every_page_that_follows(window: ParticipantWindow) -> None:
     told: list[Any] = []
     window.event.connect(told.append)
@@ -178,6 +199,7 @@ def test_another_language_changes_every_page_that_follows(window: ParticipantWin
     assert isinstance(widget, TextWidget)
     assert widget.languages is not None
     QTest.mouseClick(widget.languages.buttons[2], Qt.MouseButton.LeftButton)
+    QApplication.processEvents()
     assert told == [LanguageChosen(told[0].at_s, "ar")]
     window.show_page(text_page("consent", languages=("en", "nl", "ar"), language="ar"))
     assert window.widget.layoutDirection() == Qt.LayoutDirection.RightToLeft

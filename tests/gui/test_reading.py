@@ -157,7 +157,31 @@ def test_a_key_on_a_language_chooses_it_and_does_not_agree(qtbot: Any, key: Qt.K
     assert opened.page.languages is not None
     opened.page.languages.buttons[1].setFocus(Qt.FocusReason.TabFocusReason)
     opened.press(key)
+    QApplication.processEvents()
     assert opened.told == [LanguageChosen(100.0, "nl")]
+
+
+def test_tab_and_an_arrow_choose_a_language(qtbot: Any) -> None:
+    opened = Opened(qtbot, text_page("consent", languages=("en", "nl", "de")))
+    assert opened.page.languages is not None
+    assert opened.page.button is not None
+    opened.press(Qt.Key.Key_Tab)
+    assert opened.page.languages.buttons[0].hasFocus()
+    opened.press(Qt.Key.Key_Tab)
+    assert opened.page.button.hasFocus()
+    opened.press(Qt.Key.Key_Tab, Qt.Key.Key_Right)
+    QApplication.processEvents()
+    assert opened.told == [LanguageChosen(100.0, "nl")]
+
+
+def test_tab_comes_to_the_language_of_the_page_wherever_it_stands(qtbot: Any) -> None:
+    opened = Opened(qtbot, text_page("consent", languages=("en", "nl", "de"), language="nl"), language="nl")
+    assert opened.page.languages is not None
+    opened.press(Qt.Key.Key_Tab)
+    assert opened.page.languages.buttons[1].hasFocus()
+    opened.press(Qt.Key.Key_Left)
+    QApplication.processEvents()
+    assert opened.told == [LanguageChosen(100.0, "en")]
 
 
 def test_the_language_of_the_page_is_marked_and_choosing_it_tells_nothing(qtbot: Any) -> None:
@@ -167,6 +191,7 @@ def test_the_language_of_the_page_is_marked_and_choosing_it_tells_nothing(qtbot:
     assert (english.isChecked(), dutch.isChecked()) == (False, True)
     assert (english.text(), dutch.text()) == ("English", "Nederlands")
     QTest.mouseClick(dutch, Qt.MouseButton.LeftButton)
+    QApplication.processEvents()
     assert opened.told == []
     assert dutch.isChecked()
 

@@ -96,7 +96,10 @@ class LanguageButton(QRadioButton):
 
 
 class LanguageSwitch(QGroupBox):
-    """The languages beside each other; ``chosen`` comes with the code of another than the page's."""
+    """The languages beside each other: Tab comes to the page's own, arrows choose the one beside it.
+
+    ``chosen`` comes with the code of another than the page's.
+    """
 
     chosen = Signal(str)
 
@@ -106,6 +109,8 @@ class LanguageSwitch(QGroupBox):
         self.buttons = tuple(LanguageButton(language, self) for language in languages)
         for button in self.buttons:
             button.setChecked(button.language == present)
+            policy = Qt.FocusPolicy.StrongFocus if button.isChecked() else Qt.FocusPolicy.ClickFocus
+            button.setFocusPolicy(policy)  # Qt does so itself, but not for a button that is checked this early
             button.clicked.connect(lambda _=False, code=button.language: self._choose(code, present))
 
     def set_scale(self, scale: float) -> None:

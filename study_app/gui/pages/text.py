@@ -57,7 +57,10 @@ class TextWidget(ReadingPage):
         self.languages: LanguageSwitch | None = None
         if page.languages:
             self.languages = LanguageSwitch(page.languages, page.language, words.choose_language, self)
-            self.languages.chosen.connect(self._choose_language)
+            later = Qt.ConnectionType.QueuedConnection  # the page goes, and must not while its button hears a key
+            self.languages.chosen.connect(self._choose_language, later)
+            for language in self.languages.buttons:
+                QWidget.setTabOrder(language, self.button)  # above the text, so before its button
         if page.stays_until_s is not None:
             self._ticker.start()
         self.tick()
