@@ -25,7 +25,7 @@ REACHED: Final = 0.85  # share of the workspace that a path may fill
 APPROACH_MPS: Final = 0.08
 SHORTEST_APPROACH_S: Final = 0.5
 _REST_S: Final = 2.0
-_LEGS: Final = 8
+_LEGS: Final = 5
 _RATE_HZ: Final = 1000.0
 _HALF_TURN: Final = 0.7071  # of a leg, to either side of the way
 
@@ -49,11 +49,14 @@ def programme(name: str, scene: Scene, half_m: Vector) -> Motion:
         "reverse": {"radius_m": radius_m, "rest_s": _REST_S},
         "line": {"moving_s": 2 * x_m},
         "stop": {"moving_s": 2 * x_m, "rest_s": _REST_S},
-        "zigzag": {"leg_s": min(2 * z_m / (_LEGS * _HALF_TURN), x_m / _HALF_TURN), "legs": _LEGS},
+        "zigzag": {"leg_s": min(2 * x_m / (_LEGS * _HALF_TURN), 2 * z_m / _HALF_TURN), "legs": _LEGS},
         "reach": {"distance_m": min(0.6, 2 * x_m)},
     }
     found = path(name, rate_hz=_RATE_HZ, **sized[name])
-    places_m = found.position_m - (found.position_m.max(axis=0) + found.position_m.min(axis=0)) / 2
+    way_m = found.position_m
+    if name == "zigzag":  # from left to right instead of away, since a workspace is widest there
+        way_m = way_m[:, [2, 1, 0]] * [-1.0, 1.0, 1.0]
+    places_m = way_m - (way_m.max(axis=0) + way_m.min(axis=0)) / 2
     return Motion(found.t_s, places_m / scene.scale)
 
 
