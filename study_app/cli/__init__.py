@@ -21,6 +21,7 @@ from study_app.cli import (
     report,
     results,
     running,
+    screenshots,
     soak,
     solver,
     stability,
@@ -46,7 +47,7 @@ def commands(context: click.Context) -> None:
         context.exit(app.home())
 
 
-for module in (running, results, report, power, model, accuracy, stability, identify, solver, soak, timing, falcon):
+for module in (running, results, report, power, model, accuracy, stability, identify, solver, soak, timing, screenshots, falcon):
     for command in vars(module).values():
         if isinstance(command, click.Command):
             commands.add_command(command)

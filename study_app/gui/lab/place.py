@@ -165,6 +165,11 @@ class LabPlace(Place):
             shortcut.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
             shortcut.activated.connect(signal)
 
+    @property
+    def view(self) -> LabView | None:
+        """What is shown; None before the first."""
+        return self._view
+
     def show_view(self, view: LabView) -> None:
         """Show the lab as of now."""
         self._view = view

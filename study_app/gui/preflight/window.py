@@ -154,6 +154,10 @@ class PreflightWindow(QWidget):
                 self._values[name] = value
             self._values[name].setText(words)
 
+    def values(self) -> tuple[QLabel, ...]:
+        """Return the values of what will run."""
+        return tuple(self._values.values())
+
     def _start(self) -> None:
         """Begin, once."""
         if not self._done and self.start.isEnabled():

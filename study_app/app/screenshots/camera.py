@@ -1,0 +1,87 @@
+"""Waits until a window shows what is wanted of it, and keeps a picture of it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final, TypeVar
+
+from PySide6.QtCore import QBuffer, QEventLoop, QIODevice, QSize
+from PySide6.QtWidgets import QApplication, QWidget
+
+from study_app.errors import StudyError
+from study_app.store.atomic import write_file
+
+PATIENCE_S: Final = 180.0  # the first session after an installation compiles
+SETTLED_MS: Final = 250
+TURN_MS: Final = 20
+
+T = TypeVar("T")
+
+
+class Camera:
+    """Takes pictures into a folder.
+
+    Parameters
+    ----------
+    to
+        The folder; it must exist.
+    tell
+        Is given a line for every picture.
+    """
+
+    def __init__(self, to: Path, tell: Callable[[str], object]) -> None:
+        self._to, self._tell = to, tell
+        self.taken: list[Path] = []
+
+    def until(self, found: Callable[[], T | None], what: str) -> T:
+        """Let the program go on until ``found`` returns something, and return that.
+
+        Raises
+        ------
+        StudyError
+            It did not come.
+        """
+        deadline = time.monotonic() + PATIENCE_S
+        while not (it := found()):
+            if time.monotonic() > deadline:
+                raise StudyError(f"no picture could be taken: waited {PATIENCE_S:g} s in vain for {what}")
+            self._turn()
+        return it
+
+    def wait(self, milliseconds: int) -> None:
+        """Let the program go on for so long."""
+        deadline = time.monotonic() + milliseconds / 1000
+        while time.monotonic() < deadline:
+            self._turn()
+
+    def take(self, window: QWidget, name: str, size: tuple[int, int] | None = None, *, at_once: bool = False) -> None:
+        """Keep a picture of a window, in ``size`` [logical px] where that is given, once it has settled.
+
+        Raises
+        ------
+        StoreError
+            The file cannot be written.
+        """
+        if size is not None:
+            window.resize(QSize(*size))
+        if not at_once:
+            self.wait(SETTLED_MS)
+        held = QBuffer()
+        held.open(QIODevice.OpenModeFlag.WriteOnly)
+        window.grab().save(held, "PNG")
+        path = self._to / f"{name}.png"
+        write_file(path, bytes(held.data().data()))
+        self.taken.append(path)
+        self._tell(str(path))
+
+    @staticmethod
+    def _turn() -> None:
+        QApplication.processEvents(QEventLoop.ProcessEventsFlag.AllEvents, TURN_MS)
+        time.sleep(0.002)  # what runs in other threads goes on, too
+
+
+def shown(kind: type[T]) -> T | None:
+    """Return the window of a kind that is shown."""
+    return next((one for one in QApplication.topLevelWidgets() if isinstance(one, kind) and one.isVisible()), None)

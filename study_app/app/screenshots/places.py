@@ -1,0 +1,101 @@
+"""The main window at each of its places, and the windows that open from them, in both themes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Final
+
+from PySide6.QtWidgets import QDialog
+
+from study_app.app.screenshots.camera import Camera, shown
+from study_app.app.screenshots.stage import STUDY
+from study_app.app.visit import Visit
+from study_app.gui.home.facts import StudyFacts, study_facts
+from study_app.gui.settings.display_test import DisplayTest
+from study_app.gui.theme import Theme
+
+HOME: Final = (1440, 900)
+WIDE: Final = (1600, 900)
+FELT_MS: Final = 4300
+TESTED_MS: Final = 2500
+PATH: Final = "zigzag"
+
+
+def take_places(camera: Camera, results: Path, theme: Theme) -> None:
+    """Take home with its questions, results, lab, devices with a diagnosis, and the machine with its display test."""
+    visit = Visit(results)
+    window = visit.window
+    window.show_theme(theme)
+    visit.open()
+    try:
+        home: Any = window.place("home")
+        camera.until(lambda: home.sessions.lines, "the list of sessions")
+        camera.until(lambda: visit.devices.shown, "the list of devices")
+        camera.take(window, f"home-{theme.name}", HOME)
+        _take_questions(camera, home, theme)
+        _take_results(camera, visit, theme)
+        _take_lab(camera, visit, theme)
+        _take_devices(camera, visit, theme)
+        _take_machine(camera, visit, theme)
+    finally:
+        window.close()
+        visit.end()
+
+
+def _take_questions(camera: Camera, home: Any, theme: Theme) -> None:
+    facts = study_facts(STUDY)
+    assert isinstance(facts, StudyFacts)  # noqa: S101 - it ships with the program
+    for ask, name in ((home.ask_for_session, "new-session"), (home.ask_for_rehearsal, "rehearse")):
+        ask(facts)
+        camera.take(home.dialog, f"{name}-{theme.name}")
+        home.dialog.reject()
+
+
+def _take_results(camera: Camera, visit: Visit, theme: Theme) -> None:
+    visit.window.go("results")
+    place: Any = visit.window.place("results")
+    visit.window.resize(*HOME)
+    camera.until(lambda: place.view.studies, "the studies")
+    place.study_asked.emit(visit.results / STUDY)
+    camera.until(
+        lambda: place.view.figures and place.view.drawing is None and place.view.testing is None, "the figures"
+    )
+    camera.take(visit.window, f"results-{theme.name}", HOME)
+
+
+def _take_lab(camera: Camera, visit: Visit, theme: Theme) -> None:
+    visit.window.resize(*WIDE)
+    visit.window.go("lab")
+    assert visit.lab is not None  # noqa: S101 - one has gone there
+    lab = visit.lab
+    camera.until(lambda: lab.live, "the lab's device")
+    lab.place.path_chosen.emit(PATH)
+    camera.until(lambda: lab.place.view is not None and not lab.place.view.measuring, "the lab's prices")
+    camera.wait(FELT_MS)
+    camera.take(visit.window, f"lab-{theme.name}", WIDE)
+
+
+def _take_devices(camera: Camera, visit: Visit, theme: Theme) -> None:
+    visit.window.go("devices")
+    camera.take(visit.window, f"devices-{theme.name}", HOME)
+    over: list[bool] = []
+    visit.devices.diagnose("falcon-emulated")
+    dialog = visit.devices.dialog
+    assert dialog is not None  # noqa: S101 - it was just opened
+    dialog.over.connect(over.append)
+    camera.until(lambda: over, "the diagnosis")
+    camera.take(dialog, f"diagnosis-{theme.name}")
+    dialog.done(QDialog.DialogCode.Rejected)
+
+
+def _take_machine(camera: Camera, visit: Visit, theme: Theme) -> None:
+    visit.window.go("machine")
+    camera.take(visit.window, f"machine-{theme.name}", HOME)
+    place: Any = visit.window.place("machine")
+    place.open_test()
+    test = camera.until(lambda: shown(DisplayTest), "the display test")
+    test.showNormal()
+    test.resize(1280, 720)
+    camera.wait(TESTED_MS)
+    camera.take(test, f"display-test-{theme.name}", (1280, 720))
+    test.close()

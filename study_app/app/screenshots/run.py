@@ -1,0 +1,81 @@
+"""All pictures, one after the other."""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import chdir, contextmanager
+from pathlib import Path
+from typing import Final
+
+from PySide6.QtCore import QtMsgType, qInstallMessageHandler
+
+from study_app.app.screenshots.camera import Camera
+from study_app.app.screenshots.places import take_places
+from study_app.app.screenshots.session import take_session, take_single_blind
+from study_app.app.screenshots.stage import STUDY, quick, rehearsed
+from study_app.gui.application import application_here
+from study_app.gui.collector import collecting_here
+from study_app.gui.theme import DARK, LIGHT
+from study_app.user_folder import FOLDER_VARIABLE
+
+GROUPS: Final = ("places", "session", "single-blind")
+
+
+def screenshots(to: Path, *, only: str | None = None, tell: Callable[[str], object] = print) -> tuple[Path, ...]:
+    """Take pictures of every window in both themes into the folder ``to``; return the files.
+
+    Parameters
+    ----------
+    to : must exist
+    only : one of `GROUPS`, by default all
+    tell : is given a line for every picture
+
+    Raises
+    ------
+    StudyError
+        A window did not show what was waited for.
+    StoreError
+        A picture cannot be written.
+    """
+    qInstallMessageHandler(_pass_on)
+    application_here()
+    camera = Camera(to.resolve(), tell)
+    with tempfile.TemporaryDirectory(prefix="liquid-study-") as held, _at_home_in(Path(held)), collecting_here():
+        if only in (None, "places"):
+            results = rehearsed(Path())
+            for theme in (LIGHT, DARK):
+                take_places(camera, results, theme)
+        if only in (None, "session"):
+            take_session(camera, quick(Path()), Path("held", STUDY))
+        if only in (None, "single-blind"):
+            take_single_blind(camera, quick(Path(), blinding="single"), Path("seen", STUDY))
+    return tuple(camera.taken)
+
+
+@contextmanager
+def _at_home_in(folder: Path) -> Iterator[None]:
+    """Let the program keep its settings in ``folder`` and begin from there, so that no picture names a place."""
+    with _environment(FOLDER_VARIABLE, str(folder / "settings")), chdir(folder):
+        yield
+
+
+@contextmanager
+def _environment(name: str, value: str) -> Iterator[None]:
+    before = os.environ.get(name)
+    os.environ[name] = value
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[name]
+        else:
+            os.environ[name] = before
+
+
+def _pass_on(kind: QtMsgType, _context: object, message: str) -> None:
+    """Print what Qt says, but for what it says of having no screen."""
+    if kind != QtMsgType.QtDebugMsg and not message.startswith("This plugin does not support"):
+        sys.stderr.write(f"{message}\n")

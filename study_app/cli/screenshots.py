@@ -1,0 +1,21 @@
+"""The command that takes pictures of every window."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import click
+
+
+@click.command()
+@click.option("--to", type=click.Path(path_type=Path), required=True, metavar="DIR", help="Folder for the pictures.")
+@click.option("--only", type=click.Choice(("places", "session", "single-blind")), help="Some of them; default: all.")
+def screenshots(to: Path, only: str | None) -> None:
+    """Take pictures of every window in both themes, of the real program; takes some minutes and needs no display."""
+    os.environ["QT_QPA_PLATFORM"] = "offscreen"  # the same pictures on every machine
+    from study_app.app.screenshots import screenshots as take
+    from study_app.evaluation.output import make_folder
+
+    make_folder(to)
+    take(to, only=only, tell=click.echo)
