@@ -1,0 +1,55 @@
+"""Pictures of the windows: taken of a real session, whole, and nothing of it stays behind."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from PySide6.QtGui import QImage
+from PySide6.QtWidgets import QApplication, QLabel
+
+from study_app.app.screenshots import camera, screenshots, session
+from study_app.app.screenshots.camera import Camera
+from study_app.errors import StudyError
+from tests.compiled import needs_servo
+
+
+@needs_servo
+def test_a_session_is_held_and_its_cockpit_taken_in_both_themes(qapp, tmp_path, monkeypatch):
+    monkeypatch.setattr(session, "TRACED_MS", 500)
+    monkeypatch.setattr("study_app.gui.beginning.MEASURED_S", 0.1)
+    here, told = Path.cwd(), []
+    taken = screenshots(tmp_path, only="single-blind", tell=told.append)
+    assert [path.name for path in taken][-3:] == [
+        "cockpit-single-blind-dark.png",
+        "cockpit-single-blind-light.png",
+        "participant-end.png",
+    ]
+    assert told == [str(path) for path in taken]
+    dark, light = (QImage(str(path)) for path in taken[-3:-1])
+    assert dark.size() == light.size()
+    assert (dark.width(), dark.height()) == session.COCKPIT
+    lightness = [image.scaled(1, 1).pixelColor(0, 0).lightness() for image in (dark, light)]
+    assert lightness[0] < 60
+    assert lightness[1] > 180
+    assert Path.cwd() == here
+    assert not [window for window in QApplication.topLevelWidgets() if window.isVisible()]
+    assert sorted(tmp_path.iterdir()) == sorted(taken)
+
+
+def test_what_does_not_come_is_named(qapp, tmp_path, monkeypatch):
+    monkeypatch.setattr(camera, "PATIENCE_S", 0.1)
+    with pytest.raises(StudyError, match="in vain for the figures"):
+        Camera(tmp_path, print).until(lambda: None, "the figures")
+
+
+def test_a_picture_is_what_the_window_shows(qtbot, tmp_path):
+    shown = QLabel("here")
+    qtbot.addWidget(shown)
+    shown.show()
+    taking = Camera(tmp_path, print)
+    taking.take(shown, "words", (300, 100))
+    found = QImage(str(tmp_path / "words.png"))
+    assert (found.width(), found.height()) == (300, 100)
+    assert found == shown.grab().toImage().convertToFormat(found.format())
+    assert [path.name for path in tmp_path.iterdir()] == ["words.png"]
