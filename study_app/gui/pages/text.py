@@ -60,6 +60,7 @@ class TextWidget(ReadingPage):
             later = Qt.ConnectionType.QueuedConnection  # the page goes, and must not while its button hears a key
             self.languages.chosen.connect(self._choose_language, later)
             for language in self.languages.buttons:
+                assert self.button is not None  # noqa: S101  # these pages have one
                 QWidget.setTabOrder(language, self.button)  # above the text, so before its button
         if page.stays_until_s is not None:
             self._ticker.start()
