@@ -97,7 +97,8 @@ def _delays(
         if decided.equivalence_bound is not None:
             here = answers[[0, FULL], :, :n]
             away = here[:, :, :, 1:] - here[:, :, :, :1]
-            shown = [drawn.equivalent(one, decided.equivalence_bound, decided.alpha).sum(axis=0) for one in away]
+            bound = decided.equivalence_bound
+            shown = [drawn.equivalent(one, bound, decided.alpha, rng).sum(axis=0) for one in away]
             counted.setdefault("equivalent", []).append(np.array(shown).transpose(0, 2, 1))
     return {what: np.array(numbers) for what, numbers in counted.items()}
 

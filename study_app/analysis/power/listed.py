@@ -147,9 +147,9 @@ def _explained(question: Question, found: Powers) -> list[str]:
             ]
         case "equivalence":
             return [
-                f"Two one-sided t tests within ±{found.plan.decided.equivalence_bound} points. Where the model's "
-                "difference is near the bound or beyond it, finding equivalence would be wrong, and few should. The "
-                "report calls a delay equivalent only where tests without normality agree, which is a little rarer."
+                f"Two one-sided t tests within ±{found.plan.decided.equivalence_bound} points, with which changing "
+                "signs and signed ranks must agree. Where the model's difference is near the bound or beyond it, "
+                "finding equivalence would be wrong, and few should."
             ]
 
 
