@@ -8,6 +8,7 @@ from typing import Final
 import pandas as pd
 
 from study_app.analysis.measures import QUARTILES
+from study_app.analysis.multiples import told_lines
 from study_app.analysis.questions import Block
 from study_app.analysis.tables import Study
 
@@ -80,7 +81,7 @@ def _sentences(study: Study, block: Block) -> list[str]:
     simulated = "SIMULATED participants, no people; " if study.simulated else ""
     start = f"{'Pilot. ' if study.pilot else ''}Agreement with {statements} on {settings}"
     head = f"{start} ({simulated}{counts(study, block)[0]})."
-    drawn = _bars(block) if block.kind == "liquids" else _plots(block)
+    drawn = _bars(block) if block.kind == "liquids" else _plots(study, block)
     gone = [_left_out(study), _excluded_sessions(study), _excluded_trials(study, block)]
     return [
         head,
@@ -104,13 +105,13 @@ def _bars(block: Block) -> list[str]:
     ]
 
 
-def _plots(block: Block) -> list[str]:
+def _plots(study: Study, block: Block) -> list[str]:
     quartiles = f"the middle half of the answers; quartiles {QUARTILES}."
     scale = f"Answers from 1 ({block.labels[0]}) to 7 ({block.labels[-1]})."
     if block.revealed:
         return [
-            "Thin lines: participants, slightly apart in height where they coincide; thick line: median; band: "
-            + quartiles,
+            f"Thin lines: {told_lines(len(set(study.answers(block)['participant'])))}, slightly apart in height where "
+            f"they coincide; thick line: median; band: {quartiles}",
             scale,
         ]
     return ["Dots: participants, equal answers beside each other; ring: median; band: " + quartiles, scale]

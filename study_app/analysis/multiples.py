@@ -26,6 +26,9 @@ BOTTOM: Final = 0.55
 TOP: Final = 7.5
 LEVEL_PT: Final = PLOT_PT / (TOP - BOTTOM)
 DOT_PT: Final = 1.8
+MOST_LINES: Final = 60
+"""Of more participants so many are drawn: more lines hide the median and the band."""
+
 SPREAD: Final = 0.24
 """Height over which coinciding lines of participants are drawn apart [levels]."""
 
@@ -56,8 +59,8 @@ def draw(
 ) -> Sheet:
     """Draw the statements over delay, or, without ``delays_ms``, over the settings' codes.
 
-    Over delay (true scale, ascending): a thin line per participant, quartile band, thick median. Over codes, whose
-    order says nothing: a dot per participant, quartile band, median ring, and no line.
+    Over delay (true scale, ascending): a thin line per participant (of many: of some), quartile band, thick median.
+    Over codes, whose order says nothing: a dot per participant, quartile band, median ring, and no line.
     """
     ruler = Sheet(style.PAGE_WIDTH_PT, 72, fonts)
     columns = min(len(plots), PLOTS_A_ROW)
@@ -97,17 +100,18 @@ def _levels(sheet: Sheet, axes: Axes, *, numbers: bool) -> None:
 
 
 def over_delay(sheet: Sheet, axes: Axes, values: Array, delays_ms: Array, spread: float) -> None:
-    """Draw (participants, delays) values: a thin line each, at most ``spread`` apart, quartile band, thick median."""
+    """Draw (participants, delays) values: thin lines at most ``spread`` apart, band and thick median of all."""
     reach = float(np.ptp(delays_ms)) or 1.0
     axes.set_xlim(delays_ms.min() - 0.06 * reach, delays_ms.max() + 0.06 * reach)
     ticks = MaxNLocator(nbins=4, steps=[1, 2, 2.5, 5, 10]).tick_values(delays_ms.min(), delays_ms.max())
     ticks = [tick for tick in ticks if delays_ms.min() <= tick <= delays_ms.max()]
     axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks], fontproperties=sheet.font(6.5))
-    offsets = np.linspace(-spread / 2, spread / 2, len(values)) if len(values) > 1 else np.zeros(1)
-    for number, (line, offset) in enumerate(zip(values, offsets, strict=True), start=1):
+    shown = lines_of(len(values))
+    offsets = np.linspace(-spread / 2, spread / 2, len(shown)) if len(shown) > 1 else np.zeros(1)
+    for place, offset in zip(shown, offsets, strict=True):
         (drawn,) = axes.plot(
             delays_ms,
-            line + offset,
+            values[place] + offset,
             color=style.PARTICIPANT,
             alpha=0.75 if len(values) <= 15 else 0.45,
             linewidth=0.45,
@@ -116,7 +120,7 @@ def over_delay(sheet: Sheet, axes: Axes, values: Array, delays_ms: Array, spread
             markeredgewidth=0,
             zorder=2,
         )
-        drawn.set_gid(f"{axes.get_label()}-participant{number}")
+        drawn.set_gid(f"{axes.get_label()}-participant{place + 1}")
     q1, median, q3 = (np.array(side) for side in zip(*(quartiles(column) for column in values.T), strict=True))
     band = axes.fill_between(delays_ms, q1, q3, color=style.BAND, alpha=0.85, linewidth=0, zorder=1)
     band.set_gid(f"{axes.get_label()}-quartiles")
@@ -132,6 +136,20 @@ def over_delay(sheet: Sheet, axes: Axes, values: Array, delays_ms: Array, spread
         zorder=4,
     )
     drawn.set_gid(f"{axes.get_label()}-median")
+
+
+def lines_of(participants: int) -> list[int]:
+    """Return the places of the participants who are drawn as lines: all of few, of many an even choice."""
+    if participants <= MOST_LINES:
+        return list(range(participants))
+    return [int(place) for place in np.linspace(0, participants - 1, MOST_LINES).round()]
+
+
+def told_lines(participants: int) -> str:
+    """Return whom the thin lines are, for a caption."""
+    if participants <= MOST_LINES:
+        return "participants"
+    return f"{MOST_LINES} of the {participants} participants, evenly chosen in the order of their ids"
 
 
 def _lowest(sheet: Sheet, axes: Axes, lowest_ms: float | None, middle_ms: float) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from study_app.analysis import figures, movement, recognition_matrix, style
+from study_app.analysis import figures, movement, multiples, recognition_matrix, style
 from study_app.analysis.tables import load_study
 from tests.analysis.conftest import Results, twelve
 
@@ -106,3 +106,24 @@ def test_motion_is_drawn_for_every_participant_with_its_own_scale() -> None:
     assert high > 1.1
     assert [tick.get_text() for tick in second.get_yticklabels()] == ["1"]
     assert second.get_ylim() == (0.5, 1.5)
+
+
+def test_of_many_participants_some_are_drawn_and_the_median_is_of_all() -> None:
+    values = np.tile(np.array([1.0, 2.0, 3.0]), (500, 1))
+    values[::2] += 1
+    figure = movement.draw(
+        [movement.Measured("Time, s", values)],
+        [0.0, 100.0, 200.0],
+        title="Motion",
+        marks=[],
+        counts=["n = 500"],
+        foot="",
+        fonts=style.PRINT_FONTS,
+    ).figure
+    gids = {str(line.get_gid()): line for line in figure.axes[0].lines}
+    drawn = [gid for gid in gids if "participant" in gid]
+    assert len(drawn) == multiples.MOST_LINES
+    assert {"measure1-participant1", "measure1-participant500"} <= set(drawn)
+    assert np.asarray(gids["measure1-median"].get_ydata()).tolist() == [1.5, 2.5, 3.5]
+    assert multiples.told_lines(500) == "60 of the 500 participants, evenly chosen in the order of their ids"
+    assert multiples.told_lines(60) == "participants"

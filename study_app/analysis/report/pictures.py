@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from study_app.analysis import captions, figures, movement, recognition_matrix, style
+from study_app.analysis import captions, figures, movement, multiples, recognition_matrix, style
 from study_app.analysis.performance import OF_REACHES
 from study_app.analysis.questions import Block
 from study_app.analysis.report.words import counted, number, p_equals
@@ -124,7 +124,8 @@ def _movement(study: Study, block: Block, results: Results, name: str) -> Pictur
     simulated = "SIMULATED participants, no people; " if study.simulated else ""
     caption = (
         f"How participants reached, over the delay that was asked for ({simulated}{n} with recordings). Thin lines: "
-        "participants; thick line: median; band: the middle half. Movement time: from the lighting of a target to the "
+        f"{multiples.told_lines(len(people))}; thick line: median; band: the middle half. Movement time: from the "
+        "lighting of a target to the "
         f"entry that was held. Scales do not begin at zero. {_kept(block, results)}"
     )
     return Picture(block.id, name, caption, files)
