@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 import threading
+from dataclasses import replace
 from datetime import date
+from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication
+from PySide6.QtWidgets import QMainWindow
 
 from study_app.app.devices import DevicesDesk
+from study_app.app.live_session import LiveSession
 from study_app.app.machine import MachineDesk, described, settings_here, text_scale_on
 from study_app.app.visit import Visit
 from study_app.devices.backends import NONE, READY, Backend
+from study_app.gui.choices import NewSession
+from study_app.gui.dialogs import Notice
 from study_app.gui.theme import DARK, LIGHT
 from study_app.store import machine
 from study_app.store.machine import DEFAULTS, DisplayOffset, MachineSettings, load, save, settings_file
@@ -187,6 +194,7 @@ def test_a_damaged_file_is_told_when_the_window_opens(qtbot, tmp_path, monkeypat
     with qtbot.waitSignal(made.devices.looked):
         made.open()
     assert made.window.notice.isVisible()
+    made.window.notice.close_button.click()
     assert made.window.place("home").device.state.word == "Ready"
 
 
@@ -229,3 +237,33 @@ def _with(begin):
         return DiagnosisDialog(*words, **options, begin=begin)
 
     return made
+
+
+@pytest.mark.parametrize(("device", "held"), [("mouse", None), ("falcon:FT1", True), ("falcon-emulated", False)])
+def test_from_the_cockpit_a_falcon_is_examined_and_of_what_is_none_it_is_said(qtbot, monkeypatch, device, held):
+    asked = []
+
+    def diagnosis(_parent, _theme, name, _settings, *, held):
+        asked.append((name, held))
+        return SimpleNamespace(show=lambda: None)
+
+    monkeypatch.setattr("study_app.app.live_session.diagnosis", diagnosis)
+    live = LiveSession(NewSession("demo", "P001", 1, 7, "", "en", device, True, None, Path("nowhere")), LIGHT)
+    operator = QMainWindow()
+    operator.theme = DARK
+    qtbot.addWidget(operator)
+    operator.show()
+    live.bridge = SimpleNamespace(operator=operator)
+    live._diagnose()
+    assert asked == ([] if held is None else [(device, held)])
+    assert [notice.windowTitle() for notice in operator.findChildren(Notice)] == (
+        ["There is nothing to examine"] if held is None else []
+    )
+
+
+def test_a_session_opens_on_the_screen_that_is_set_unless_another_was_chosen(qapp, monkeypatch):
+    monkeypatch.setattr("study_app.app.live_session.choose_screens", lambda number: number)
+    monkeypatch.setattr("study_app.app.live_session.screen_number", lambda _settings: 2)
+    chosen = NewSession("demo", "P001", 1, 7, "", "en", "mouse", True, None, Path("nowhere"))
+    assert LiveSession(chosen, LIGHT)._screens() == 2
+    assert LiveSession(replace(chosen, screen=1), LIGHT)._screens() == 1
