@@ -55,3 +55,13 @@ def dress(whole: QWidget, theme: Theme) -> None:
     for part in (whole, *whole.findChildren(QWidget)):
         if isinstance(part, Themed):
             part.wear(theme)
+
+
+def take_away(part: QWidget) -> None:
+    """Take a part out of its window for good.
+
+    It is hidden first: the layout that it came into may still be about to show it, and would show it as a window.
+    """
+    part.hide()
+    part.setParent(None)
+    part.deleteLater()

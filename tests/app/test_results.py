@@ -155,6 +155,8 @@ def test_what_the_store_refuses_is_said(shown: Opened, results: Path) -> None:
     assert shown.window.notice.windowTitle() == "It was not left out"
     assert len(exclusions(results / "demo")) == 1
     assert shown.place.sessions.why.text() == "P001 is excluded."
+    shown.click(shown.window.notice.close_button)
+    assert not shown.window.notice.isVisible()
 
 
 def test_tables_are_written_and_their_folder_opened(shown: Opened, tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from study_app.gui.controls import ActionButton
 from study_app.gui.home.facts import BrokenFacts, StudyFacts
 from study_app.gui.labels import Clamped, Elided, label
 from study_app.gui.theme import font
+from study_app.gui.themed import take_away
 
 LEAST_WIDTH = 330
 LEAST_HEIGHT = 252
@@ -87,8 +88,7 @@ class CardGrid(QWidget):
     def show_cards(self, cards: list[QWidget]) -> None:
         """Show these cards in place of those before."""
         for card in self.cards:
-            card.setParent(None)
-            card.deleteLater()
+            take_away(card)
         self.cards = cards
         self._across = 0
         self.arrange(self.width())

@@ -15,7 +15,7 @@ from study_app.gui.results.view import LeftOut, in_figures
 from study_app.gui.sessions.facts import SessionFacts, started_words
 from study_app.gui.sessions.rows import Column, SessionRows, matching, states_of
 from study_app.gui.theme import font
-from study_app.gui.themed import dress
+from study_app.gui.themed import dress, take_away
 
 COLUMNS = (
     Column("participant", "Participant", 90, 62),
@@ -121,8 +121,7 @@ class ExclusionsCard(Card):
     def show_left_out(self, listed: Sequence[LeftOut]) -> None:
         """Show what is left out, the last decision first."""
         for line in self.lines:
-            line.setParent(None)
-            line.deleteLater()
+            take_away(line)
         self.lines = [_line(one) for one in reversed(listed)]
         for place, line in enumerate(self.lines):
             dress(line, self.theme)

@@ -14,7 +14,7 @@ from study_app.gui.labels import Elided, label
 from study_app.gui.results.figure import FigureView
 from study_app.gui.results.view import FigureShown, Going, Remedy, ResultsView, Trouble
 from study_app.gui.theme import font
-from study_app.gui.themed import dress
+from study_app.gui.themed import dress, take_away
 
 GAP = 12
 PADDING = 14
@@ -62,8 +62,7 @@ class FigureCard(Card):
         if self.drawing is not None and there:
             self.drawing.show_figure(figure, colours)
         elif self.drawing is not None:
-            self.drawing.setParent(None)
-            self.drawing.deleteLater()
+            take_away(self.drawing)
             self.drawing = None
         elif there:
             self.drawing = FigureView(figure, colours)
@@ -222,8 +221,7 @@ class FiguresPanel(QScrollArea):
             self._column.insertWidget(place, card)
             self.cards.append(card)
         for gone in kept.values():
-            gone.setParent(None)
-            gone.deleteLater()
+            take_away(gone)
 
     def show_whole(self, yes: bool) -> None:
         """Be as high as the figures are, for a page that scrolls as a whole."""

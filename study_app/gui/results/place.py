@@ -19,6 +19,7 @@ from study_app.gui.results.figures import FiguresPanel
 from study_app.gui.results.view import ResultsView
 from study_app.gui.results.writing import Extra, WriteDialog
 from study_app.gui.theme import font
+from study_app.gui.themed import take_away
 
 STACKED_BELOW = 1160
 BESIDE, BESIDE_WIDE, WIDE_FROM = 374, 420, 1700
@@ -185,8 +186,7 @@ class ResultsPlace(Place):
             told.append(("warn", "warning", f"{words} not as recorded", "\n".join(self.view.doubts)))
         if [chip.word for chip in self.chips] != [words for _, _, words, _ in told]:
             for chip in self.chips:
-                chip.setParent(None)
-                chip.deleteLater()
+                take_away(chip)
             self.chips = []
             for tone, icon, words, tip in told:
                 chip = Chip(tone, icon, words)  # type: ignore[arg-type]  # the tones above

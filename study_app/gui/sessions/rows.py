@@ -14,7 +14,7 @@ from study_app.gui.cards import Chip, Tone
 from study_app.gui.labels import Elided, figures, label
 from study_app.gui.sessions.facts import SessionFacts, started_words
 from study_app.gui.theme import RADIUS_CONTROL, font
-from study_app.gui.themed import Themed, dress
+from study_app.gui.themed import Themed, dress, take_away
 
 ROW_HEIGHT = 43
 MARGIN = 12
@@ -234,8 +234,7 @@ class SessionRows(Themed, QWidget):
     def show_rows(self, found: Sequence[SessionFacts], now: datetime) -> None:
         """Show these sessions in place of those before."""
         for line in self.lines:
-            line.setParent(None)
-            line.deleteLater()
+            take_away(line)
         self.lines = []
         self._now, self._waiting = now, list(found)
         self._make_more()
