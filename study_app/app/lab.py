@@ -43,9 +43,12 @@ log = logging.getLogger(__name__)
 P = ParamSpec("P")
 
 
-def compose_lab(place: LabPlace) -> LabVisit:
-    """Give a lab's place its device, servo and prices: they come as it is entered and go as it is left."""
-    return LabVisit(place)
+def compose_lab(place: LabPlace, *, device: str = "mouse", firmware: Path | None = None) -> LabVisit:
+    """Give a lab's place its device, servo and prices: they come as it is entered and go as it is left.
+
+    ``device`` is the one it begins with, ``firmware`` the file of a Falcon's program.
+    """
+    return LabVisit(place, device=device, firmware=firmware)
 
 
 def _guarded(slot: Callable[Concatenate[LabVisit, P], None]) -> Callable[Concatenate[LabVisit, P], None]:
@@ -67,6 +70,7 @@ class LabVisit(QObject):
     Parameters
     ----------
     place : the widgets; this ends with them
+    device, firmware : what it begins with, and the file of a Falcon's program
     open_live, make_appraiser : what opens a device by its name, what begins the process that appraises
     chance : what a blinding is drawn from
     """
@@ -77,6 +81,8 @@ class LabVisit(QObject):
         self,
         place: LabPlace,
         *,
+        device: str = "mouse",
+        firmware: Path | None = None,
         open_live: Callable[..., Live] | None = None,
         make_appraiser: Callable[[], AsksPrice] = Appraiser,
         chance: Chance | None = None,
@@ -84,14 +90,14 @@ class LabVisit(QObject):
         super().__init__(place)
         self.place = place
         self.live: Live | None = None
-        self.device = "mouse"
+        self.device = device
         self.bench = Workbench(FIRST_A.setting(), FIRST_B.setting())
         self.liquids = liquids_at_hand()
         self.trouble = ""
         self._refused: tuple[str, str] | None = None
         self._entered = False
         self._prices = Prices(make_appraiser)
-        self._opening = LabOpening(open_live)
+        self._opening = LabOpening(open_live, firmware)
         self._chance = chance if chance is not None else random.SystemRandom()
         self._said = ""
         self._hook_before = sys.excepthook

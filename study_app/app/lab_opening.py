@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QCoreApplication, QObject, Qt, Signal
@@ -23,6 +25,7 @@ class LabOpening(QObject):
     Parameters
     ----------
     open_live : opens a device by its name, as ``lab.live.open_live`` does
+    firmware : file of a Falcon's program, where it needs one
     """
 
     opened = Signal(object)
@@ -30,9 +33,10 @@ class LabOpening(QObject):
     said = Signal(str)
     _done = Signal(object)
 
-    def __init__(self, open_live: Callable[..., Live] | None = None) -> None:
+    def __init__(self, open_live: Callable[..., Live] | None = None, firmware: Path | None = None) -> None:
         super().__init__()
         self._open_live = open_live
+        self._firmware = firmware
         self._wanted: str | None = None
         self._opening: str | None = None
         self._cancelled = threading.Event()
@@ -76,7 +80,7 @@ class LabOpening(QObject):
             if self._open_live is None:
                 from study_app.lab.live import open_live  # noqa: PLC0415 - the compiler: only once it is needed
 
-                self._open_live = open_live
+                self._open_live = partial(open_live, firmware=self._firmware)
             made: object = self._open_live(name, tell=self.said.emit, cancelled=cancelled.is_set)
         except Exception as error:  # noqa: BLE001 - handed over, not swallowed: a thread has nobody to raise it to
             made = error

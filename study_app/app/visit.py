@@ -125,7 +125,8 @@ class Visit(QObject):
         from study_app.gui.lab.place import LabPlace  # noqa: PLC0415
 
         made = LabPlace()
-        self.lab = compose_lab(made)
+        settings = self.machine.settings
+        self.lab = compose_lab(made, device=settings.device, firmware=settings.firmware_file)
         return made
 
     def end(self) -> None:

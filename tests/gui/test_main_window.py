@@ -71,6 +71,7 @@ def test_a_place_may_ask_for_another_and_have_something_said(main):
     assert main.here == "devices"
     main.place("devices").told.emit("It did not work", "The cable is out.")
     assert main.notice.isVisible()
+    main.notice.accept()
 
 
 def test_a_session_and_the_end_leave_the_place(main, log):
@@ -82,6 +83,13 @@ def test_a_session_and_the_end_leave_the_place(main, log):
     main.close()
     assert log[-1].startswith("leave")
     assert "leave lab" in log[-2:]
+
+
+def test_what_was_said_goes_with_the_window(main):
+    main.tell("It did not work", "The cable is out.")
+    assert main.notice.isVisible()
+    main.close()
+    assert not main.notice.isVisible()
 
 
 def test_a_place_made_later_wears_the_theme(main):

@@ -155,7 +155,9 @@ class MachinePlace(Place):
         if self.test is not None:
             return
         there = self.participants
-        self.test = DisplayTest(f"Screen {there.number}  ·  {there.name}  ·  {there.words}", there.refresh_hz)
+        self.test = DisplayTest(
+            "  ·  ".join(filter(None, (f"Screen {there.number}", there.name, there.words))), there.refresh_hz
+        )
         self.test.kept.connect(self._measured)
         self.test.forgotten.connect(lambda: self.changed.emit({"display_offset": None}))
         self.test.left.connect(self._test_left)
