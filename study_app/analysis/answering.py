@@ -151,7 +151,7 @@ def _study_found(study: Study) -> StudyFound:
             "warn": style.WARN,
             "warn_bg": style.WARN_GROUND,
             "sunk": style.SEALED_GROUND,
-            "hover": "#f4f6f8",
+            "hover": style.GROUND,
         },
     )
 
@@ -167,7 +167,7 @@ def _evaluate(study: Study, tell: Tell, stop: Callable[[], bool]) -> None:
 
     going("testing", 0.0)
     results = evaluate(study, progress=lambda what, share: going(what, EVALUATION * share))
-    for drawn, picture in enumerate(pictures(study, results), start=1):
+    for drawn, picture in enumerate(pictures(study, results, ("svg",)), start=1):
         title = _title(study, picture.name)
         tell(FigureDrawn(picture.name, title, picture.caption, picture.files["svg"]))
         going("drawing", EVALUATION + (1 - EVALUATION) * min(1.0, drawn / 4))

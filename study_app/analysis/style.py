@@ -28,6 +28,7 @@ LEVEL_INKS: Final = ("#ffffff", "#ffffff", "#000000", "#000000", "#000000", "#ff
 TEXT: Final = "#13202c"
 TEXT_SOFT: Final = "#45535f"
 GRID: Final = "#e6ebef"
+GROUND: Final = "#f4f6f8"
 BORDER: Final = "#c9d1d8"
 AXIS: Final = "#5d6a75"
 ACCENT: Final = "#0b65a3"

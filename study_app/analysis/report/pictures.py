@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from study_app.analysis import captions, figures, movement, multiples, recognition_matrix, style
@@ -30,20 +30,20 @@ class Picture:
     files: dict[str, bytes]
 
 
-def pictures(study: Study, results: Results) -> Iterator[Picture]:
-    """Draw every figure that there are answers or recordings for, block by block."""
+def pictures(study: Study, results: Results, forms: Sequence[str] = style.FORMATS) -> Iterator[Picture]:
+    """Draw every figure that there are answers or recordings for, block by block, in each of ``forms``."""
     for block, found in zip(study.blocks, results.blocks, strict=True):
         if not found.n:
             continue
         several = len(study.blocks_of(block.kind)) > 1
-        yield _answers(study, block, found, f"{block.kind}-{block.id}" if several else block.kind)
+        yield _answers(study, block, found, f"{block.kind}-{block.id}" if several else block.kind, forms)
         if found.named is not None:
-            yield _recognition(study, block, found, f"recognition-{block.id}" if several else "recognition")
+            yield _recognition(study, block, found, f"recognition-{block.id}" if several else "recognition", forms)
         if found.delays_ms and results.performance is not None and results.performance.recorded_in(block.id):
-            yield _movement(study, block, results, f"movement-{block.id}" if several else "movement")
+            yield _movement(study, block, results, f"movement-{block.id}" if several else "movement", forms)
 
 
-def _answers(study: Study, block: Block, found: BlockFound, name: str) -> Picture:
+def _answers(study: Study, block: Block, found: BlockFound, name: str, forms: Sequence[str]) -> Picture:
     lowest = {one.item: one.steps.lowest_ms for one in found.lowest if one.steps.lowest_ms is not None}
     caption = captions.caption(study, block)
     if lowest:
@@ -51,12 +51,10 @@ def _answers(study: Study, block: Block, found: BlockFound, name: str) -> Pictur
             " Dashed: lowest delay at which stepping down still shows a trend, an upper bound of the delay that is "
             "noticed."
         )
-    return Picture(
-        block.id, name, caption, {form: figures.render(study, block, form, lowest) for form in style.FORMATS}
-    )
+    return Picture(block.id, name, caption, {form: figures.render(study, block, form, lowest) for form in forms})
 
 
-def _recognition(study: Study, block: Block, found: BlockFound, name: str) -> Picture:
+def _recognition(study: Study, block: Block, found: BlockFound, name: str, forms: Sequence[str]) -> Picture:
     named = found.named
     assert named is not None  # noqa: S101 - asked by the caller
     shorts = {item.id: item.short for item in found.items}
@@ -78,7 +76,7 @@ def _recognition(study: Study, block: Block, found: BlockFound, name: str) -> Pi
             form,
             f"{study.name}: {title}",
         )
-        for form in style.FORMATS
+        for form in forms
     }
     simulated = "SIMULATED participants, no people; " if study.simulated else ""
     hits, expected = named.found.statistic, named.found.expected
@@ -96,7 +94,7 @@ def _recognition(study: Study, block: Block, found: BlockFound, name: str) -> Pi
     return Picture(block.id, name, caption, files)
 
 
-def _movement(study: Study, block: Block, results: Results, name: str) -> Picture:
+def _movement(study: Study, block: Block, results: Results, name: str, forms: Sequence[str]) -> Picture:
     measured = results.performance
     assert measured is not None  # noqa: S101 - asked by the caller
     people = sorted({trial.participant for trial in measured.reached if trial.block == block.id})
@@ -119,7 +117,7 @@ def _movement(study: Study, block: Block, results: Results, name: str) -> Pictur
             form,
             f"{study.name}: {title}",
         )
-        for form in style.FORMATS
+        for form in forms
     }
     simulated = "SIMULATED participants, no people; " if study.simulated else ""
     caption = (
