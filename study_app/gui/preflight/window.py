@@ -13,7 +13,7 @@ from study_app.gui.plots import LatenessPlot
 from study_app.gui.preflight.rows import CheckRow
 from study_app.gui.preflight.view import WAITING, PreflightView, histogram
 from study_app.gui.theme import LIGHT, Theme, font
-from study_app.gui.themed import dress, wear
+from study_app.gui.themed import dress, take_away, wear
 
 FULL, LEAST = QSize(1200, 800), QSize(1024, 640)
 ASIDE = 352
@@ -136,8 +136,7 @@ class PreflightWindow(QWidget):
         if [row.check for row in self.rows] == list(view.checks):
             return
         for row in self.rows:
-            row.setParent(None)
-            row.deleteLater()
+            take_away(row)
         self.rows = [CheckRow(check, last=check is view.checks[-1]) for check in view.checks]
         for row in self.rows:
             self.checks.column.addWidget(row)
