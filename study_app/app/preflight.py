@@ -35,7 +35,7 @@ class Appraisal:
         self._appraiser = Appraiser()
         self.tick_s: float | None = None
         self.error_n: float | None = None
-        self._error_n = 0.0
+        self._errors_n: list[float | None] = []
         self._ask()
 
     @property
@@ -53,12 +53,11 @@ class Appraisal:
                 self.tick_s = max(self.tick_s or 0.0, told.tick_ns * 1e-9)
                 news = True
                 continue
-            if isinstance(told, Errors):
-                self._error_n = max(self._error_n, told.force_n or 0.0)
+            self._errors_n.append(told.force_n if isinstance(told, Errors) else None)
             self._waiting.pop(0)
             self._ask()
             if not self._waiting:
-                self.error_n, news = self._error_n, True
+                self.error_n, news = _largest(self._errors_n), True
         return news
 
     def _ask(self) -> None:
@@ -73,7 +72,7 @@ class Appraisal:
 class Preflight(QObject):
     """Shows the window before a session, has things measured again, and tells what was decided, once.
 
-    The machine stays somebody else's; the servo turns at rest meanwhile.
+    The machine stays somebody else's; the servo turns at rest meanwhile, and ``failed`` comes when it stops itself.
     """
 
     started = Signal(object)
@@ -88,12 +87,14 @@ class Preflight(QObject):
         self._chosen, self._protocol, self._ready, self._screen = chosen, protocol, ready, screen
         self._who = who
         self._measuring: threading.Thread | None = None
+        self._ending = threading.Event()
         self._appraisal = Appraisal(_scenes(protocol))
         self.window = PreflightWindow(protocol.limits.lateness_ms * 1e3, theme=theme)
         self.window.start_asked.connect(self._start)
         self.window.again_asked.connect(self._again)
         self.window.cancelled.connect(self._cancel)
         self._measured.connect(self._take)
+        self._appraised = False
         self._timer = QTimer(self)
         self._timer.timeout.connect(self._look)
         self._timer.start(LOOK_MS)
@@ -105,8 +106,9 @@ class Preflight(QObject):
         self.window.show()
 
     def close(self) -> None:
-        """Let go of window and processes; what is being measured is waited for, since it uses the servo."""
+        """Let go of window and processes; what is being measured uses the servo, and is seen off at once."""
         self._timer.stop()
+        self._ending.set()
         self._appraisal.close()
         if self._measuring is not None:
             self._measuring.join(PATIENCE_S)
@@ -134,10 +136,18 @@ class Preflight(QObject):
         )
 
     def _look(self) -> None:
-        if self._appraisal.look() or self._appraisal.over:
-            self._show()
-        if self._appraisal.over:
+        """Watch over the servo, which a device that is unplugged stops, and take what was said of the scenes."""
+        try:
+            self._ready.machine.servo.check()
+        except StudyError as error:
             self._timer.stop()
+            self.failed.emit(error)
+            return
+        if self._appraised:
+            return
+        self._appraised = self._appraisal.over
+        if self._appraisal.look() or self._appraised:
+            self._show()
 
     def _again(self) -> None:
         """Measure anew, in a thread of its own: it looks at the servo for two seconds."""
@@ -149,8 +159,8 @@ class Preflight(QObject):
 
     def _measure(self) -> None:
         try:
-            found: object = measured(self._ready.machine, self._chosen)
-        except StudyError as error:
+            found: object = measured(self._ready.machine, self._chosen, sleep=self._ending.wait)
+        except Exception as error:  # noqa: BLE001 - handed over, not swallowed: a thread has nobody to raise it to
             found = error
         self._measured.emit(found)
 
@@ -167,6 +177,12 @@ class Preflight(QObject):
 
     def _cancel(self) -> None:
         self.cancelled.emit()
+
+
+def _largest(errors_n: list[float | None]) -> float | None:
+    """Return the largest error; None where one is not known, which may be the largest."""
+    known = [error for error in errors_n if error is not None]
+    return max(known, default=None) if len(known) == len(errors_n) else None
 
 
 def _scenes(protocol: Protocol) -> tuple[Scene, ...]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -53,8 +55,8 @@ def check(chosen: NewSession, study: Protocol) -> None:
     check_unused(folder, chosen.participant, chosen.session)
 
 
-def measured(machine: Machine, chosen: NewSession) -> Facts:
-    """Return what the pre-flight judges, but for the screen."""
+def measured(machine: Machine, chosen: NewSession, *, sleep: Callable[[float], object] = time.sleep) -> Facts:
+    """Return what the pre-flight judges, but for the screen; a ``sleep`` that does not wait cuts it short."""
     from study_app.session.measuring import measure  # noqa: PLC0415 - the compiler: only once it is needed
 
     return measure(
@@ -65,6 +67,7 @@ def measured(machine: Machine, chosen: NewSession) -> Facts:
         participant=chosen.participant,
         recordings=chosen.recordings,
         lasts_s=MEASURED_S,
+        sleep=sleep,
     )
 
 

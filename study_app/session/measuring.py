@@ -36,7 +36,7 @@ def measure(
     participant: str,
     recordings: bool,
     lasts_s: float,
-    sleep: Callable[[float], None] = time.sleep,
+    sleep: Callable[[float], object] = time.sleep,
 ) -> Facts:
     """Look at a running servo for ``lasts_s`` and at the disk of the study folder ``results``, leaving no trace."""
     reader = servo.telemetry.reader()

@@ -1,0 +1,152 @@
+"""The question before a session: a servo that stops itself is told, and whoever goes back does not wait."""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+from typing import Any
+
+import pytest
+from PySide6.QtCore import QEvent
+from PySide6.QtGui import QGuiApplication
+from PySide6.QtWidgets import QApplication
+
+from study_app.app import preflight
+from study_app.app.preflight import Appraisal, Preflight
+from study_app.errors import DeviceLost
+from study_app.evaluation.appraiser import Costs, Errors
+from study_app.gui.beginning import Ready
+from study_app.gui.choices import NewSession
+from study_app.gui.theme import LIGHT
+from study_app.haptics.telemetry import Timing
+from study_app.protocol.load import load
+from study_app.session.preflight import Facts, Screen
+
+CHOSEN = NewSession("demo", "P001", 1, 7, "AK", "en", "mouse", True, None, Path("nowhere"))
+FACTS = Facts(
+    device="mouse",
+    fresh_share=1.0,
+    timing=Timing(2000, 1000.0, 6e-5, 2e-3, 0),
+    sample_age_s=0.001,
+    screen=Screen(60.0, 1.0),
+    probe_s=0.002,
+    probe_fault="",
+    free_bytes=10**11,
+    participant="P001",
+    recordings=True,
+)
+COSTS = Costs(tick_ns=146.0, rest_ns=40.0, effects=())
+
+
+class Answering:
+    """In place of the process that appraises scenes: has the answers it was given, question by question."""
+
+    given: tuple[Any, ...] = ()
+
+    def __init__(self) -> None:
+        self.asked = 0
+        self.works = True
+
+    def ask(self, _scene: Any) -> int:
+        self.asked += 1
+        return self.asked
+
+    def answers(self) -> list[tuple[int, Any]]:
+        return [(self.asked, COSTS), (self.asked, self.given[self.asked - 1])] if self.given else []
+
+    def close(self) -> None:
+        self.works = False
+
+
+class Servo:
+    """A servo at rest that is well until its device is lost."""
+
+    lost = False
+
+    def check(self) -> None:
+        if self.lost:
+            raise DeviceLost("the device 'falcon' does not answer any more; the force is zero")
+
+
+class Machine:
+    """Stands for an open device with its servo."""
+
+    def __init__(self) -> None:
+        self.servo = Servo()
+
+
+@pytest.fixture
+def machine(monkeypatch: Any) -> Machine:
+    monkeypatch.setattr(preflight, "Appraiser", Answering)
+    return Machine()
+
+
+@pytest.fixture
+def asked(qapp: Any, machine: Any) -> Any:
+    screen = QGuiApplication.primaryScreen()
+    made = Preflight(CHOSEN, load("demo"), Ready(machine, FACTS), screen, "Participant P001", LIGHT)
+    made.open()
+    yield made
+    made.close()
+    QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+
+
+def test_a_device_that_is_lost_meanwhile_is_told_once(asked: Preflight, machine: Machine, qtbot: Any) -> None:
+    told: list[object] = []
+    asked.failed.connect(told.append)
+    machine.servo.lost = True
+    with qtbot.waitSignal(asked.failed, timeout=3000):
+        pass
+    assert not asked._timer.isActive()
+    assert [str(error) for error in told] == ["the device 'falcon' does not answer any more; the force is zero"]
+
+
+def test_going_back_does_not_wait_for_what_is_being_measured(asked: Preflight, monkeypatch: Any) -> None:
+    begun, waited = threading.Event(), []
+
+    def slow(_machine: Any, _chosen: Any, *, sleep: Any) -> Facts:
+        begun.set()
+        waited.append(sleep(60.0))
+        return FACTS
+
+    monkeypatch.setattr(preflight, "measured", slow)
+    asked._again()
+    measuring = asked._measuring
+    assert measuring is not None
+    assert begun.wait(5)
+    asked.close()
+    assert not measuring.is_alive()
+    assert waited == [True]
+
+
+def test_a_mistake_in_measuring_does_not_leave_the_window_waiting(
+    asked: Preflight, monkeypatch: Any, qtbot: Any
+) -> None:
+    def broken(*_words: Any, **_named: Any) -> Facts:
+        raise ValueError("no samples")
+
+    monkeypatch.setattr(preflight, "measured", broken)
+    with qtbot.waitSignal(asked.failed) as failed:
+        asked._again()
+    assert isinstance(failed.args[0], ValueError)
+    assert asked._measuring is None
+
+
+@pytest.mark.parametrize(
+    ("told", "largest"),
+    [
+        ((Errors(0.0, 0.02, 0.0, ()), Errors(0.0, 0.04, 0.0, ())), 0.04),
+        ((Errors(0.0, 0.02, 0.0, ()), Errors(None, None, 0.0, ())), None),
+        (("it could not be measured", Errors(0.0, 0.02, 0.0, ())), None),
+    ],
+)
+def test_an_error_that_is_not_known_is_not_called_none(monkeypatch: Any, told: Any, largest: float | None) -> None:
+    monkeypatch.setattr(preflight, "Appraiser", Answering)
+    monkeypatch.setattr(Answering, "given", told)
+    protocol = load("demo")
+    scene = protocol.scene_for(next(iter(protocol.conditions)))
+    appraisal = Appraisal([scene, scene])
+    while not appraisal.over:
+        appraisal.look()
+    assert appraisal.error_n == largest
+    assert appraisal.tick_s == pytest.approx(146e-9)
