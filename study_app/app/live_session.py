@@ -10,6 +10,7 @@ import signal
 import threading
 import traceback
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -93,6 +94,7 @@ class LiveSession(QObject):
         self._machine: Machine | None = None
         self._store: SessionStore | None = None
         self._closed = False
+        self._ending = threading.Event()
         self._working = False
         self._opening: threading.Thread | None = None
         self._ready.connect(self._begin, Qt.ConnectionType.QueuedConnection)
@@ -111,6 +113,16 @@ class LiveSession(QObject):
         self._working = True
         self._opening = threading.Thread(target=self._make_ready, name="opening", daemon=True)
         self._opening.start()
+
+    @property
+    def began(self) -> bool:
+        """Whether its windows were opened."""
+        return self.bridge is not None
+
+    @property
+    def opening(self) -> bool:
+        """Whether device and servo are being made ready, even for a session that was called off meanwhile."""
+        return self._opening is not None and self._opening.is_alive()
 
     def wait(self) -> None:
         """Wait for what is being made ready: it must be let go of here, not in the thread that makes it."""
@@ -132,11 +144,12 @@ class LiveSession(QObject):
         try:
             study = load(self.chosen.source)
             machine = open_machine(self.chosen, study, tell=self._said.emit, cancelled=lambda: self._closed)
-            made: object = Ready(machine, measured(machine, self.chosen))
+            made: object = Ready(machine, measured(machine, self.chosen, sleep=self._ending.wait))
         except Exception as error:  # noqa: BLE001 - handed over, not swallowed: a thread has nobody to raise it to
-            if machine is not None:
-                machine.stop()
             made = error
+            if machine is not None:
+                with suppress(StudyError):  # what came first says why
+                    machine.stop()
         self._ready.emit(made)
 
     def _begin(self, made: object) -> None:
@@ -257,6 +270,7 @@ class LiveSession(QObject):
         if self._closed:
             return
         self._closed = True
+        self._ending.set()
         self._close_note()
         self._close_preflight()
         self._let_go()

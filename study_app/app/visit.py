@@ -70,6 +70,7 @@ class Visit(QObject):
         self.loop = QEventLoop()
         self.code = 0
         self.live: LiveSession | None = None
+        self._called_off: list[LiveSession] = []
         self.desk: ResultsDesk | None = None
         self.lab: LabVisit | None = None
         self.window.closed.connect(self._leave)
@@ -130,10 +131,12 @@ class Visit(QObject):
         return made
 
     def end(self) -> None:
-        """Let go of what the places hold, and wait for what is under way in other threads."""
+        """Let go of what the places hold, and wait for what is under way in other threads: a device may be opening."""
         if self.lab is not None:
             self.lab.end()
         self.devices.wait()
+        for live in self._called_off:
+            live.wait()
 
     def end_by_signal(self, number: int) -> None:
         """End because the program is being ended from outside."""
@@ -144,6 +147,8 @@ class Visit(QObject):
         self.loop.quit()
 
     def _start(self, chosen: NewSession) -> None:
+        if self.live is not None:
+            return
         self.live = LiveSession(chosen, self.window.theme, asks=True)
         self.live.over.connect(self._return)
         self.window.rest()
@@ -151,11 +156,17 @@ class Visit(QObject):
 
     def _return(self) -> None:
         live, self.live = self.live, None
-        if self.code or live is None:
+        if live is None:
             return
+        self._called_off = [earlier for earlier in (*self._called_off, live) if earlier.opening]
+        if self.code:
+            return
+        if live.theme is not self.window.theme:  # it was changed in the cockpit
+            self.machine.change({"theme": live.theme.name})
         self.window.come_back()
         if live.error is not None:
-            self.window.tell("The session did not go to its end", f"{live.error}.")
+            title = "The session did not go to its end" if live.began else "The session was not begun"
+            self.window.tell(title, f"{live.error}.")
         elif live.code == BUG:
             self.window.tell("The session was stopped by a mistake in the program", "The terminal shows where.")
 

@@ -1,0 +1,96 @@
+"""The main window's stay around a session: what was called off is let go of before the program ends."""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+from typing import Any
+
+import pytest
+from PySide6.QtCore import QEvent
+from PySide6.QtWidgets import QApplication
+
+from study_app.app import live_session
+from study_app.app.visit import Visit
+from study_app.errors import DeviceNotFound
+from study_app.gui.choices import NewSession
+from study_app.gui.theme import DARK
+
+CHOSEN = NewSession("demo", "P001", 1, 7, "AK", "en", "mouse", True, None, Path("nowhere"))
+
+
+class Machine:
+    """An open device with its servo."""
+
+    def __init__(self) -> None:
+        self.stopped = False
+
+    def stop(self) -> None:
+        self.stopped = True
+
+
+@pytest.fixture
+def visit(qapp: Any, tmp_path: Path) -> Any:
+    made = Visit(tmp_path / "results")
+    made.window.show()
+    yield made
+    made.window.close()
+    made.end()
+    made.window.deleteLater()
+    QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+
+
+@pytest.mark.parametrize("how", ["back", "signal"])
+def test_a_device_that_opens_after_all_is_let_go_of_before_the_end(visit: Visit, monkeypatch: Any, how: str) -> None:
+    machine, opening, may_open = Machine(), threading.Event(), threading.Event()
+
+    def open_slowly(*_words: Any, **_named: Any) -> Machine:
+        opening.set()
+        may_open.wait(10)
+        return machine
+
+    monkeypatch.setattr(live_session, "open_machine", open_slowly)
+    monkeypatch.setattr(live_session, "measured", lambda *_words, **_named: None)
+    visit._start(CHOSEN)
+    assert opening.wait(10)
+    assert visit.live is not None
+    if how == "back":
+        assert visit.live.note is not None
+        visit.live.note.close()
+        assert visit.window.isVisible()
+        visit.window.close()
+    else:
+        visit.end_by_signal(15)
+    threading.Timer(0.05, may_open.set).start()
+    visit.end()
+    assert machine.stopped
+
+
+def test_one_session_at_a_time(visit: Visit, monkeypatch: Any) -> None:
+    monkeypatch.setattr(live_session.LiveSession, "open", lambda _self: None)
+    visit._start(CHOSEN)
+    first = visit.live
+    visit._start(CHOSEN)
+    assert visit.live is first
+    visit.live = None
+
+
+def test_a_session_that_was_not_begun_is_told_so(visit: Visit, monkeypatch: Any, qtbot: Any) -> None:
+    def refuse(*_words: Any, **_named: Any) -> Machine:
+        raise DeviceNotFound("no Falcon is connected: plug it in")
+
+    monkeypatch.setattr(live_session, "open_machine", refuse)
+    visit._start(CHOSEN)
+    qtbot.waitUntil(lambda: visit.window.notice is not None)
+    assert visit.window.notice is not None
+    assert visit.window.notice.windowTitle() == "The session was not begun"
+
+
+def test_a_theme_that_was_changed_in_the_cockpit_stays(visit: Visit, monkeypatch: Any) -> None:
+    monkeypatch.setattr(live_session.LiveSession, "open", lambda _self: None)
+    visit._start(CHOSEN)
+    assert visit.live is not None
+    visit.live.theme = DARK
+    visit.live._cancel()
+    assert visit.window.theme is DARK
+    assert visit.machine.settings.theme == "dark"
