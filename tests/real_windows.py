@@ -22,10 +22,10 @@ needs_display = pytest.mark.skipif(bool(MISSING), reason=f"not installed here: {
 
 
 @contextmanager
-def virtual_display() -> Iterator[str]:
-    """A virtual X display that nobody else uses."""
+def virtual_display(*more: str) -> Iterator[str]:
+    """A virtual X display that nobody else uses; ``more`` is said to its server."""
     read_end, write_end = os.pipe()
-    words_of_xvfb = ["Xvfb", "-displayfd", str(write_end), "-screen", "0", "1920x1080x24", "-nolisten", "tcp"]
+    words_of_xvfb = ["Xvfb", "-displayfd", str(write_end), "-screen", "0", "1920x1080x24", "-nolisten", "tcp", *more]
     server = subprocess.Popen(
         words_of_xvfb, pass_fds=(write_end,), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
     )
@@ -86,7 +86,8 @@ class Program:
         self.xdotool("windowfocus", "--sync", window, "key", "--clearmodifiers", *keys)
 
     def events(self, kind: str) -> list[dict[str, object]]:
-        found = list(self.folder.glob("results/rek2024/data/sub-P042/ses-01/journal.jsonl"))
+        """Return what the journal of the only session tells of a kind."""
+        found = list(self.folder.glob("results/*/data/sub-*/ses-01/journal.jsonl"))
         whole = found[0].read_bytes().rpartition(b"\n")[0].splitlines() if found else []
         return [event for event in map(json.loads, whole) if event["event"] == kind]
 

@@ -1,250 +1,355 @@
-"""The whole study of the thesis in its real windows on a virtual display: by keyboard alone, and by the mouse alone.
-
-Where a click must go is read off the same pages laid out off screen at the same size. The tasks last a second.
-"""
+"""The whole study of the thesis as one comes to it: from home to home and out, by keys alone and by the mouse alone."""
 
 from __future__ import annotations
 
-import csv
 import json
-import os
-import signal
-import subprocess
-import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 pytest.importorskip("PySide6.QtWidgets", reason="Qt's system libraries are missing", exc_type=ImportError)
 
-from PySide6.QtCore import QPoint
-from PySide6.QtWidgets import QApplication, QWidget
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtWidgets import QWidget
 
+from study_app.app.visit import Visit
+from study_app.gui.home.cards import StudyCard
+from study_app.gui.home.place import HomePlace
+from study_app.gui.main_window import FULL as HOME
+from study_app.gui.new_session import NewSessionDialog
+from study_app.gui.operator import OperatorWindow
 from study_app.gui.pages.questionnaire import QuestionnaireWidget
 from study_app.gui.pages.text import TextWidget
-from study_app.gui.participant import ParticipantWindow
-from study_app.protocol.files import source_bytes
-from study_app.protocol.load import parse
-from study_app.protocol.model import Protocol
-from study_app.protocol.schedule import build_schedule, draw_key, stream
+from study_app.gui.participant import WINDOWED_SIZE, ParticipantWindow
+from study_app.gui.pointer import SHARE_OF_SCREEN
+from study_app.gui.preflight import PreflightWindow
+from study_app.gui.preflight.window import FULL as PREFLIGHT
+from study_app.protocol.model import Reach
 from study_app.protocol.words import words
-from study_app.session.commands import ShowPage
-from study_app.session.events import Begin, Chosen, Continue, ItemShown, Submitted, TaskDone
-from study_app.session.machine import advance, open_session
-from study_app.session.pages import Page, QuestionnairePage, TaskPage, TextPage
-from study_app.session.state import FINAL, SessionState
+from study_app.session.pages import QuestionnairePage, TaskPage, TextPage
+from study_app.store.machine import settings_file
 from tests.compiled import needs_servo
 from tests.gui.small import ManualClock
-from tests.real_windows import Program, needs_display, virtual_display
+from tests.real_windows import needs_display, virtual_display, wait_for
+from tests.walking import ANSWERS, TRIALS, Pages, Person, Visitor, laid_out, place_in, tabs_to
 
-SEED = 7
-SHORTER = {
-    "min_s = 10 ": "min_s = 0.5 ",
-    "max_s = 60 ": "max_s = 1 ",
-    "min_s = 30": "min_s = 0.5",
-    "max_s = 120": "max_s = 1",
-    "[[-30, 0, 0], [30, 0, 0]]": "[[0, 0, 0], [20, 0, 0]]",
-    "dwell_s = 0.5": "dwell_s = 0.1",
-    "count = 12": "count = 1",
-    "duration_s = 30": "duration_s = 1",
-}
+SCREEN_PX = 1080
+CORRECTED = {2: 5}  # statement: first answer, of every page
 
 pytestmark = [needs_servo, pytest.mark.xvfb, pytest.mark.timeout(300), needs_display]
 
 
-def shorter() -> str:
-    """Return the study with tasks of a second, whose first target is where the ball is."""
-    text = source_bytes("rek2024").decode()
-    for long, short in SHORTER.items():
-        assert long in text
-        text = text.replace(long, short)
-    return text
-
-
-class Session(Program):
-    """A session begun from the command line, and what its journal says."""
-
-    def __init__(self, display: str, folder: Path, device: str) -> None:
-        self.folder = folder
-        self.environment = os.environ | {"DISPLAY": display, "QT_QPA_PLATFORM": "xcb"}
-        (folder / "protocols").mkdir()
-        (folder / "protocols" / "rek2024.toml").write_text(shorter(), encoding="utf-8")
-        command = ["run", "rek2024", "--participant", "P042", "--seed", str(SEED), "--windowed", "--device", device]
-        self.process = subprocess.Popen(
-            [sys.executable, "-m", "study_app", *command, "--no-recordings"],
-            cwd=folder,
-            env=self.environment,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-
-    def events(self, kind: str) -> list[dict[str, object]]:
-        found = list(self.folder.glob("results/*/data/sub-P042/ses-01/journal.jsonl"))
-        whole = found[0].read_bytes().rpartition(b"\n")[0].splitlines() if found else []
-        return [event for event in map(json.loads, whole) if event["event"] == kind]
-
-    def end(self) -> None:
-        """End the program as a system that shuts down does, and see that it ends well."""
-        self.process.send_signal(signal.SIGTERM)
-        assert self.process.wait(30) == 128 + signal.SIGTERM
-
-    @property
-    def responses(self) -> list[dict[str, str]]:
-        (table,) = self.folder.glob("results/*/data/sub-P042/ses-01/*_description-responses_data.csv")
-        with table.open(encoding="utf-8", newline="") as opened:
-            return list(csv.DictReader(opened))
-
-
-class Pages:
-    """The pages of the session in their order, as the machine gives them, and the values to answer."""
-
-    def __init__(self, protocol: Protocol) -> None:
-        key = draw_key(protocol, stream(1, "key").random)
-        self._state = open_session(protocol, build_schedule(protocol, "P042", SEED), key, "en")
-        self.page: Page | None = None
-        self.take(Begin(0.0))
-
-    @property
-    def state(self) -> SessionState:
-        return self._state
-
-    def take(self, event: Any) -> None:
-        self._state, commands = advance(self._state, event)
-        self.page = next((command.page for command in commands if isinstance(command, ShowPage)), self.page)
-
-    def answer(self, page: QuestionnairePage) -> list[int]:
-        """Answer the page here as well; return the values."""
-        values = [(page.trial + item.number) % 7 + 1 for item in page.items]
-        for item, value in zip(page.items, values, strict=True):
-            self.take(ItemShown(0.0, item.id))
-            self.take(Chosen(0.0, item.id, value))
-        self.take(Submitted(0.0))
-        return values
+@pytest.fixture
+def program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Visitor]:
+    monkeypatch.chdir(tmp_path)
+    with virtual_display("-fbdir", str(tmp_path)) as display:
+        begun = Visitor(display, tmp_path)
+        yield begun
+        begun.close()
 
 
 @pytest.fixture
-def display() -> Iterator[str]:
-    with virtual_display() as number:
-        yield number
+def plan(program: Visitor, qtbot: Any) -> Visit:
+    """The same visit off screen, to look up where its parts lie."""
+    home_window(program)
+    made = Visit()
+    qtbot.addWidget(made.window)
+    laid_out(made.window, (HOME.width(), HOME.height()))
+    return made
 
 
-def walk(session: Session, person: Any) -> list[int]:
-    """Go through the study as ``person`` does; return what was answered."""
-    pages = Pages(parse(shorter().encode(), "rek2024"))
-    read = done = filled = 0
-    given: list[int] = []
-    while pages.state.phase not in FINAL:
-        match pages.page:
-            case TextPage() as page:
-                session.wait_for_event("page_shown", read + 1)
-                person.read(page)
-                read += 1
-                session.wait_for_event("page_left", read)
-                pages.take(Continue(1000.0))
-            case TaskPage():
-                done += 1
-                session.wait_for_event("trial_ended", done)
-                pages.take(TaskDone(0.0, "complete", {}))
-            case QuestionnairePage() as page:
-                session.wait_for_event("item_shown", len(given) + len(page.items))
-                values = pages.answer(page)
-                person.fill_in(page, values)
-                filled += 1
-                given += values
-                session.wait_for_event("responses", filled)
-    session.wait_for_event("session_ended")
-    return given
+def home_window(program: Visitor) -> str:
+    size = (HOME.width(), HOME.height())
+    return program.window_of("^Liquid Study$", size, size)
 
 
-class ByKeyboard:
-    """Uses keys alone."""
+def preflight_window(program: Visitor) -> str:
+    size = (PREFLIGHT.width(), PREFLIGHT.height())
+    return program.window_of("^Liquid Study$", size, size)
 
-    def __init__(self, session: Session) -> None:
-        self._session = session
-        self._window = session.window("^Study$")
+
+def thesis(plan: Visit) -> StudyCard:
+    cards = plan.window.findChildren(StudyCard)
+    return next(card for card in cards if card.facts.protocol.study.name == "rek2024")
+
+
+def rail_places(plan: Visit) -> dict[str, QPoint]:
+    """Return where the rail's buttons lie, and as "theme" its switch."""
+    laid_out(plan.window, (HOME.width(), HOME.height()))
+    rail = plan.window.rail
+    return {name: place_in(plan.window, button) for name, button in (*rail.buttons.items(), ("theme", rail.switch))}
+
+
+def dialog_of(plan: Visit, size: tuple[int, int]) -> NewSessionDialog:
+    place = plan.window.place("home")
+    assert isinstance(place, HomePlace)
+    thesis(plan).new.click()
+    dialog = place.dialog
+    assert isinstance(dialog, NewSessionDialog)
+    laid_out(dialog, size)
+    return dialog
+
+
+def operator_plan(pages: Pages, size: tuple[int, int], qtbot: Any) -> OperatorWindow:
+    """Return the operator's window at the end of the session."""
+    made = OperatorWindow("rek2024", lateness_limit_s=0.002, reach_m=0.05, pointer=True)
+    qtbot.addWidget(made)
+    made.show_view(pages.ended_view())
+    laid_out(made, size)
+    return made
+
+
+class ByKeyboard(Person):
+    """Presses keys; the pointer stays where it was when the display began."""
+
+    def take_keyboard(self, window: str) -> None:
+        """Do what a window manager does with a window that opens; from then on keys go where the keyboard is."""
+        self.window = window
+        self.program.xdotool("windowfocus", "--sync", window)
+
+    def press(self, *keys: str) -> None:
+        assert self.program.xdotool("getwindowfocus") == self.window
+        self.program.xdotool("key", *keys)
+
+    def choose_language(self, page: TextPage, language: str) -> None:
+        forward = page.languages.index(language) > page.languages.index(page.language)
+        self.press("Tab", "Right" if forward else "Left")
 
     def read(self, page: TextPage) -> None:
-        if page.languages and not self._session.events("language_chosen"):
-            self._session.key(self._window, "Tab", "Right")
-            self._session.wait_for_event("language_chosen")
-            self._window = self._session.window("^Onderzoek$")
-            self._session.key(self._window, "Tab", "Left")
-            self._session.wait_for_event("language_chosen", 2)
-            self._window = self._session.window("^Study$")
-        self._session.key(self._window, "Return" if page.kind == "consent" else "space")
+        self.press("Return" if page.kind == "consent" else "space")
 
-    def fill_in(self, _page: QuestionnairePage, values: list[int]) -> None:
-        self._session.key(self._window, *(str(value) for value in values), "Return")
+    def leave_tank(self) -> None:
+        self.press("space")
+
+    def reach(self, _page: TaskPage, _ended: Callable[[], bool]) -> None:
+        """Look on: the scripted hand reaches."""
+
+    def fill_in(self, page: QuestionnairePage, values: list[int]) -> None:
+        """Answer by digit, by arrows and space from either side, and one after going back to it."""
+        keys: list[str] = []
+        for item, value in zip(page.items, values, strict=True):
+            if item.number in CORRECTED:
+                first = CORRECTED[item.number] if CORRECTED[item.number] != value else value % 7 + 1
+                keys += [str(first), "shift+Tab", str(value)]
+            elif item.number % 3 == 0:
+                keys += ["Down", "Up", *["Right"] * value, "space"]
+            elif item.number % 3 == 1:
+                keys += ["Tab", "BackSpace", *["Left"] * (8 - value), "space"]
+            else:
+                keys.append(str(value))
+        self.press(*keys, "Return")
 
 
-class ByMouse:
-    """Uses the mouse alone."""
+class ByMouse(Person):
+    """Moves the mouse and clicks; where, is looked up in a window off screen."""
 
-    def __init__(self, session: Session, qtbot: Any) -> None:
-        self._session = session
-        self._window = session.window("^Study$")
+    def __init__(self, program: Visitor, qtbot: Any) -> None:
+        super().__init__(program)
         self._plan = ParticipantWindow(words("en"), clock=ManualClock(), windowed=True)
         qtbot.addWidget(self._plan)
-        self._plan.resize(*session.size(self._window))
-        self._plan.show()
-        qtbot.waitExposed(self._plan)
+        laid_out(self._plan, (WINDOWED_SIZE.width(), WINDOWED_SIZE.height()))
+        self._middle = self._plan.rect().center()
 
-    def close(self) -> None:
+    def leave(self) -> None:
         self._plan.may_close = True
         self._plan.close()
 
-    def _shown(self, page: Page) -> QWidget:
+    def click(self, window: str, *places: QPoint) -> None:
+        orders = [
+            order
+            for place in places
+            for order in ("mousemove", "--window", window, str(place.x()), str(place.y()), "click", "1")
+        ]
+        self.program.xdotool(*orders)
+
+    def _shown(self, page: TextPage | QuestionnairePage) -> QWidget:
         self._plan.show_page(page)
-        QApplication.processEvents()
+        laid_out(self._plan, (WINDOWED_SIZE.width(), WINDOWED_SIZE.height()))
         return self._plan.widget
 
-    def _click(self, *parts: QWidget) -> None:
-        orders: list[str] = []
-        for part in parts:
-            place: QPoint = part.mapTo(self._plan, part.rect().center())
-            orders += ["mousemove", "--window", self._window, str(place.x()), str(place.y()), "click", "1"]
-        self._session.xdotool(*orders)
+    def choose_language(self, page: TextPage, language: str) -> None:
+        widget = self._shown(page)
+        assert isinstance(widget, TextWidget)
+        assert widget.languages is not None
+        button = widget.languages.buttons[page.languages.index(language)]
+        self.click(self.window, place_in(self._plan, button))
 
     def read(self, page: TextPage) -> None:
         widget = self._shown(page)
         assert isinstance(widget, TextWidget)
         assert widget.button is not None
-        self._click(widget.button)
+        self.click(self.window, place_in(self._plan, widget.button))
 
     def fill_in(self, page: QuestionnairePage, values: list[int]) -> None:
         widget = self._shown(page)
         assert isinstance(widget, QuestionnaireWidget)
-        self._click(*(row.cells[value - 1] for row, value in zip(widget.rows, values, strict=True)), widget.button)
+        cells: list[QWidget] = []
+        for row, value in zip(widget.rows, values, strict=True):
+            if row.item.number in CORRECTED:
+                first = CORRECTED[row.item.number] if CORRECTED[row.item.number] != value else value % 7 + 1
+                cells.append(row.cells[first - 1])
+            cells.append(row.cells[value - 1])
+        self.click(self.window, *(place_in(self._plan, part) for part in (*cells, widget.button)))
+
+    def leave_tank(self) -> None:
+        self.move(80)
+        self.move(-80)
+        self.program.xdotool("click", "1")
+
+    def reach(self, page: TaskPage, ended: Callable[[], bool]) -> None:
+        """Begin at the tank's left wall, then go from target to target as each is lit."""
+        task = page.task
+        assert isinstance(task, Reach)
+        px_per_m = SHARE_OF_SCREEN * SCREEN_PX / page.workspace_m[1]
+        here_m = -page.workspace_m[0] / 2
+        self.move(-round(1.1 * page.workspace_m[0] * px_per_m))
+        while not ended():
+            reached = self._reached(page)
+            x_m = task.targets_m[reached % len(task.targets_m)][0]
+            self.move(round((x_m - here_m) * px_per_m))
+            here_m = x_m
+            wait_for(partial(self._reached_more, page, reached, ended), f"a target of trial {page.trial}", 20.0)
+
+    def _reached(self, page: TaskPage) -> int:
+        return sum(event["trial"] == page.trial for event in self.program.events("target_reached"))
+
+    def _reached_more(self, page: TaskPage, before: int, ended: Callable[[], bool]) -> bool:
+        return self._reached(page) > before or ended()
+
+    def move(self, right_px: int) -> None:
+        """Move the mouse, no faster than the pointer is put back into the middle of the tank."""
+        strays = min(self._plan.width(), self._plan.height()) // 4
+        while right_px:
+            step = max(-400, min(400, right_px))
+            x, y = self._pointer()
+            self.program.xdotool("mousemove_relative", "--", str(step), "0")
+            right_px -= step
+            if abs(x + step - self._middle.x()) + abs(y - self._middle.y()) > strays:
+                wait_for(lambda: self._pointer() == (self._middle.x(), self._middle.y()), "the pointer in the middle")
+
+    def _pointer(self) -> tuple[int, int]:
+        place = dict(
+            line.split("=") for line in self.program.xdotool("getmouselocation", "--shell").splitlines() if "=" in line
+        )
+        return int(place["X"]), int(place["Y"])
 
 
-def check(session: Session, given: list[int]) -> None:
-    assert [int(row["response"]) for row in session.responses] == given
-    assert len(given) == 62
-    assert session.events("session_ended")[0]["status"] == "completed"
-    assert not session.events("paused")
-    assert not session.events("broke")
+def changed(program: Visitor, before: Any) -> bool:
+    """Return whether much of what the display shows is no longer what it was."""
+    return bool(np.mean(np.any(program.picture() != before, axis=2)) > 0.05)
 
 
-def test_the_whole_study_by_keyboard_alone(display: str, tmp_path: Path) -> None:
-    session = Session(display, tmp_path, "scripted")
-    try:
-        given = walk(session, ByKeyboard(session))
-        check(session, given)
-        assert [event["language"] for event in session.events("language_chosen")] == ["nl", "en"]
-        session.end()
-    finally:
-        session.close()
+def check(program: Visitor, given: dict[tuple[int, str], int], *, simulated: str) -> None:
+    """Check what is on the disk after a session."""
+    rows = program.table("responses")
+    assert {(int(row["trial"]), row["item"]): int(row["response"]) for row in rows} == given
+    assert len(rows) == len(given) == ANSWERS
+    assert [row["changes"] for row in rows] == [str(int(int(row["number"]) in CORRECTED)) for row in rows]
+    assert {row["simulated"] for row in rows} == {simulated}
+    trials = program.table("trials")
+    assert [row["outcome"] for row in trials] == ["complete"] * TRIALS
+    assert {row["attempt"] for row in trials} == {"1"}
+    assert [event["status"] for event in program.events("session_ended")] == ["completed"]
+    for kind in ("paused", "broke", "force_stopped", "repeat"):
+        assert not program.events(kind)
+    found = program.verified()
+    assert found.returncode == 0, found.stdout + found.stderr
 
 
-def test_the_whole_study_by_the_mouse_alone(display: str, tmp_path: Path, qtbot: Any) -> None:
-    session = Session(display, tmp_path, "mouse")
-    try:
-        person = ByMouse(session, qtbot)
-        given = walk(session, person)
-        person.close()
-        check(session, given)
-        session.end()
-    finally:
-        session.close()
+def check_left(program: Visitor) -> None:
+    """Check how the program ended: as it should, with no window and no word on its errors."""
+    assert program.process.wait(30) == 0
+    assert not program.windows(".")
+    assert program.process.stderr is not None
+    assert program.process.stderr.read() == ""
+    assert json.loads(settings_file().read_text(encoding="utf-8"))["theme"] == "dark"
+
+
+def test_the_whole_study_by_keys_alone_from_home_to_home(program: Visitor, plan: Visit, qtbot: Any) -> None:
+    person = ByKeyboard(program)
+    pointer = program.xdotool("getmouselocation")
+    home, main = home_window(program), plan.window
+    person.take_keyboard(home)
+    person.press(*["Tab"] * tabs_to(main, thesis(plan).new), "Return")
+    person.take_keyboard(program.window("^New session$"))
+    dialog = dialog_of(plan, program.size(person.window))
+    to_device = tabs_to(dialog, dialog.device)
+    down = dialog.device.findData("scripted") - dialog.device.currentIndex()
+    person.press(*["Tab"] * to_device, *["Down"] * down, *["Tab"] * tabs_to(dialog, dialog.begin), "Return")
+    dialog.reject()
+    person.take_keyboard(preflight_window(program))
+    person.press("Tab", "shift+Tab", "Return")
+    person.take_keyboard(program.window("^Study$"))
+    program.wait_for_event("session_started")
+    pages = Pages(program.events("session_started")[0])
+    given = person.walk(pages)
+    person.take_keyboard(program.window("operator$"))
+    cockpit = operator_plan(pages, program.size(person.window), qtbot)
+    person.press(*["Tab"] * tabs_to(cockpit, cockpit.buttons.close_session), "Return")
+    person.take_keyboard(home_window(program))
+    assert program.windows(".") == [person.window]
+    check(program, given, simulated="true")
+    see_results_and_dark_theme_by_keys(program, person, plan)
+    assert program.xdotool("getmouselocation") == pointer
+    assert not program.orders & {"click", "mousedown", "mousemove", "mousemove_relative"}
+    person.press("ctrl+q")
+    check_left(program)
+
+
+def see_results_and_dark_theme_by_keys(program: Visitor, person: ByKeyboard, plan: Visit) -> None:
+    main, rail = plan.window, plan.window.rail
+    laid_out(main, (HOME.width(), HOME.height()))
+    thesis(plan).new.setFocus()  # where the dialog was opened
+    to_results = tabs_to(main, rail.buttons["results"], Qt.Key.Key_Backtab)
+    to_home = tabs_to(main, rail.buttons["home"], Qt.Key.Key_Backtab)
+    to_switch = tabs_to(main, rail.switch)
+    home = program.picture()
+    person.press(*["shift+Tab"] * to_results, "Return")
+    wait_for(lambda: changed(program, home), "results")
+    person.press(*["shift+Tab"] * to_home, "space")
+    wait_for(lambda: not changed(program, home), "home")
+    person.press(*["Tab"] * to_switch, "Return")
+    wait_for(lambda: changed(program, home), "the dark theme")
+
+
+def test_the_whole_study_by_the_mouse_alone_from_home_to_home(program: Visitor, plan: Visit, qtbot: Any) -> None:
+    person = ByMouse(program, qtbot)
+    home, wide = home_window(program), rail_places(plan)
+    plan.window.rail.narrow(True)
+    narrow = rail_places(plan)
+    plan.window.rail.narrow(False)
+    person.click(home, place_in(plan.window, thesis(plan).new))
+    asked = program.window("^New session$")
+    dialog = dialog_of(plan, program.size(asked))
+    begin = place_in(dialog, dialog.begin)
+    dialog.reject()
+    person.click(asked, begin)
+    before = PreflightWindow(2e3)
+    qtbot.addWidget(before)
+    laid_out(before, (PREFLIGHT.width(), PREFLIGHT.height()))
+    person.click(preflight_window(program), place_in(before, before.start))
+    person.window = program.window("^Study$")
+    program.wait_for_event("session_started")
+    pages = Pages(program.events("session_started")[0])
+    given = person.walk(pages)
+    person.leave()
+    operator = program.window("operator$")
+    cockpit = operator_plan(pages, program.size(operator), qtbot)
+    person.click(operator, place_in(cockpit, cockpit.buttons.close_session))
+    home = home_window(program)
+    assert program.windows(".") == [home]
+    check(program, given, simulated="false")
+    seen = program.picture()
+    person.click(home, wide["results"])
+    wait_for(lambda: changed(program, seen), "results")
+    person.click(home, narrow["home"])  # results have the rail narrow
+    wait_for(lambda: not changed(program, seen), "home")
+    person.click(home, wide["theme"])
+    wait_for(lambda: changed(program, seen), "the dark theme")
+    assert not program.orders & {"key", "keydown", "type"}
+    program.close_by_frame(home)
+    check_left(program)

@@ -230,3 +230,4 @@ def test_the_preferred_device_is_shown_as_it_was_found_and_sessions_begin_with_i
     assert (card.about.text(), card.why.text()) == ("Felt, up to 8 N.", "Plug its cable in.")
     qtbot.mouseClick(study_cards(home)[0].new, Qt.MouseButton.LeftButton)
     assert home.dialog.chosen().device == "falcon"
+    home.dialog.reject()

@@ -104,6 +104,7 @@ def window(request: pytest.FixtureRequest, qtbot: Any) -> Iterator[OperatorWindo
     qtbot.waitExposed(made)
     yield made
     made.may_close = True
+    made.close()
 
 
 def settle(window: OperatorWindow, size: tuple[int, int]) -> None:

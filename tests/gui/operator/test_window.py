@@ -28,6 +28,9 @@ def window(qtbot):
     qtbot.waitExposed(made)
     yield made
     made.may_close = True
+    if made.question is not None:
+        made.question.reject()
+    made.close()
 
 
 @pytest.fixture

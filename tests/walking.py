@@ -1,0 +1,306 @@
+"""A walk through the thesis' whole study in its real windows: what comes next, where it lies, and what is on the disk.
+
+What comes next is told by the session's own machine, which knows no window; where it lies, by the same widgets laid out
+off screen at the same size.
+"""
+
+from __future__ import annotations
+
+import csv
+import ctypes
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication, QWidget
+
+from study_app.gui.operator.health import ServoHealth
+from study_app.gui.operator.progress import SessionProgress, stages
+from study_app.gui.operator.view import OperatorView, Session, operator_view
+from study_app.protocol.files import source_bytes
+from study_app.protocol.load import parse
+from study_app.protocol.model import Explore, Protocol
+from study_app.protocol.schedule import build_schedule, draw_key, stream
+from study_app.session.commands import ShowPage
+from study_app.session.events import Begin, Chosen, Continue, ItemShown, LanguageChosen, Submitted, TaskDone
+from study_app.session.machine import advance, open_session
+from study_app.session.pages import Page, QuestionnairePage, TaskPage, TextPage
+from study_app.session.state import FINAL
+from tests.real_windows import Program, wait_for
+
+SHORTER = {
+    "min_s = 10 ": "min_s = 0.5 ",
+    "min_s = 30": "min_s = 0.5",
+    "dwell_s = 0.5": "dwell_s = 0.1",
+    "count = 12": "count = 2",
+    "duration_s = 30": "duration_s = 1",
+}
+ANSWERS, TRIALS = 62, 12
+LEAVING_S, LEAVES = 0.8, 20  # a tank is left again, if it was not, after so long, and so often
+
+
+def _shorter() -> str:
+    """Return the thesis' study with tasks of a second; all else is as it was."""
+    text = source_bytes("rek2024").decode()
+    for long, short in SHORTER.items():
+        text, found = re.subn(f"^{long}", short, text, flags=re.MULTILINE)
+        assert found, long
+    return text
+
+
+SHORT = _shorter()  # now: in the folder of a walk, the study's name means the short one
+
+
+class Visitor(Program):
+    """The program begun without a word, in a folder with the short study."""
+
+    def __init__(self, display: str, folder: Path) -> None:
+        (folder / "protocols").mkdir()
+        (folder / "protocols" / "rek2024.toml").write_text(SHORT, encoding="utf-8")
+        self.display = display
+        self.orders: set[str] = set()
+        super().__init__(display, folder)
+
+    def xdotool(self, *arguments: str) -> str:
+        """Give orders, and remember them: keys and the mouse are told apart by them."""
+        self.orders |= set(arguments)
+        return super().xdotool(*arguments)
+
+    def window_of(self, title: str, least: tuple[int, int], most: tuple[int, int] = (9999, 9999)) -> str:
+        """Wait for a window of this title that is neither smaller nor larger than that; return its number."""
+        found: list[str] = []
+
+        def look() -> list[str]:
+            assert self.process.poll() is None, self.process.stderr.read()  # type: ignore[union-attr]
+            found[:] = [one for one in self.windows(title) if self._fits(one, least, most)]
+            return found
+
+        wait_for(look, f"the window {title!r}", 90.0)
+        return found[-1]
+
+    def _fits(self, window: str, least: tuple[int, int], most: tuple[int, int]) -> bool:
+        geometry = self.xdotool("getwindowgeometry", "--shell", window)
+        if "WIDTH" not in geometry:  # it has just gone
+            return False
+        width, height = self.size(window)
+        return least[0] <= width <= most[0] and least[1] <= height <= most[1]
+
+    def windows(self, title: str) -> list[str]:
+        """Return the windows of this title that are seen."""
+        return self.xdotool("search", "--onlyvisible", "--name", title).split()
+
+    def close_by_frame(self, window: str) -> None:
+        """Ask a window to close, as the cross in its frame does; there is no frame on a bare display."""
+        _send_delete(self.display, int(window))
+
+    def picture(self) -> NDArray[np.uint8]:
+        """Return what the display shows: rows, columns and the four bytes of a pixel."""
+        raw = (self.folder / "Xvfb_screen0").read_bytes()
+        head = np.frombuffer(raw, ">u4", 25)
+        width, height, colours = int(head[4]), int(head[5]), int(head[19])
+        pixels = np.frombuffer(raw, np.uint8, offset=int(head[0]) + 12 * colours, count=4 * width * height)
+        return pixels.reshape(height, width, 4)
+
+    def table(self, name: str) -> list[dict[str, str]]:
+        (path,) = self.folder.glob(f"results/*/data/sub-*/ses-01/*_description-{name}_data.csv")
+        with path.open(encoding="utf-8", newline="") as opened:
+            return list(csv.DictReader(opened))
+
+    def verified(self) -> subprocess.CompletedProcess[str]:
+        """Return what the program finds in the results that it wrote."""
+        (study,) = self.folder.glob("results/*")
+        words = [sys.executable, "-m", "study_app", "verify", str(study)]
+        return subprocess.run(words, capture_output=True, text=True, check=False)
+
+
+class _ClientMessage(ctypes.Structure):
+    _fields_ = (
+        ("type", ctypes.c_int),
+        ("serial", ctypes.c_ulong),
+        ("send_event", ctypes.c_int),
+        ("display", ctypes.c_void_p),
+        ("window", ctypes.c_ulong),
+        ("message_type", ctypes.c_ulong),
+        ("format", ctypes.c_int),
+        ("data", ctypes.c_long * 5),
+        ("room", ctypes.c_long * 24),
+    )
+
+
+def _send_delete(display: str, window: int) -> None:
+    """Send a window the message by which a window manager closes it."""
+    x11 = ctypes.CDLL("libX11.so.6")
+    x11.XOpenDisplay.restype = x11.XInternAtom.restype = ctypes.c_void_p
+    x11.XInternAtom.argtypes = [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_int]
+    x11.XSendEvent.argtypes = [ctypes.c_void_p, ctypes.c_ulong, ctypes.c_int, ctypes.c_long, ctypes.c_void_p]
+    x11.XCloseDisplay.argtypes = [ctypes.c_void_p]
+    opened = x11.XOpenDisplay(display.encode())
+    protocols, delete = (x11.XInternAtom(opened, name, 0) for name in (b"WM_PROTOCOLS", b"WM_DELETE_WINDOW"))
+    client_message = 33
+    data = (ctypes.c_long * 5)(delete, 0, 0, 0, 0)
+    message = _ClientMessage(client_message, 0, 1, opened, window, protocols, 32, data)
+    x11.XSendEvent(opened, window, 0, 0, ctypes.byref(message))
+    x11.XCloseDisplay(opened)
+
+
+class Pages:
+    """The pages of the session that the program holds, in their order, and the values to answer them with."""
+
+    def __init__(self, started: dict[str, Any]) -> None:
+        protocol = parse(SHORT.encode(), "rek2024")
+        self.schedule = build_schedule(protocol, started["participant"], started["seed"])
+        key = draw_key(protocol, stream(1, "key").random)  # codes are all that pages show
+        self._state = open_session(protocol, self.schedule, key, started["language"])
+        self.protocol: Protocol = protocol
+        self.page: Page | None = None
+        self.take(Begin(0.0))
+
+    @property
+    def over(self) -> bool:
+        return self._state.phase in FINAL
+
+    def take(self, event: Any) -> None:
+        self._state, commands = advance(self._state, event)
+        self.page = next((command.page for command in commands if isinstance(command, ShowPage)), self.page)
+
+    def answer(self, page: QuestionnairePage) -> dict[tuple[int, str], int]:
+        """Answer the page here as well; return the values by trial and statement."""
+        given = {(page.trial, item.id): (3 * page.trial + 2 * item.number) % 7 + 1 for item in page.items}
+        for (_, item), value in given.items():
+            self.take(ItemShown(0.0, item))
+            self.take(Chosen(0.0, item, value))
+        self.take(Submitted(0.0))
+        return given
+
+    def ended_view(self) -> OperatorView:
+        """Return what the operator sees in the end."""
+        progress = SessionProgress(self.protocol, self.schedule).after("session_started", 0.0, {})
+        session = Session(
+            protocol=self.protocol,
+            stages=stages(self.protocol, self.schedule),
+            who="",
+            expected_s=1200.0,
+            answers_of=ANSWERS,
+            lateness_limit_s=0.002,
+            device_name="",
+            device_kind="mouse",
+            device_rows=(("Priority", "normal"),),
+        )
+        ended = progress.after("session_ended", 1.0, {"status": "completed"})
+        return operator_view(session, ended, ServoHealth(1000.0).vitals(), now_s=1.0, force_on=False)
+
+
+class Person:
+    """Goes through the study; how a page is read, a task done and a statement answered is the subclass's affair."""
+
+    def __init__(self, program: Visitor) -> None:
+        self.program = program
+        self.window = ""
+
+    def choose_language(self, page: TextPage, language: str) -> None:
+        raise NotImplementedError
+
+    def read(self, page: TextPage) -> None:
+        raise NotImplementedError
+
+    def leave_tank(self) -> None:
+        raise NotImplementedError
+
+    def reach(self, page: TaskPage, ended: Callable[[], bool]) -> None:
+        raise NotImplementedError
+
+    def fill_in(self, page: QuestionnairePage, values: list[int]) -> None:
+        raise NotImplementedError
+
+    def walk(self, pages: Pages) -> dict[tuple[int, str], int]:
+        """Go from the first page to the last; return what was answered."""
+        given: dict[tuple[int, str], int] = {}
+        read = done = filled = 0
+        while not pages.over:
+            page = pages.page
+            if isinstance(page, TextPage):
+                read += 1
+                self.program.wait_for_event("page_shown", read)
+                self.read(self._in_another_language_and_back(page, pages))
+                self.program.wait_for_event("page_left", read)
+                pages.take(Continue(1e3))
+            elif isinstance(page, TaskPage):
+                done += 1
+                self.program.wait_for_event("trial_started", done)
+                self._do(page, partial(self._have_ended, done))
+                pages.take(TaskDone(0.0, "complete", {}))
+            else:
+                assert isinstance(page, QuestionnairePage)
+                self.program.wait_for_event("item_shown", len(given) + len(page.items))
+                answers = pages.answer(page)
+                self.fill_in(page, list(answers.values()))
+                given |= answers
+                filled += 1
+                self.program.wait_for_event("responses", filled)
+        self.program.wait_for_event("session_ended")
+        return given
+
+    def _in_another_language_and_back(self, page: TextPage, pages: Pages) -> TextPage:
+        """Where languages can be chosen, look at the page in another one; return the page."""
+        for chosen, language in enumerate((*page.languages[1:], *page.languages[:1]), start=1):
+            self.choose_language(page, language)
+            self.program.wait_for_event("language_chosen", chosen)
+            pages.take(LanguageChosen(0.0, language))
+            assert isinstance(pages.page, TextPage)
+            page = pages.page
+        return page
+
+    def _have_ended(self, trials: int) -> bool:
+        return len(self.program.events("trial_ended")) >= trials
+
+    def _do(self, page: TaskPage, ended: Callable[[], bool]) -> None:
+        """Do a task: an exploration is left, again where that came before its least time."""
+        if not isinstance(page.task, Explore):
+            self.reach(page, ended)
+        for _ in range(LEAVES if isinstance(page.task, Explore) else 0):
+            self.leave_tank()
+            if happens(ended, LEAVING_S):
+                return
+        wait_for(ended, "the end of the trial", LEAVING_S if isinstance(page.task, Explore) else 90.0)
+
+
+def happens(found: Callable[[], object], seconds: float) -> bool:
+    """Return whether it comes about within so long."""
+    try:
+        wait_for(found, "", seconds)
+    except AssertionError:
+        return False
+    return True
+
+
+def laid_out(window: QWidget, size: tuple[int, int]) -> None:
+    """Show a window off screen as large as another is on one."""
+    window.resize(*size)
+    window.show()
+    window.activateWindow()
+    for _ in range(3):
+        QApplication.processEvents()
+    assert (window.width(), window.height()) == size
+
+
+def place_in(window: QWidget, part: QWidget) -> QPoint:
+    """Return where the middle of a part lies."""
+    assert part.isVisible()
+    return part.mapTo(window, part.rect().center())
+
+
+def tabs_to(window: QWidget, part: QWidget, key: Qt.Key = Qt.Key.Key_Tab) -> int:
+    """Return how often Tab is pressed from where the keyboard is until it is on ``part``."""
+    for count in range(60):
+        if part.hasFocus():
+            return count
+        QTest.keyClick(window.focusWidget() or window, key)
+    raise AssertionError(f"the keyboard does not get to {part.accessibleName() or part}")
