@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
-from study_app.analysis.analyst import (
+from study_app.analysis.orders import (
     Answer,
     Done,
     FigureDrawn,

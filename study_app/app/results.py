@@ -17,8 +17,8 @@ from typing import Any, Final
 from PySide6.QtCore import QObject, QTimer, QUrl
 from PySide6.QtGui import QDesktopServices
 
-from study_app.analysis.analyst import (
-    Analyst,
+from study_app.analysis.analyst import Analyst
+from study_app.analysis.orders import (
     Answer,
     Done,
     FigureDrawn,

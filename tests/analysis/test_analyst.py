@@ -12,8 +12,10 @@ from pathlib import Path
 import pytest
 
 from study_app.analysis import captions, style
-from study_app.analysis.analyst import (
-    Analyst,
+from study_app.analysis.analyst import Analyst
+from study_app.analysis.answering import carry_out
+from study_app.analysis.export import export
+from study_app.analysis.orders import (
     Answer,
     Done,
     FigureDrawn,
@@ -31,8 +33,6 @@ from study_app.analysis.analyst import (
     WriteReport,
     WriteTables,
 )
-from study_app.analysis.answering import carry_out
-from study_app.analysis.export import export
 from study_app.analysis.tables import load_study
 from study_app.errors import AnalysisError, StoreError, StudyError
 from study_app.protocol.load import load
