@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from study_app.gui.cards import Bar
 from study_app.gui.icons import draw_icon
-from study_app.gui.labels import Elided, Ink, figures, label
+from study_app.gui.labels import Ink, figures, label
 from study_app.gui.theme import font
 from study_app.gui.themed import Themed
 from study_app.session.preflight import Check
@@ -16,7 +16,8 @@ from study_app.session.preflight import Check
 ROW_HEIGHT = 48
 DOT = 13.0
 LEFT = 70
-VALUE = 130
+NAME, BAR = 148, 160
+LEAST_WORDS = 160  # narrower, wrapped words would ask for room that they do not need
 LOOKS: dict[str, tuple[str, Ink, str]] = {
     "ok": ("check", "ok", "passed"),
     "warning": ("warning", "warn", "warning"),
@@ -33,30 +34,34 @@ class CheckRow(Themed, QWidget):
         _, ink, word = LOOKS[check.verdict]
         name = label(check.name, "body")
         name.setFont(font("body", weight=600, scale=0.97))
-        name.setFixedWidth(168)
-        about = Elided("label", "text2")
+        name.setFixedWidth(NAME)
+        about = label(check.about, "label", "text2", wraps=True)
         about.setFont(font("label", weight=400, tabular=True))
-        about.show_text(check.about)
+        about.setMinimumWidth(LEAST_WORDS)
         value = figures(check.value, "body", "text" if check.verdict == "ok" else ink)
         value.setFont(font("body", weight=600, tabular=True, scale=0.97))
-        value.setMinimumWidth(VALUE)
         value.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         row = QHBoxLayout()
         row.setSpacing(14)
         row.addWidget(name)
-        row.addWidget(about, 1)
+        said = QVBoxLayout()
+        said.setSpacing(6)
+        said.addStretch()
+        said.addWidget(about)
         if check.share is not None:
             share = Bar(height=6)
-            share.setFixedWidth(84)
+            share.setFixedWidth(BAR)
             share.show_share(min(1.0, check.share))
-            row.addWidget(share)
+            said.addWidget(share, 0, Qt.AlignmentFlag.AlignLeft)
+        said.addStretch()
+        row.addLayout(said, 1)
         row.addWidget(value)
         column = QVBoxLayout(self)
         column.setContentsMargins(LEFT, 0, 24, 0 if check.verdict == "ok" else 14)
         column.setSpacing(0)
-        holder = QWidget()
-        holder.setFixedHeight(ROW_HEIGHT)
-        row.setContentsMargins(0, 0, 0, 0)
+        self._head = holder = QWidget()
+        holder.setMinimumHeight(ROW_HEIGHT)
+        row.setContentsMargins(0, 4, 0, 4)
         holder.setLayout(row)
         column.addWidget(holder)
         if check.advice:
@@ -74,7 +79,7 @@ class CheckRow(Themed, QWidget):
         tint = QColor(getattr(t, f"{ink}_bg"))
         if self.check.verdict != "ok":
             painter.fillRect(self.rect().adjusted(4, 0, -4, 0), tint)
-        middle = QPointF(40, ROW_HEIGHT / 2)
+        middle = QPointF(40, self._head.geometry().center().y() + 0.5)
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(tint if self.check.verdict == "ok" else QColor(t.surface))
         painter.drawEllipse(middle, DOT, DOT)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QCloseEvent, QKeyEvent
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QAbstractSlider, QGridLayout, QHBoxLayout, QLabel, QScrollArea, QVBoxLayout, QWidget
 
 from study_app.gui.cards import Card, Chip, Rule
 from study_app.gui.controls import ActionButton
@@ -17,6 +17,10 @@ from study_app.gui.themed import dress, take_away, wear
 
 FULL, LEAST = QSize(1200, 800), QSize(1024, 640)
 ASIDE = 352
+PAGES = {
+    Qt.Key.Key_PageDown: QAbstractSlider.SliderAction.SliderPageStepAdd,
+    Qt.Key.Key_PageUp: QAbstractSlider.SliderAction.SliderPageStepSub,
+}
 NOTHING_YET = "Nothing is created until you start."
 
 
@@ -48,6 +52,7 @@ class PreflightWindow(QWidget):
         self.start = ActionButton("play", "Start", role="primary", height=46)
         self._values: dict[str, QLabel] = {}
         self._done = False
+        self._busy = False
         around = self.checks.column.contentsMargins()
         self.checks.column.setContentsMargins(4, around.top(), 4, around.bottom())
         self._lay_out()
@@ -70,7 +75,7 @@ class PreflightWindow(QWidget):
         left.setContentsMargins(0, 0, 0, 0)
         left.addWidget(self.checks)
         left.addStretch()
-        area = QScrollArea()
+        area = self._area = QScrollArea()
         area.setWidgetResizable(True)
         area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
@@ -117,6 +122,9 @@ class PreflightWindow(QWidget):
         self.start.show_action("play", view.start_words)
         self.start.setEnabled(not view.busy and not view.failures)
         self.again.setEnabled(not view.busy)
+        if self._busy and not view.busy:
+            self.start.setFocus()  # what was pressed lost the keyboard to Cancel meanwhile
+        self._busy = view.busy
         self._show_checks(view)
         self._show_rows(view)
         edges, counts, p99_us = histogram(view.lateness_us)
@@ -169,12 +177,14 @@ class PreflightWindow(QWidget):
         self.close()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
-        """Begin on Enter, go back on Esc."""
+        """Begin on Enter, go back on Esc, look at the checks below by the page keys."""
         if event.key() == Qt.Key.Key_Escape:
             self.close()
         elif event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
             chosen = next((button for button in (self.cancel, self.again) if button.hasFocus()), self.start)
             chosen.click()
+        elif event.key() in PAGES:
+            self._area.verticalScrollBar().triggerAction(PAGES[Qt.Key(event.key())])
         else:
             super().keyPressEvent(event)
 

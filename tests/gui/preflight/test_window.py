@@ -104,6 +104,15 @@ def test_enter_on_another_button_does_what_it_says(window, qtbot):
         qtbot.keyClick(window.again, Qt.Key.Key_Return)
 
 
+def test_after_measuring_anew_enter_begins(window, qtbot):
+    window.again.setFocus()
+    window.show_view(view_of(WELL, busy=True))
+    assert not window.again.hasFocus()
+    window.show_view(view_of(WELL))
+    with qtbot.waitSignal(window.start_asked):
+        qtbot.keyClick(QApplication.focusWidget(), Qt.Key.Key_Return)
+
+
 @pytest.mark.parametrize("how", ["escape", "cancel", "close"])
 def test_one_goes_back_without_a_trace(window, qtbot, how):
     with qtbot.waitSignal(window.cancelled):
@@ -140,6 +149,17 @@ def test_the_histogram_holds_every_turn():
     assert histogram(np.empty(0))[2] is None
 
 
+def test_every_check_can_be_looked_at_by_the_keyboard_in_the_smallest_window(window, qtbot):
+    window.resize(LEAST)
+    QApplication.processEvents()
+    last = window.rows[-1]
+    assert last.visibleRegion().boundingRect().height() < last.height()
+    qtbot.keyClick(window.start, Qt.Key.Key_PageDown)
+    assert last.visibleRegion().boundingRect().height() == last.height()
+    qtbot.keyClick(window.start, Qt.Key.Key_PageUp)
+    assert window.rows[0].visibleRegion().boundingRect().height() == window.rows[0].height()
+
+
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_no_words_are_cut_in_the_smallest_window(qtbot, theme):
     made = PreflightWindow(1000.0, **({"theme": DARK} if theme == "dark" else {}))
@@ -150,8 +170,9 @@ def test_no_words_are_cut_in_the_smallest_window(qtbot, theme):
     QApplication.processEvents()
     for row in made.rows:
         for part in row.findChildren(QLabel):
-            if not part.toolTip():  # an elided one says all of it in its tip
-                needed = part.sizeHint().width() if not part.wordWrap() else 0
-                assert part.width() >= needed, (row.check.name, part.text())
+            needed = part.sizeHint().width() if not part.wordWrap() else 0
+            assert part.width() >= needed, (row.check.name, part.text())
+            if part.wordWrap():
+                assert part.height() >= part.heightForWidth(part.width()), (row.check.name, part.text())
     for value in made.runs.findChildren(QLabel):
         assert made.rect().contains(value.mapTo(made, QPoint(0, 0)))
