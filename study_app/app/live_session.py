@@ -12,7 +12,7 @@ import traceback
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QEventLoop, QObject, Qt, QTimer, Signal
 from PySide6.QtGui import QScreen
@@ -101,7 +101,10 @@ class LiveSession(QObject):
         self._said.connect(self._say, Qt.ConnectionType.QueuedConnection)
 
     def open(self) -> None:
-        """Show the note, and make device and servo ready beside it."""
+        """Show the note, and make device and servo ready beside it; a mistake ends in order, with ``over``."""
+        self._go_on(self._open)
+
+    def _open(self) -> None:
         from study_app.gui.session_windows import who  # noqa: PLC0415 - pyqtgraph: only once it is needed
 
         if self._unread and self._tell is not None:
@@ -161,12 +164,16 @@ class LiveSession(QObject):
             self._let_go()
             self.deleteLater()
             return
-        self._go_on(self._ask if self._asks and isinstance(made, Ready) else self._open_windows, made)
+        if self._asks and isinstance(made, Ready):
+            ready = made
+            self._go_on(lambda: self._ask(ready))
+        else:
+            self._go_on(lambda: self._open_windows(made))
 
-    def _go_on(self, step: Callable[[Any], None], made: object) -> None:
+    def _go_on(self, step: Callable[[], None]) -> None:
         """Take a step toward the first page; whatever it meets ends in order."""
         try:
-            step(made)
+            step()
         except StudyError as error:
             self.error = error
             self._close()
@@ -182,8 +189,8 @@ class LiveSession(QObject):
 
         shown_on, _ = self._screens()
         asked = Preflight(self.chosen, load(self.chosen.source), made, shown_on, who(self.chosen), self.theme)
-        asked.started.connect(lambda ready: self._go_on(self._open_windows, ready))
-        asked.failed.connect(lambda error: self._go_on(self._open_windows, error))
+        asked.started.connect(lambda ready: self._go_on(lambda: self._open_windows(ready)))
+        asked.failed.connect(lambda error: self._go_on(lambda: self._open_windows(error)))
         asked.cancelled.connect(self._cancel)
         self.preflight = asked
         self._close_note()
@@ -271,9 +278,15 @@ class LiveSession(QObject):
             return
         self._closed = True
         self._ending.set()
-        self._close_note()
-        self._close_preflight()
-        self._let_go()
+        try:
+            self._close_note()
+            self._close_preflight()
+            self._let_go()
+        except StudyError as error:
+            self.error = self.error or error  # what came first says why
+        except Exception:  # noqa: BLE001 - told to the terminal; whoever waits for the end must hear of it
+            traceback.print_exc()
+            self.code = BUG
         self.over.emit()
         if not self._working:
             self.deleteLater()

@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QApplication
 
 from study_app.app import live_session
 from study_app.app.visit import Visit
-from study_app.errors import DeviceNotFound
+from study_app.errors import DeviceLost, DeviceNotFound
 from study_app.gui.choices import NewSession
 from study_app.gui.theme import DARK
 
@@ -20,13 +20,16 @@ CHOSEN = NewSession("demo", "P001", 1, 7, "AK", "en", "mouse", True, None, Path(
 
 
 class Machine:
-    """An open device with its servo."""
+    """An open device with its servo; the device may be lost when it is to be let go of."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, lost: bool = False) -> None:
         self.stopped = False
+        self._lost = lost
 
     def stop(self) -> None:
         self.stopped = True
+        if self._lost:
+            raise DeviceLost("the device 'falcon' is gone")
 
 
 @pytest.fixture
@@ -84,6 +87,32 @@ def test_a_session_that_was_not_begun_is_told_so(visit: Visit, monkeypatch: Any,
     qtbot.waitUntil(lambda: visit.window.notice is not None)
     assert visit.window.notice is not None
     assert visit.window.notice.windowTitle() == "The session was not begun"
+
+
+def test_a_mistake_before_the_first_window_leads_home_again(visit: Visit, monkeypatch: Any, capsys: Any) -> None:
+    def broken(_chosen: NewSession) -> str:
+        raise TypeError("nobody is there")
+
+    monkeypatch.setattr("study_app.gui.session_windows.who", broken)
+    visit._start(CHOSEN)
+    assert visit.window.isVisible()
+    assert visit.live is None
+    assert visit.window.notice is not None
+    assert visit.window.notice.windowTitle() == "The session was stopped by a mistake in the program"
+    assert "nobody is there" in capsys.readouterr().err
+
+
+def test_a_device_that_is_gone_at_the_end_does_not_keep_the_window_away(visit: Visit, monkeypatch: Any) -> None:
+    machine = Machine(lost=True)
+    monkeypatch.setattr(live_session.LiveSession, "open", lambda _self: None)
+    visit._start(CHOSEN)
+    live = visit.live
+    assert live is not None
+    live._machine = machine  # type: ignore[assignment]
+    live._cancel()
+    assert machine.stopped
+    assert visit.window.isVisible()
+    assert visit.window.notice is not None
 
 
 def test_a_theme_that_was_changed_in_the_cockpit_stays(visit: Visit, monkeypatch: Any) -> None:
