@@ -1,4 +1,6 @@
-"""Where Qt drives a session: timers poll the runner, windows' signals become events, its news becomes views.
+"""Where Qt drives a session: frames poll the runner, windows' signals become events, its news becomes views.
+
+A frame is drawn first and at once; what else is to be shown is drawn in the time until the next.
 
 Whatever fails in here ends in zero force: the force is stopped first, then the failure is written down and shown to the
 operator. Nothing of it reaches the participant but a calm page.
@@ -16,12 +18,14 @@ from typing import Concatenate, ParamSpec
 from PySide6.QtCore import QObject, QTimer, Signal
 
 from study_app.errors import SessionError, StudyError
+from study_app.gui.collector import settle, unsettle
 from study_app.gui.frames import Frames
 from study_app.gui.lookout import Lookout
 from study_app.gui.operator.view import OperatorView
 from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.participant import ParticipantWindow
 from study_app.gui.session_parts import Hand, Parts
+from study_app.gui.slack import Slack
 from study_app.session.events import (
     Begin,
     Broke,
@@ -38,8 +42,8 @@ from study_app.session.pages import Page, TaskPage
 from study_app.session.ports import Ports
 from study_app.session.runner import Runner
 
-TRACE_MS = 33
-TILES_MS = 500
+TRACES_S = 0.030  # every second frame of 60 a second, every fifth of 144
+TILES_S = 0.5
 END_SHOWN_MS = 5000
 log = logging.getLogger(__name__)
 P = ParamSpec("P")
@@ -99,15 +103,9 @@ class SessionBridge(QObject):
         self._hook_before = sys.excepthook
         self._frames = Frames(refresh_hz, parent=self)
         self._frames.due.connect(self._frame)
-        self._timers = (self._frames, self._timer(TRACE_MS, self._traces), self._timer(TILES_MS, self._tiles))
+        self._slack = Slack(((self._tiles, TILES_S), (self._traces, TRACES_S), (self._forces, TRACES_S)))
         self.runner.on_change(lambda _state: self._changed())
         self._connect()
-
-    def _timer(self, interval_ms: int, slot: Callable[[], None]) -> QTimer:
-        timer = QTimer(self)
-        timer.setInterval(interval_ms)
-        timer.timeout.connect(slot)
-        return timer
 
     def _connect(self) -> None:
         operator, participant = self.operator, self.participant
@@ -130,6 +128,11 @@ class SessionBridge(QObject):
             participant.pointer.connect(self._point)
             participant.buttons.connect(self._press)
 
+    @property
+    def paced(self) -> str:
+        """What the participant's frames follow now, in words."""
+        return self._frames.paced
+
     def present(self, page: Page) -> None:
         """Put a page before the participant; the runner's port."""
         self.participant.show_page(page)
@@ -140,8 +143,8 @@ class SessionBridge(QObject):
     def start(self) -> None:
         """Begin the session."""
         sys.excepthook = self._uncaught
-        for timer in self._timers:
-            timer.start()
+        settle()
+        self._frames.start()
         self._begin()
 
     @_guarded
@@ -183,17 +186,21 @@ class SessionBridge(QObject):
     def _post(self, event: Event) -> None:
         self.runner.post(event)
 
-    @_guarded
     def _frame(self) -> None:
+        """Draw the tank, and with what time is left until the next frame the rest."""
+        self._draw()
+        self._slack.use(self._frames.next_ns)
+
+    @_guarded
+    def _draw(self) -> None:
         """Look at the device, and draw the tank as late as the trial asks."""
         self.runner.poll()
+        view = self.runner.view(self.parts.servo.now_ns())
+        if view is not None:
+            self.participant.show_view(view)
         self.lookout.look()
         now_s = self._now()
-        view = self.runner.view(self.parts.servo.now_ns())
-        if view is None:
-            return
-        self.participant.show_view(view)
-        if self._hand is not None and self._hand.act(now_s, view):
+        if view is not None and self._hand is not None and self._hand.act(now_s, view):
             self._post(Continue(now_s))
 
     @_guarded
@@ -206,6 +213,10 @@ class SessionBridge(QObject):
     @_guarded
     def _traces(self) -> None:
         self.lookout.show_traces(self.operator)
+
+    @_guarded
+    def _forces(self) -> None:
+        self.lookout.show_forces(self.operator)
 
     @_guarded
     def _tiles(self) -> None:
@@ -319,8 +330,8 @@ class SessionBridge(QObject):
         if self._gone:
             return
         self._gone = True
-        for timer in self._timers:
-            timer.stop()
+        self._frames.stop()
+        unsettle()
         sys.excepthook = self._hook_before
         self.participant.may_close = True
         self.participant.close()

@@ -26,6 +26,21 @@ def collect_if_due() -> int | None:
     return oldest
 
 
+def settle() -> None:
+    """Collect everything, and look at what is left no more until `unsettle`: before what must not wait for that.
+
+    A collection of all that a session is made of takes as long as several frames; of what comes later, next to nothing.
+    """
+    gc.unfreeze()
+    gc.collect()
+    gc.freeze()
+
+
+def unsettle() -> None:
+    """Look at everything again when a collection is due."""
+    gc.unfreeze()
+
+
 @contextmanager
 def collecting_here() -> Iterator[None]:
     """Collect in this thread, which runs Qt's event loop, and in no other."""

@@ -16,6 +16,7 @@ from PySide6.QtCore import QObject, Qt, QTimer, Signal
 LEAD_NS: Final = 5_000_000  # so long before a swap a frame is drawn: twice what the tank takes at 1080p
 STALE_REFRESHES: Final = 8  # without a swap for so many refreshes the clock counts alone
 NS_PER_S: Final = 1_000_000_000
+LOCKED, BY_CLOCK = "locked to the screen's swaps", "by the clock"
 
 
 class Frames(QObject):
@@ -50,6 +51,11 @@ class Frames(QObject):
         """Whether frames follow the swaps of a surface now."""
         swapped_ns = self._swapped_ns
         return swapped_ns is not None and self._now_ns() - swapped_ns < STALE_REFRESHES * self.period_ns
+
+    @property
+    def paced(self) -> str:
+        """What frames follow now, in words."""
+        return LOCKED if self.locked else BY_CLOCK
 
     @property
     def next_ns(self) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from study_app.gui.operator.force_plots import ForceCard
 from study_app.gui.operator.forces import Forces
 from study_app.gui.operator.health import ServoHealth
 from study_app.gui.operator.view import OperatorView, operator_view
@@ -39,15 +40,23 @@ class Lookout:
         self.health.hand(self._parts.clock(), self._parts.aim_m())
 
     def show_traces(self, operator: OperatorWindow) -> None:
-        """Draw the hand's place and, where it is seen, the force."""
+        """Draw the hand's place, at once."""
         operator.show_traces(self.health, self._parts.clock())
-        if self.forces is not None:
-            operator.show_forces(self.forces, self._parts.servo.now_ns())
+        operator.position.plot.paint_now()
+
+    def show_forces(self, operator: OperatorWindow) -> None:
+        """Draw the force and the wake where they are seen, at once."""
+        if self.forces is None or not isinstance(operator.force, ForceCard):
+            return
+        operator.show_forces(self.forces, self._parts.servo.now_ns())
+        for plot in (operator.force.plot, operator.force.wake):
+            plot.paint_now()
 
     def show_lateness(self, operator: OperatorWindow) -> None:
-        """Draw how late ticks were."""
+        """Draw how late ticks were, at once."""
         self.health.overruns = self._parts.servo.overruns
         operator.show_lateness(self.health)
+        operator.lateness.plot.paint_now()
 
     def view(self, trouble: str, stalled: str | None) -> OperatorView:
         """Return what the operator is to see now; ``stalled`` is why the disk takes nothing, None while it does."""

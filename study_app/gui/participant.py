@@ -186,6 +186,8 @@ class ParticipantWindow(QWidget):
             made.focus_first()
         old.hide()  # only now, or Qt would lead the keyboard somewhere itself
         old.deleteLater()
+        if isinstance(made, TankWidget):
+            made.repaint()  # whole, lest its first view wait for that
         self._ahead.start()
 
     def show_view(self, view: TankView) -> None:

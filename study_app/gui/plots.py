@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
-from PySide6.QtCore import QEvent, QPointF, QSize, Qt
+from PySide6.QtCore import QCoreApplication, QEvent, QPointF, QSize, Qt
 from PySide6.QtGui import QColor, QPen
 from PySide6.QtWidgets import QFrame
 
@@ -96,6 +96,10 @@ class Plot(Themed, pg.GraphicsView):
         if event.type() == QEvent.Type.DevicePixelRatioChange:
             self.wear(self.theme)
         return bool(super().event(event))
+
+    def paint_now(self) -> None:
+        """Paint what was changed at once, and not when Qt finds the time."""
+        QCoreApplication.sendPostedEvents(self.scene(), QEvent.Type.MetaCall.value)
 
     def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
         """Return a small size: a plot takes what is left, and never makes a window scroll."""

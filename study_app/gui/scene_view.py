@@ -63,10 +63,11 @@ def paint_ahead(page: TaskPage, words: Words, text_scale: float, size: QSize, ra
 
 
 class TankWidget(QWidget):
-    """Draws a task page and, on it, the views that it is shown.
+    """Draws a task page and, on it, the views that it is shown, at once.
 
-    ``painted(sample_ns)`` comes once for every view with the time of what was drawn: from inside the painting, or with
-    ``on_card``, on a surface of the graphics card, when that swapped. ``swapped`` comes with each swap.
+    ``painted(sample_ns)`` comes once for every view with the time of what was drawn: when it was painted and handed to
+    the window's system, or with ``on_card``, on a surface of the graphics card, when that swapped. ``swapped`` comes
+    with each swap.
     """
 
     painted = Signal(object)
@@ -91,6 +92,7 @@ class TankWidget(QWidget):
         self._patch = OnsetPatch()
         self._view: TankView | None = None
         self._unpainted = False
+        self._showing = False
         self._drawn_ns: int | None = None
         self._things: dict[str, Placed] = {}
         self._ball: BallPlace | None = None
@@ -126,11 +128,12 @@ class TankWidget(QWidget):
         self._patch.follow((x, y, z), view.sample_time_ns)
         self._ready()
         things = self._frame()
+        changed = changes(self._things, things) + ALWAYS
+        self._things = things
         if self._pane is None:
-            self.update(changes(self._things, things) + ALWAYS)
+            self._repaint(changed)
         else:
             self._pane.update()
-        self._things = things
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
         """Find the tank's place anew."""
@@ -146,6 +149,14 @@ class TankWidget(QWidget):
         painter = page_painter(self)
         self._paint(painter, event.region())
         painter.end()
+        if not self._showing:
+            self._tell()
+
+    def _repaint(self, region: QRegion) -> None:
+        """Paint the view at once, for whatever waits to be done would make it older; tell when it is handed over."""
+        self._drawn_ns, self._showing = None, True
+        self.repaint(region)
+        self._showing = False
         self._tell()
 
     def _made_pane(self) -> QWidget:

@@ -6,7 +6,7 @@ from typing import Any
 
 from PySide6.QtCore import QObject
 
-from study_app.gui.collector import collect_if_due, collecting_here
+from study_app.gui.collector import collect_if_due, collecting_here, settle, unsettle
 
 
 class Cycle:
@@ -64,3 +64,23 @@ def test_nothing_is_collected_before_it_is_due() -> None:
         assert len(kept) == 5_000
     finally:
         gc.enable()
+
+
+def test_what_has_settled_is_looked_at_no_more_until_it_is_again() -> None:
+    freed_in: list[int] = []
+    Cycle(freed_in)
+    settle()
+    try:
+        assert freed_in, "what nobody holds goes first"
+        held = Cycle(freed_in)
+        settle()
+        del held
+        gc.collect()
+        assert len(freed_in) == 1
+        Cycle(freed_in)
+        gc.collect()
+        assert len(freed_in) == 2, "what came since is looked at"
+    finally:
+        unsettle()
+    gc.collect()
+    assert len(freed_in) == 3

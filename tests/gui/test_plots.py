@@ -9,7 +9,7 @@ import pytest
 from PySide6.QtCore import QRectF
 from PySide6.QtWidgets import QApplication
 
-from study_app.gui.plots import LatenessPlot
+from study_app.gui.plots import LatenessPlot, TracePlot
 
 LIMIT_US = 2000.0
 
@@ -40,3 +40,23 @@ def test_the_names_of_limit_and_p99_do_not_touch(
     inside = plot.box.mapRectToScene(plot.box.boundingRect()).adjusted(0, -1, 0, 1)
     assert inside.top() <= limit.top() < limit.bottom() <= p99.top() + 1
     assert p99.bottom() <= inside.bottom()
+
+
+def test_what_was_changed_is_painted_at_once_and_not_again_later(qtbot: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    plot = TracePlot(10.0, 50.0)
+    qtbot.addWidget(plot)
+    plot.resize(420, 200)
+    plot.show()
+    qtbot.waitExposed(plot)
+    QApplication.processEvents()
+    painted: list[int] = []
+    paint = TracePlot.paintEvent
+    monkeypatch.setattr(TracePlot, "paintEvent", lambda self, event: (painted.append(1), paint(self, event))[1])
+    times_s = np.linspace(-10, 0, 100)
+    for turn in range(5):
+        plot.show_traces(times_s, np.column_stack([np.sin(times_s + turn)] * 3))
+        assert len(painted) == turn
+        plot.paint_now()
+        assert len(painted) == turn + 1
+        QApplication.processEvents()
+    assert len(painted) == 5

@@ -227,6 +227,30 @@ def test_painted_comes_once_a_view_with_the_time_of_what_was_drawn(tank: TankWid
     assert told == [5_123_456_789_012]
 
 
+def test_a_view_is_painted_before_anything_else_is_done(tank: TankWidget, qtbot: Any) -> None:
+    qtbot.waitExposed(tank)
+    told: list[int] = []
+    tank.painted.connect(told.append)
+    for sample_ns in range(1, 6):
+        tank.show_view(view((0.004 * sample_ns, 0.0, 0.0), sample_ns=sample_ns))
+        assert told[-1] == sample_ns, "without a turn of the event loop"
+    QApplication.processEvents()
+    assert told == [1, 2, 3, 4, 5]
+
+
+def test_a_view_that_nobody_can_see_is_told_of_when_it_is_seen(tank: TankWidget, qtbot: Any) -> None:
+    told: list[int] = []
+    tank.painted.connect(told.append)
+    tank.show_view(view(sample_ns=1))
+    tank.hide()
+    tank.show_view(view(sample_ns=2))
+    tank.show_view(view(sample_ns=3))
+    assert told == [1]
+    with qtbot.waitSignal(tank.painted, timeout=1000):
+        tank.show()
+    assert told == [1, 3]
+
+
 def test_exploration_may_be_left_after_its_least_time(qtbot: Any) -> None:
     widget = TankWidget(task_page(explore()), words("en"))
     qtbot.addWidget(widget)

@@ -64,8 +64,7 @@ def make(qapp, world):
         bridge = SessionBridge(made, participant, operator)
         made_bridges.append(bridge)
         bridge.start()
-        for timer in bridge._timers:
-            timer.stop()  # a test moves time itself
+        bridge._frames.stop()  # a test moves time itself
         return bridge
 
     made_bridges = []
