@@ -14,8 +14,10 @@ from PySide6.QtWidgets import QBoxLayout, QGridLayout, QHBoxLayout, QLabel, QVBo
 
 from study_app.gui.controls import ActionButton
 from study_app.gui.fields import NumberField, write_number
+from study_app.gui.frames import Frames
 from study_app.gui.labels import figures, label
-from study_app.gui.settings.frames import LEAST_S, Frames, FrameTimes
+from study_app.gui.settings.frame_times import LEAST_S, FrameFigures, FrameTimes
+from study_app.gui.settings.measure import LEAST_WORDS
 from study_app.gui.settings.offset import OffsetForm
 from study_app.gui.settings.patterns import GreyRamp, LineField
 from study_app.gui.tank.patch import paint_patch, patch_place
@@ -26,7 +28,7 @@ from study_app.store.machine import DisplayOffset
 TOLD_MS = 500
 INTERVAL_MS = (50.0, 5000.0)
 FIRST_MS = 500.0
-NAMES = ("Frames painted", "Median gap", "Longest of 99 %", "Missed in 10 s")
+NAMES = ("Frames painted", "Median gap", "99 % of gaps within", "Missed in 10 s")
 LEAST = QSize(960, 600)
 
 
@@ -80,10 +82,8 @@ class DisplayTest(QWidget):
         self._lay_out(screen_words)
         self._connect()
         wear(self, PARTICIPANT)
-        self.frames = QTimer(self)
-        self.frames.setTimerType(Qt.TimerType.PreciseTimer)
-        self.frames.setInterval(max(4, round(1000 / self.times.refresh_hz)))
-        self.frames.timeout.connect(self.frame)
+        self.frames = Frames(self.times.refresh_hz, now_ns=now_ns, parent=self)
+        self.frames.due.connect(self.frame)
         self.told = QTimer(self)
         self.told.setInterval(TOLD_MS)
         self.told.timeout.connect(self.tell)
@@ -102,9 +102,8 @@ class DisplayTest(QWidget):
         column.setSpacing(18)
         column.addLayout(head)
         column.addLayout(self._figures())
-        column.addWidget(GreyRamp())
-        column.addLayout(self._fields())
-        column.addStretch()
+        column.addWidget(GreyRamp(), 2)
+        column.addLayout(self._fields(), 3)
         column.addLayout(self._foot())
 
     def _figures(self) -> QGridLayout:
@@ -125,7 +124,7 @@ class DisplayTest(QWidget):
         row.setSpacing(16)
         for thick in (1, 2):
             for standing in (True, False):
-                row.addWidget(LineField(thick, standing=standing))
+                row.addWidget(LineField(thick, standing=standing), 2)
         words = label(
             "Every line is 1 or 2 pixels of the screen. Where a field looks grey all over, shimmers or shows broad "
             "bands, the system scales the picture: set the screen to its own resolution. All seventeen greys above "
@@ -134,14 +133,16 @@ class DisplayTest(QWidget):
             "text2",
             wraps=True,
         )
-        row.addWidget(words, 1)
+        words.setMinimumWidth(LEAST_WORDS)
+        row.addWidget(words, 3)
         return row
 
     def _foot(self) -> QBoxLayout:
         """Return the patch's interval and the offset, left of where the patch is."""
         toggling = QVBoxLayout()
         toggling.setSpacing(6)
-        toggling.addWidget(label("The patch toggles every, ms", "label", "text2"))
+        toggling.addWidget(label("Photodiode's patch", "card"))
+        toggling.addWidget(label("Toggles every, ms", "label", "text2"))
         toggling.addWidget(self.interval)
         self.why = label("", "label", "bad", wraps=True)
         toggling.addWidget(self.why)
@@ -150,6 +151,7 @@ class DisplayTest(QWidget):
         measured.setSpacing(6)
         measured.addWidget(label("Display offset", "card"))
         measured.addWidget(self.offset)
+        measured.addStretch()
         row = QHBoxLayout()
         row.setContentsMargins(0, 0, 120, 0)  # the patch's corner is nobody else's
         row.setSpacing(48)
@@ -238,7 +240,7 @@ class DisplayTest(QWidget):
         self.left.emit()
 
 
-def figures_words(found: Frames | None, refresh_hz: float) -> tuple[str, str, str, str]:
+def figures_words(found: FrameFigures | None, refresh_hz: float) -> tuple[str, str, str, str]:
     """Return the figures as they are shown; dashes until there are enough frames."""
     if found is None:
         return "–", "–", "–", "–"

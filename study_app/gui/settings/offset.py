@@ -116,7 +116,7 @@ class OffsetForm(QWidget):
 def offset_words(offset: DisplayOffset | None, screen: str) -> str:
     """Return what is known of a screen's offset, in a sentence."""
     if offset is None:
-        return "Not measured. A light on the screen comes later than it is painted; the receipt then says so."
+        return "Not measured. What is painted lights up a little later; receipts say that nobody knows by how much."
     told = f"{write_number(offset.mean_ms, DECIMALS)} ± {write_number(offset.spread_ms, DECIMALS)} ms"
     when = f", {offset.measured}" if offset.measured else ""
     where = "" if offset.screen == screen else f" of another screen ({offset.screen}): it does not count here"

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 from PySide6.QtCore import QRect, QRectF, Qt
 from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from study_app.gui.theme import PARTICIPANT, font
 
@@ -20,8 +20,8 @@ class GreyRamp(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self.setFixedHeight(96)
-        self.setMinimumWidth(17 * 24)
+        self.setMinimumSize(17 * 24, 80)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setAccessibleName("Seventeen greys from black to white")
 
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
@@ -42,7 +42,8 @@ class LineField(QWidget):
     def __init__(self, thick: int, *, standing: bool) -> None:
         super().__init__()
         self.thick, self.standing = thick, standing
-        self.setFixedSize(FIELD, FIELD - 24)
+        self.setMinimumSize(FIELD, FIELD - 40)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         way = "standing" if standing else "lying"
         self.setAccessibleName(f"Lines of {thick} pixels, {way}")
 

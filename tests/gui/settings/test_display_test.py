@@ -92,7 +92,7 @@ def test_frames_are_asked_for_while_it_is_shown_and_no_longer(qtbot):
     qtbot.waitUntil(lambda: made.times.figures() is not None)
     with qtbot.waitSignal(made.left):
         qtbot.keyClick(made, Qt.Key.Key_Escape)
-    assert not made.frames.isActive()
+    assert not made.frames._timer.isActive()
     assert not made.told.isActive()
 
 

@@ -13,7 +13,7 @@ LATE: Final = 1.5  # so many refreshes of the screen apart, at least one was mis
 
 
 @dataclass(frozen=True, slots=True)
-class Frames:
+class FrameFigures:
     """Frames of the last ten seconds: ``rate_hz`` and ``p99_ms`` of the gaps between them, and how many were missed."""
 
     rate_hz: float
@@ -45,7 +45,7 @@ class FrameTimes:
         while time_ns - self._times[0] > 1e9 * KEPT_S:
             self._times.popleft()
 
-    def figures(self) -> Frames | None:
+    def figures(self) -> FrameFigures | None:
         """Return what the frames come to; None until there are enough."""
         times = list(self._times)
         if len(times) < 3 or times[-1] - times[0] < self._least_ns:
@@ -53,7 +53,7 @@ class FrameTimes:
         gaps_ms = sorted((late - early) / 1e6 for early, late in pairwise(times))
         refresh_ms = 1000 / self.refresh_hz
         median_ms = gaps_ms[len(gaps_ms) // 2]
-        return Frames(
+        return FrameFigures(
             rate_hz=1e9 * (len(times) - 1) / (times[-1] - times[0]),
             median_ms=median_ms,
             p99_ms=gaps_ms[min(len(gaps_ms) - 1, int(0.99 * len(gaps_ms)))],

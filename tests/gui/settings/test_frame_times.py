@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from study_app.gui.settings.frames import KEPT_S, LEAST_S, FrameTimes
+from study_app.gui.settings.frame_times import KEPT_S, LEAST_S, FrameTimes
 
 REFRESH_NS = 16_666_667
 
