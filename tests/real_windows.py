@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import QPoint
+from PySide6.QtCore import QPoint, QSize
 
 NEEDED = ("Xvfb", "xdotool")
 MISSING = [tool for tool in NEEDED if shutil.which(tool) is None]
@@ -73,11 +73,28 @@ class Program:
         wait_for(number, f"the window {title!r}")
         return number().splitlines()[-1]
 
+    def window_of(self, title: str, size: QSize) -> str:
+        """Wait for a window of this title and size; return its number."""
+        found: list[str] = []
+
+        def look() -> list[str]:
+            assert self.process.poll() is None, self.process.stderr.read()  # type: ignore[union-attr]
+            found[:] = [one for one in self.windows(title) if QSize(*self.size(one)) == size]
+            return found
+
+        wait_for(look, f"the window {title!r}", 90.0)
+        return found[-1]
+
+    def windows(self, title: str) -> list[str]:
+        """Return the windows of this title that are seen."""
+        return self.xdotool("search", "--onlyvisible", "--name", title).split()
+
     def size(self, window: str) -> tuple[int, int]:
+        """Return width and height, 0 of a window that has just gone."""
         geometry = dict(
             line.split("=") for line in self.xdotool("getwindowgeometry", "--shell", window).splitlines() if "=" in line
         )
-        return int(geometry["WIDTH"]), int(geometry["HEIGHT"])
+        return int(geometry.get("WIDTH", 0)), int(geometry.get("HEIGHT", 0))
 
     def click(self, window: str, place: QPoint) -> None:
         self.xdotool("mousemove", "--window", window, str(place.x()), str(place.y()), "click", "1")

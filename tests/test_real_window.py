@@ -19,6 +19,7 @@ from study_app.app.visit import Visit
 from study_app.gui.home.cards import StudyCard
 from study_app.gui.pages.questionnaire import QuestionnaireWidget
 from study_app.gui.participant import ParticipantWindow
+from study_app.gui.preflight.window import FULL as PREFLIGHT
 from study_app.protocol.files import source_bytes
 from study_app.protocol.words import words
 from tests.compiled import needs_servo
@@ -85,6 +86,7 @@ def begin_session(program: Program, qtbot) -> None:
     program.key(dialog, "ctrl+a")
     program.xdotool("type", "P042")
     program.key(dialog, "Return")
+    program.key(program.window_of("^Liquid Study$", PREFLIGHT), "Return")
     program.wait_for_event("page_shown")
 
 
@@ -128,6 +130,8 @@ def answer_nine_items(program: Program, felt: str, qtbot) -> None:
             program.wait_for_event("choice", number + 1)
     assert not program.events("responses")
     program.key(felt, "Return")
+    plan.may_close = True
+    plan.close()
 
 
 def responses(folder: Path) -> list[dict[str, str]]:

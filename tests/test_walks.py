@@ -63,13 +63,11 @@ def plan(program: Visitor, qtbot: Any) -> Visit:
 
 
 def home_window(program: Visitor) -> str:
-    size = (HOME.width(), HOME.height())
-    return program.window_of("^Liquid Study$", size, size)
+    return program.window_of("^Liquid Study$", HOME)
 
 
 def preflight_window(program: Visitor) -> str:
-    size = (PREFLIGHT.width(), PREFLIGHT.height())
-    return program.window_of("^Liquid Study$", size, size)
+    return program.window_of("^Liquid Study$", PREFLIGHT)
 
 
 def thesis(plan: Visit) -> StudyCard:

@@ -74,29 +74,6 @@ class Visitor(Program):
         self.orders |= set(arguments)
         return super().xdotool(*arguments)
 
-    def window_of(self, title: str, least: tuple[int, int], most: tuple[int, int] = (9999, 9999)) -> str:
-        """Wait for a window of this title that is neither smaller nor larger than that; return its number."""
-        found: list[str] = []
-
-        def look() -> list[str]:
-            assert self.process.poll() is None, self.process.stderr.read()  # type: ignore[union-attr]
-            found[:] = [one for one in self.windows(title) if self._fits(one, least, most)]
-            return found
-
-        wait_for(look, f"the window {title!r}", 90.0)
-        return found[-1]
-
-    def _fits(self, window: str, least: tuple[int, int], most: tuple[int, int]) -> bool:
-        geometry = self.xdotool("getwindowgeometry", "--shell", window)
-        if "WIDTH" not in geometry:  # it has just gone
-            return False
-        width, height = self.size(window)
-        return least[0] <= width <= most[0] and least[1] <= height <= most[1]
-
-    def windows(self, title: str) -> list[str]:
-        """Return the windows of this title that are seen."""
-        return self.xdotool("search", "--onlyvisible", "--name", title).split()
-
     def close_by_frame(self, window: str) -> None:
         """Ask a window to close, as the cross in its frame does; there is no frame on a bare display."""
         _send_delete(self.display, int(window))
