@@ -138,10 +138,10 @@ def serve(questions: Iterable[str], answers: TextIO) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the program; this ends when nobody asks any more
     if hasattr(os, "nice"):
         os.nice(NICEST)
+    waiting: SimpleQueue[str | None] = SimpleQueue()
+    threading.Thread(target=_queue, args=(questions, waiting), daemon=True).start()  # a full pipe would stop who asks
     from study_app.evaluation.appraise import costs, errors  # noqa: PLC0415 - the compiler: only in this process
 
-    waiting: SimpleQueue[str | None] = SimpleQueue()
-    threading.Thread(target=_queue, args=(questions, waiting), daemon=True).start()
     while (question := _newest(waiting)) is not None:
         asked = json.loads(question)
         scene = Scene.model_validate_json(json.dumps(asked["scene"]))
