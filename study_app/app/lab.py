@@ -10,25 +10,24 @@ import logging
 import math
 import random
 import sys
-import threading
+import traceback
 from collections.abc import Callable
 from functools import wraps
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Concatenate, Final, ParamSpec
 
-from PySide6.QtCore import QObject, Qt, QTimer, Signal
+from PySide6.QtCore import QObject, Qt, QTimer
 
 from study_app.app.lab_opening import LabOpening
 from study_app.app.lab_prices import AsksPrice, Prices
-from study_app.app.lab_rows import cost_rows, error_rows
-from study_app.devices import list_devices
+from study_app.app.lab_rows import cost_rows, device_choices, error_rows, title_of
+from study_app.app.lab_saving import LabSaving
 from study_app.errors import StudyError
 from study_app.evaluation.appraiser import Appraiser
 from study_app.gui.lab.place import LabPlace
 from study_app.gui.lab.view import DeviceShown, LabView, Now
-from study_app.gui.new_session import DEVICE_WORDS
-from study_app.lab.presets import Choice, liquids_at_hand, preset_text, save, spoken
+from study_app.lab.presets import Choice, liquids_at_hand, spoken
 from study_app.lab.programmes import TITLES
 from study_app.lab.workbench import Chance, Setting, Side, Workbench
 
@@ -75,8 +74,6 @@ class LabVisit(QObject):
     chance : what a blinding is drawn from
     """
 
-    _saved = Signal(object)
-
     def __init__(
         self,
         place: LabPlace,
@@ -98,6 +95,7 @@ class LabVisit(QObject):
         self._entered = False
         self._prices = Prices(make_appraiser)
         self._opening = LabOpening(open_live, firmware)
+        self._saving = LabSaving()
         self._chance = chance if chance is not None else random.SystemRandom()
         self._said = ""
         self._hook_before = sys.excepthook
@@ -115,7 +113,7 @@ class LabVisit(QObject):
         return timer
 
     def _connect(self) -> None:
-        place, opening = self.place, self._opening
+        place, opening, saving = self.place, self._opening, self._saving
         for signal, slot in (
             (place.entered, self._enter),
             (place.left, self.leave),
@@ -137,9 +135,10 @@ class LabVisit(QObject):
             (opening.opened, self._begin),
             (opening.failed, self._could_not_open),
             (opening.said, self._say),
+            (saving.saved, self._offer),
+            (saving.failed, self._could_not_save),
         ):
             signal.connect(slot)
-        self._saved.connect(self._hear_of_saving, Qt.ConnectionType.QueuedConnection)
 
     def leave(self) -> None:
         """Let go of the hand: zero force, the servo's end, the device; then of everything else."""
@@ -156,16 +155,22 @@ class LabVisit(QObject):
             sys.excepthook = self._hook_before
 
     def end(self) -> None:
-        """Leave, and wait for a device that is still being opened, so that it is let go of, too."""
+        """Leave, and wait for a preset that is being written, and for a device, so that it is let go of, too."""
         self.leave()
         self._opening.wait()
+        self._saving.wait()
 
     def fail(self, error: BaseException) -> None:
-        """Zero force, then say what failed; the force can be faded in again, through a device opened anew."""
+        """Zero force, then say what failed; the force can be faded in again, through a device opened anew.
+
+        A painter is at work for as long as something holds it, as a traceback does: Qt would paint nothing any more.
+        """
+        self._opening.cancel()
         try:
             self._let_go()
         except StudyError as second:
             log.warning("the servo did not end as it should: %s", second)
+        traceback.clear_frames(error.__traceback__)
         known = isinstance(error, StudyError)
         before, self.trouble = (
             self.trouble,
@@ -190,7 +195,7 @@ class LabVisit(QObject):
         return LabView(
             workbench=bench,
             liquids=self.liquids,
-            device=DeviceShown(_devices(), self.device, self._state(fault), live is not None and not fault),
+            device=DeviceShown(device_choices(), self.device, self._state(fault), live is not None and not fault),
             paths=tuple(TITLES.items()),
             path=None if live is None else live.path,
             trace=None if live is None else live.trace(),
@@ -203,7 +208,7 @@ class LabVisit(QObject):
             errors=() if price.errors is None else error_rows(price.errors),
             measuring=price.waits or self._price_due.isActive(),
             force_on=reading is not None and reading.force_on,
-            busy="" if busy is None else self._said or f"Opening {_words(busy)}",
+            busy="" if busy is None else self._said or f"Opening {title_of(busy)}",
             trouble=self.trouble or fault,
             refused=self._refused,
             **shown,
@@ -285,7 +290,9 @@ class LabVisit(QObject):
 
     @_guarded
     def _switch(self) -> None:
+        """Feel the other setting; a knob that is held is let go of at once, for it was the other one's."""
         self._feel(self.bench.switch())
+        self._show()
 
     @_guarded
     def _blind(self, asked: bool) -> None:
@@ -304,7 +311,9 @@ class LabVisit(QObject):
 
     def _feel(self, bench: Workbench, *, anew: bool = False) -> None:
         """Let a workbench be felt at once, and be appraised once it has rested for a while."""
-        before, self.bench, self._refused, self.trouble = self.bench, bench, None, ""
+        before, self.bench, self._refused = self.bench, bench, None
+        if self.live is not None:  # else it says why there is none
+            self.trouble = ""
         if bench.in_hand.scene != before.in_hand.scene:
             self._prices.forget()
             self._price_due.start()
@@ -325,8 +334,11 @@ class LabVisit(QObject):
 
     @_guarded
     def _stop_force(self) -> None:
+        """Send zero force; a device that is being opened, which would bring its own, is given up."""
         if self.live is not None:
             self.live.stop_force()
+        elif self._opening.busy_with is not None:
+            self._cancel()
 
     @_guarded
     def _fade_in(self) -> None:
@@ -347,31 +359,23 @@ class LabVisit(QObject):
             self.live.press(buttons)
 
     @_guarded
-    def _save(self, path: Path) -> None:
-        """Write the felt setting as a preset, beside the windows: a disk may take its time."""
+    def _save(self, path: Path, setting: Setting) -> None:
+        """Write a setting as a preset."""
         if self.bench.blind:
             self.trouble = "while the comparison is blind no preset can be saved: end the blinding first"
             return
-        at_hand = tuple(it.source for it in self.liquids)
-        words = (path, self.bench.in_hand, at_hand)
-        threading.Thread(target=self._write, args=words, name="preset", daemon=True).start()
-
-    def _write(self, path: Path, setting: Setting, at_hand: tuple[str, ...]) -> None:
-        """Write a preset, and look which liquids there are then: in a thread of its own."""
-        try:
-            save(path, preset_text(setting))
-            found: object = liquids_at_hand(saved=(*at_hand, str(path)))
-        except StudyError as error:
-            found = error
-        self._saved.emit(found)
+        self._saving.save(path, setting, tuple(it.source for it in self.liquids))
 
     @_guarded
-    def _hear_of_saving(self, found: tuple[Choice, ...] | StudyError) -> None:
-        """Offer the new preset as a liquid, or say why it could not be written; the force goes on."""
-        if isinstance(found, StudyError):
-            self.trouble = str(found)
-        else:
-            self.liquids = found
+    def _offer(self, liquids: tuple[Choice, ...]) -> None:
+        self.liquids = liquids
+
+    @_guarded
+    def _could_not_save(self, error: Exception) -> None:
+        """Say why a preset could not be written; the force goes on, unless it is a mistake in here."""
+        if not isinstance(error, StudyError):
+            raise error
+        self.trouble = str(error)
 
     def _let_go(self) -> None:
         """End with the device in the order of safety."""
@@ -388,11 +392,3 @@ class LabVisit(QObject):
         """Hear of exceptions that Qt met outside our slots, such as in painting."""
         self.fail(error)
         self._hook_before(kind, error, trace)
-
-
-def _devices() -> tuple[tuple[str, str], ...]:
-    return tuple((name, _words(name)) for name in list_devices())
-
-
-def _words(name: str) -> str:
-    return DEVICE_WORDS.get(name, name)

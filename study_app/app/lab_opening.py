@@ -95,6 +95,9 @@ class LabOpening(QObject):
             (self.failed if isinstance(made, Exception) else self.opened).emit(made)
             return
         if not isinstance(made, Exception):
-            made.close()  # type: ignore[attr-defined]
+            try:
+                made.close()  # type: ignore[attr-defined]
+            except Exception as error:  # noqa: BLE001 - told: it may push, and the next one waits for nobody
+                self.failed.emit(error)
         if self._wanted is not None:
             self._begin()

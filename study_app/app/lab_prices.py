@@ -61,6 +61,8 @@ class Prices:
                 self.errors, self.waits = answer, False
             else:
                 self.waits = False
+        if self._appraiser is not None and not self._appraiser.works:
+            self.waits = False
 
     def close(self) -> None:
         """End the process."""

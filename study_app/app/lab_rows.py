@@ -1,9 +1,12 @@
-"""What a setting costs and how true it is, as the lab's cards say it."""
+"""What a setting costs, how true it is, and what there is to feel it with, as the lab says it."""
 
 from __future__ import annotations
 
+from study_app.devices import list_devices
 from study_app.evaluation.appraiser import Costs, Errors
+from study_app.gui.devices.view import TITLES
 from study_app.gui.lab.view import CostRow, ErrorRow
+from study_app.gui.new_session import DEVICE_WORDS
 from study_app.lab.parameters import EFFECT_WORDS
 
 SMALLEST_N = 0.001
@@ -26,6 +29,16 @@ def error_rows(errors: Errors) -> tuple[ErrorRow, ...]:
         ErrorRow("Force, largest", "no drag" if errors.force_n is None else _newtons(errors.force_n), note),
         ErrorRow("Lag of the velocity filter", f"{1e3 * errors.lag_s:.1f} ms", "while the speed grows evenly"),
     )
+
+
+def device_choices() -> tuple[tuple[str, str], ...]:
+    """Return every device's name, and the words to choose it by."""
+    return tuple((name, DEVICE_WORDS.get(name, name)) for name in list_devices())
+
+
+def title_of(device: str) -> str:
+    """Return what a device is called."""
+    return TITLES.get(device, device)
 
 
 def _tiny(share: float) -> str:

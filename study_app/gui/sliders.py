@@ -108,6 +108,11 @@ class Slider(Themed, QSlider):
         self._tell()
         self.update()
 
+    def let_go(self) -> None:
+        """Let the knob go without a word, whatever the mouse holds on to."""
+        self._dragged = False
+        self.update()
+
     def step(self, steps: int) -> None:
         """Go some steps to the right, or to the left where ``steps`` is negative."""
         self._move(self._stepped(steps), held=False)

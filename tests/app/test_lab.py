@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import threading
+import weakref
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -11,15 +12,15 @@ from typing import Any
 import numpy as np
 import pytest
 from PySide6.QtCore import QEvent
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QMainWindow
 
 from study_app.app.lab import LabVisit, compose_lab
 from study_app.app.lab_opening import LabOpening
-from study_app.errors import DeviceNotFound
+from study_app.errors import DeviceNotFound, ServoFault
 from study_app.evaluation.appraiser import Costs, EffectCost, Errors, Told
 from study_app.gui.lab.place import LabPlace
 from study_app.haptics.scene import Scene
-from study_app.lab.presets import Choice
+from study_app.lab.presets import Choice, save
 from study_app.protocol.load import load_scene
 from tests.compiled import needs_servo
 
@@ -211,6 +212,31 @@ def test_an_exception_in_painting_ends_in_zero_force(felt: LabVisit, caplog: Any
     felt._hook_before = sys.__excepthook__
 
 
+def test_a_painter_that_an_exception_leaves_at_work_is_ended(felt: LabVisit, qtbot: Any, caplog: Any) -> None:
+    """Else Qt paints no window any more: what failed could not even be read."""
+    window = QMainWindow()  # Qt paints it without a detour through Python, as it does the operator's
+    window.setCentralWidget(felt.place)
+    window.show()
+    qtbot.waitUntil(lambda: felt.live is not None, timeout=OPENS_MS)
+    live, left, told = felt.live, [], []
+    felt._hook_before = lambda kind, error, trace: told.append((kind, error, trace))
+
+    def broken(painter: Any, _places: Any) -> None:
+        left.append(weakref.ref(painter))
+        raise RuntimeError("in a paint event")
+
+    felt.place.tank._paint_words = broken  # type: ignore[method-assign]
+    qtbot.waitUntil(lambda: bool(told), timeout=SOON_MS)
+    del felt.place.tank._paint_words
+    assert is_let_go(live)
+    assert told[0][0] is RuntimeError
+    assert [painter() for painter in left] == [None] * len(left)
+    caplog.clear()
+    felt._hook_before = sys.__excepthook__
+    felt.place.setParent(None)
+    window.close()
+
+
 def test_a_lost_device_is_told_and_can_be_opened_again(felt: LabVisit, qtbot: Any) -> None:
     live = felt.live
     assert live is not None
@@ -239,7 +265,7 @@ def test_while_blind_nothing_tells_one_from_the_other(felt: LabVisit, qtbot: Any
     assert view.felt == "A"
     assert view.body_radius_m == pytest.approx(0.0034)
     felt.place.switched.emit()
-    felt.place.save_asked.emit(tmp_path / "told.toml")
+    felt.place.save_asked.emit(tmp_path / "told.toml", felt.bench.a)
     assert "blind" in felt.view().trouble
     assert not list(tmp_path.iterdir())
     felt.place.blind_asked.emit(False)
@@ -251,12 +277,38 @@ def test_a_setting_is_saved_as_a_preset_that_is_at_hand_from_then_on(
 ) -> None:
     felt.place.changed.emit("liquid.density_kg_m3", 1234.5, False)
     path = tmp_path / "mine.toml"
-    felt.place.save_asked.emit(path)
+    asked = felt.bench.in_hand
+    felt.place.switched.emit()
+    felt.place.save_asked.emit(path, asked)
     qtbot.waitUntil(lambda: any(it.source == str(path) for it in felt.liquids), timeout=SOON_MS)
     assert load_scene(path, "honey") == felt.bench.a.scene
-    felt.place.save_asked.emit(tmp_path / "nowhere" / "mine.toml")
+    felt.place.save_asked.emit(tmp_path / "nowhere" / "mine.toml", asked)
     qtbot.waitUntil(lambda: "cannot be written" in felt.view().trouble, timeout=SOON_MS)
     assert felt.live is not None
+
+
+def test_a_preset_is_on_the_disk_before_the_program_ends(visit: LabVisit, monkeypatch: Any, tmp_path: Path) -> None:
+    ended = threading.Event()
+
+    def slowly(path: Path, text: str) -> None:
+        ended.wait(30.0)
+        save(path, text)
+
+    monkeypatch.setattr("study_app.app.lab_saving.save", slowly)
+    for name in ("one.toml", "two.toml"):
+        visit.place.save_asked.emit(tmp_path / name, visit.bench.a)
+    assert not list(tmp_path.iterdir())
+    threading.Timer(0.05, ended.set).start()
+    visit.end()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["one.toml", "two.toml"]
+    assert str(tmp_path / "two.toml") in [it.source for it in visit.liquids]
+
+
+def test_an_appraiser_that_died_is_not_waited_for(felt: LabVisit, prices: Prices, qtbot: Any) -> None:
+    qtbot.waitUntil(lambda: bool(prices.asked), timeout=SOON_MS)
+    assert felt.view().measuring
+    prices.works = False
+    qtbot.waitUntil(lambda: not felt.view().measuring, timeout=SOON_MS)
 
 
 def test_prices_are_asked_for_once_the_hand_rests_and_old_answers_do_not_count(
@@ -355,6 +407,53 @@ def test_leaving_while_a_device_is_being_opened_lets_go_of_it(visit: LabVisit, q
     visit.end()
     assert (devices.open, devices.closed) == (0, 1)
     assert visit.live is None
+
+
+def test_a_force_that_was_stopped_does_not_come_with_a_device_that_is_being_opened(visit: LabVisit, qtbot: Any) -> None:
+    devices = SlowDevices()
+    visit._opening._open_live = devices
+    visit.place.show()
+    qtbot.waitUntil(lambda: devices.asked == ["scripted"], timeout=SOON_MS)
+    visit.place.stop_asked.emit()
+    devices.gate.set()
+    qtbot.waitUntil(lambda: devices.closed == 1, timeout=SOON_MS)
+    assert visit.live is None
+    view = visit.view()
+    assert (view.busy, view.trouble, view.may_fade_in) == ("", "No device is open", True)
+    visit.place.changed.emit("liquid.density_kg_m3", 900.0, False)
+    assert visit.view().trouble == "No device is open"  # an edit opens none
+
+
+def test_a_failure_gives_up_the_device_that_is_being_opened(visit: LabVisit, qtbot: Any, caplog: Any) -> None:
+    devices = SlowDevices()
+    visit._opening._open_live = devices
+    visit.place.show()
+    qtbot.waitUntil(lambda: devices.asked == ["scripted"], timeout=SOON_MS)
+    visit.fail(RuntimeError("out of ideas"))
+    caplog.clear()
+    devices.gate.set()
+    qtbot.waitUntil(lambda: devices.closed == 1, timeout=SOON_MS)
+    assert visit.live is None
+    assert "the force is off" in visit.view().trouble
+
+
+def test_a_device_that_cannot_be_closed_is_told_of_and_holds_nobody_up(qtbot: Any) -> None:
+    class Stuck(SlowDevices):
+        def close(self) -> None:
+            super().close()
+            raise ServoFault("the servo is stuck: switch it off")
+
+    devices = Stuck()
+    opening = LabOpening(devices)
+    failed: list[Exception] = []
+    opened: list[Any] = []
+    opening.failed.connect(failed.append)
+    opening.opened.connect(opened.append)
+    opening.want("falcon")
+    opening.want("mouse")
+    devices.gate.set()
+    qtbot.waitUntil(lambda: bool(opened), timeout=SOON_MS)
+    assert [str(error) for error in failed] == ["the servo is stuck: switch it off"]
 
 
 def test_a_device_that_is_not_there_is_told(visit: LabVisit, qtbot: Any) -> None:

@@ -177,7 +177,7 @@ class FormPanel(Card):
             self._stack_up()
         if forget:
             for row in self.rows.values():
-                row.show_refused("")
+                row.let_go()
         came = [row for section in sections for row in self.blocks[section.title].show_section(section)]
         for row in came:
             row.changed.connect(self.changed)

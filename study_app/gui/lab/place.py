@@ -12,7 +12,7 @@ from PySide6.QtGui import QHideEvent, QKeySequence, QResizeEvent, QShortcut, QSh
 from PySide6.QtWidgets import QFileDialog, QGridLayout, QScrollArea, QVBoxLayout, QWidget
 
 from study_app.gui.cards import SHADOW
-from study_app.gui.escape import EscapeHold
+from study_app.gui.escape import EscapeAnywhere
 from study_app.gui.lab.form import FormPanel
 from study_app.gui.lab.header import LabHeader
 from study_app.gui.lab.note import TankNote
@@ -36,7 +36,8 @@ class LabPlace(Place):
 
     ``changed(name, value, held)`` is a parameter of the felt side in SI, ``held`` while its slider is dragged;
     ``hand_moved`` [m, hand frame] and ``hand_pressed`` are the mouse's while it moves the ball; ``entered`` and
-    ``left`` come as the place is shown and hidden.
+    ``left`` come as the place is shown and hidden; ``save_asked`` is a file and the `Setting` that was felt when it was
+    asked for.
     """
 
     changed = Signal(str, object, bool)
@@ -50,7 +51,7 @@ class LabPlace(Place):
     stop_asked = Signal()
     fade_in_asked = Signal()
     cancel_asked = Signal()
-    save_asked = Signal(Path)
+    save_asked = Signal(Path, object)
     copied = Signal()
     hand_moved = Signal(float, float, float)
     hand_pressed = Signal(int)
@@ -72,7 +73,7 @@ class LabPlace(Place):
         self.note = TankNote(self.tank)
         self.force, self.speed = ForceCard(), SpeedCard()
         self.cost, self.error, self.limiters = CostCard(), ErrorCard(), LimiterCard()
-        self._escape = EscapeHold(self)
+        self._escape = EscapeAnywhere(self)
         self._lay_out()
         self._connect()
         self._shortcuts()
@@ -141,7 +142,6 @@ class LabPlace(Place):
             (self.undo_asked, header.undo_asked),
             (self.redo_asked, header.redo_asked),
             (self.stop_asked, header.stop_asked),
-            (self.stop_asked, self._escape.held),
             (self.changed, form.changed),
             (self.liquid_chosen, form.liquid_chosen),
             (self.copied, form.copied),
@@ -152,6 +152,7 @@ class LabPlace(Place):
         ):
             part.connect(mine)
         header.save_asked.connect(self.ask_where_to_save)
+        self._escape.held.connect(self._stop)
 
     def _shortcuts(self) -> None:
         """Give X, undo and redo to the place alone: other places of the window have keys of their own."""
@@ -179,22 +180,28 @@ class LabPlace(Place):
             part.show_view(view)
 
     def ask_where_to_save(self) -> None:
-        """Ask for the preset's file; nothing waits meanwhile."""
+        """Ask for the preset's file; nothing waits meanwhile, and the force can be stopped beside the dialog."""
         if self.dialog is not None or self._view is None or self._view.workbench.blind:
             return
-        dialog = QFileDialog(self, "Save preset", f"{preset_name(self._view.workbench.in_hand.title)}{SUFFIX}")
+        setting = self._view.workbench.in_hand
+        dialog = QFileDialog(self, f"Save preset: {setting.title}", f"{preset_name(setting.title)}{SUFFIX}")
         dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
         dialog.setNameFilter("Presets (*.toml)")
         dialog.setDefaultSuffix(SUFFIX[1:])
-        dialog.fileSelected.connect(lambda name: self.save_asked.emit(Path(name)))
+        dialog.fileSelected.connect(lambda name: self.save_asked.emit(Path(name), setting))
         dialog.finished.connect(self._forget_dialog)
         self.dialog = dialog
-        dialog.open()
+        dialog.show()
 
     def _forget_dialog(self) -> None:
         if self.dialog is not None:
             self.dialog.deleteLater()
         self.dialog = None
+
+    def _stop(self) -> None:
+        """Ask for zero force when Esc was held, in whichever window of the program."""
+        if self.isVisible():
+            self.stop_asked.emit()
 
     def event(self, event: QEvent) -> bool:
         """Give the pointer back when the window is left."""
@@ -207,22 +214,17 @@ class LabPlace(Place):
         return True
 
     def showEvent(self, event: QShowEvent) -> None:  # noqa: N802 - Qt's name
-        """Watch for Esc held, whichever part has the focus, and say that the lab is entered."""
+        """Say that the lab is entered."""
         super().showEvent(event)
-        handle = self.window().windowHandle()
-        if handle is not None:
-            handle.removeEventFilter(self._escape)
-            handle.installEventFilter(self._escape)
         self.setFocus()
         self.entered.emit()
 
     def hideEvent(self, event: QHideEvent) -> None:  # noqa: N802 - Qt's name
         """Say that the lab is left."""
         super().hideEvent(event)
-        handle = self.window().windowHandle()
-        if handle is not None:
-            handle.removeEventFilter(self._escape)
         self.left.emit()
+        if self.dialog is not None:
+            self.dialog.reject()
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
         """Give way in a small window: first the header, then the right column; the middle and the form scroll."""

@@ -62,6 +62,10 @@ class ParameterRow(QWidget):
         self.why.setText(why)
         self._below.setVisible(bool(why))
 
+    def let_go(self) -> None:
+        """Let go of what is held, and forget what was refused: it was another setting's."""
+        self.show_refused("")
+
     def parts(self) -> tuple[QWidget, ...]:
         """Return what takes the keyboard, in its order."""
         raise NotImplementedError
@@ -121,6 +125,11 @@ class NumberRow(ParameterRow):
         self.field.show_state("refused" if why else changed)
         if why:
             self.field.setAccessibleDescription(why)
+
+    def let_go(self) -> None:
+        """Let go of the knob, too."""
+        super().let_go()
+        self.slider.let_go()
 
     def parts(self) -> tuple[QWidget, ...]:
         """Return slider and field."""

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
+import random
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from PySide6.QtWidgets import QApplication
 
 from study_app.gui.lab.view import CostRow, DeviceShown, ErrorRow, LabView, Now
 from study_app.haptics.layout import SAMPLE, records
@@ -115,3 +118,20 @@ def lab_view(bench: Workbench | None = None, *, cut: int | None = None, **fields
         "limiters": counts.told(8.0),
     }
     return still_view(bench, **(moved | fields))
+
+
+def blind(bench: Workbench, *, first: str = "A", felt: str = "A") -> Workbench:
+    drawn = bench.blinded(random.Random(1))  # noqa: S311 - drawn, then set
+    return dataclasses.replace(drawn, first=first, felt=felt)  # type: ignore[arg-type]
+
+
+def heard(place: Any, name: str) -> list[tuple[Any, ...]]:
+    said: list[tuple[Any, ...]] = []
+    getattr(place, name).connect(lambda *what: said.append(what))
+    return said
+
+
+def settle() -> None:
+    """Let layouts within layouts come to rest."""
+    for _ in range(4):
+        QApplication.processEvents()

@@ -3,35 +3,22 @@
 from __future__ import annotations
 
 import dataclasses
-import random
 from pathlib import Path
 from typing import Any
 
 import pytest
-from PySide6.QtCore import QEvent, QPoint, Qt
-from PySide6.QtGui import QKeyEvent, QKeySequence
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtGui import QKeySequence
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QApplication, QComboBox, QLabel, QLineEdit, QSlider, QWidget
 
-from study_app.gui.escape import HOLD_MS
 from study_app.gui.lab.note import SHOWN_AFTER_MS
 from study_app.gui.lab.place import preset_name
 from study_app.gui.lab.view import LabView
 from study_app.gui.theme import DARK, LIGHT
 from study_app.gui.themed import wear
 from study_app.lab.workbench import Workbench
-from tests.gui.lab.sample import still_view, workbench
-
-
-def blind(bench: Workbench, *, first: str = "A", felt: str = "A") -> Workbench:
-    drawn = bench.blinded(random.Random(1))  # noqa: S311 - drawn, then set
-    return dataclasses.replace(drawn, first=first, felt=felt)  # type: ignore[arg-type]
-
-
-def heard(place: Any, name: str) -> list[tuple[Any, ...]]:
-    said: list[tuple[Any, ...]] = []
-    getattr(place, name).connect(lambda *what: said.append(what))
-    return said
+from tests.gui.lab.sample import blind, heard, settle, still_view, workbench
 
 
 def shown(place: Any) -> list[QWidget]:
@@ -47,12 +34,6 @@ def words_of(place: Any) -> str:
         if isinstance(it, QComboBox):
             said.append(it.currentText())
     return " | ".join(said)
-
-
-def settle() -> None:
-    """Let layouts within layouts come to rest."""
-    for _ in range(4):
-        QApplication.processEvents()
 
 
 def press(place: Any, sequence: str) -> None:
@@ -121,46 +102,6 @@ def test_device_and_path_are_chosen(place: Any, still: LabView) -> None:
     assert paths == [("zigzag",), (None,)]
     place.show_view(dataclasses.replace(still, path="zigzag"))
     assert place.header.path.currentText() == "Turns of 90°"
-
-
-def test_stop_force_speaks_at_the_press(place: Any, still: LabView) -> None:
-    place.show_view(still)
-    said = heard(place, "stop_asked")
-    QTest.mousePress(place.header.stop, Qt.MouseButton.LeftButton)
-    assert len(said) == 1
-
-
-def test_stop_force_is_never_disabled_hidden_or_moved(place: Any, still: LabView) -> None:
-    views = [
-        still,
-        dataclasses.replace(still, force_on=False),
-        dataclasses.replace(still, busy="Opening the Falcon"),
-        dataclasses.replace(still, trouble="The device is gone: plug it in again."),
-        dataclasses.replace(still, workbench=blind(still.workbench)),
-    ]
-    for width in (1528, 952):
-        place.resize(width, 640)
-        settle()
-        places = set()
-        for view in views:
-            place.show_view(view)
-            settle()
-            stop = place.header.stop
-            assert stop.isEnabled()
-            assert stop.isVisible()
-            assert place.rect().contains(stop.geometry())
-            assert stop.height() >= 44
-            places.add(stop.mapTo(place, QPoint()).toTuple())
-        assert len(places) == 1
-
-
-def test_esc_held_stops_the_force_from_any_part(place: Any, still: LabView, qtbot: Any) -> None:
-    place.show_view(still)
-    handle = place.window().windowHandle()
-    with qtbot.waitSignal(place.stop_asked, timeout=HOLD_MS + 2000):
-        QApplication.sendEvent(
-            handle, QKeyEvent(QEvent.Type.KeyPress, Qt.Key.Key_Escape, Qt.KeyboardModifier.NoModifier)
-        )
 
 
 def test_after_a_stop_the_force_can_be_faded_in_again(place: Any, still: LabView) -> None:
@@ -273,7 +214,7 @@ def test_a_preset_is_saved_where_one_says(place: Any, still: LabView, qtbot: Any
     assert place.dialog.isVisible()
     place.dialog.fileSelected.emit(str(tmp_path / "mine.toml"))
     place.dialog.reject()
-    assert said == [(tmp_path / "mine.toml",)]
+    assert said == [(tmp_path / "mine.toml", still.workbench.a)]
     assert place.dialog is None
 
 
