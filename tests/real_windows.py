@@ -23,9 +23,13 @@ needs_display = pytest.mark.skipif(bool(MISSING), reason=f"not installed here: {
 
 @contextmanager
 def virtual_display(*more: str) -> Iterator[str]:
-    """A virtual X display that nobody else uses; ``more`` is said to its server."""
+    """A virtual X display that nobody else uses; ``more`` is said to its server.
+
+    It does not begin anew with every last client that goes: that would turn away one that is just coming.
+    """
     read_end, write_end = os.pipe()
-    words_of_xvfb = ["Xvfb", "-displayfd", str(write_end), "-screen", "0", "1920x1080x24", "-nolisten", "tcp", *more]
+    how = ("-screen", "0", "1920x1080x24", "-nolisten", "tcp", "-noreset", *more)
+    words_of_xvfb = ["Xvfb", "-displayfd", str(write_end), *how]
     server = subprocess.Popen(
         words_of_xvfb, pass_fds=(write_end,), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
     )
