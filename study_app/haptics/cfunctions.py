@@ -26,7 +26,7 @@ from numba import from_dtype, types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-import study_app.haptics.compiled  # noqa: F401 - decides where compiled functions are kept, before the first is made
+from study_app.haptics.compiled import CACHE  # decided before the first is made
 
 READ = types.int32(types.intp, types.int64, types.intp)
 WRITE = types.int32(types.intp, types.float64, types.float64, types.float64)
@@ -60,7 +60,7 @@ _StarArgTuple: Any = types.StarArgTuple
 
 def c_function(signature: Any, function: Callable[..., Any]) -> Any:
     """Compile ``function`` as a C function of ``signature``, kept on disk like every kernel."""
-    return numba.cfunc(signature, cache=True, error_model="numpy")(function)
+    return numba.cfunc(signature, cache=CACHE is not None, error_model="numpy")(function)
 
 
 def external(symbol: str, signature: Any) -> Any:

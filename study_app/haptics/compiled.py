@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import logging
 import os
 import re
 import secrets
@@ -22,6 +23,8 @@ from typing import Any, TypeVar, cast
 import numba
 from numba.core.options import DefaultOptions
 
+log = logging.getLogger(__name__)
+
 _PACKAGE = Path(__file__).resolve().parent.parent
 _KERNEL_FOLDERS = ("haptics", "devices", "evaluation")
 
@@ -31,7 +34,7 @@ SWEPT_AT_ONCE = 8  # what removing may take of a start
 _DIGEST = re.compile(r"[0-9a-f]{16}")
 _HALF_REMOVED = re.compile(r"\.[0-9a-f]{16}\.[0-9a-f]{8}\.gone")
 
-_OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
+_OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
 # numba's own name for it, which its stubs do not know; without it ticks are slower, and just as right.
 _NO_MEMORY: dict[str, Any] = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
 
@@ -55,15 +58,32 @@ def _user_cache() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "liquid-study"
 
 
-def _use_own_cache() -> None:
-    folder = Path(os.environ.get("NUMBA_CACHE_DIR") or _user_cache()) / _digest_of_sources()
+def _use_own_cache() -> Path | None:
+    """Use the first folder that can be written, and say which if it is not the first; without one, none."""
+    wanted = [*map(Path, filter(None, [os.environ.get("NUMBA_CACHE_DIR")])), _user_cache()]
+    digest = _digest_of_sources()
+    for place in wanted:
+        if _writable(place / digest):
+            if place is not wanted[0]:
+                log.warning("%s cannot be written: what is compiled is kept in %s", wanted[0], place)
+            vars(numba.config)["CACHE_DIR"] = str(place / digest)
+            sweep_caches(place / digest)
+            return place / digest
+    places = " and ".join(map(str, wanted))
+    log.warning(
+        "%s cannot be written: every start compiles anew, for up to a minute; name a folder in NUMBA_CACHE_DIR", places
+    )
+    return None
+
+
+def _writable(folder: Path) -> bool:
+    """Make a folder and say that it is used now; return whether it can be written."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         os.utime(folder)
     except OSError:
-        return  # numba then falls back to its own places; slower, never wrong within one run
-    vars(numba.config)["CACHE_DIR"] = str(folder)
-    sweep_caches(folder)
+        return False
+    return os.access(folder, os.W_OK)
 
 
 def sweep_caches(own: Path) -> None:
@@ -94,7 +114,9 @@ def _remove_cache(path: Path, used_at: float) -> None:
             shutil.rmtree(gone)
 
 
-_use_own_cache()
+CACHE: Path | None = _use_own_cache()
+"""Where what is compiled is kept; None where nothing can be."""
+_OPTIONS["cache"] = CACHE is not None
 
 
 def kernel(function: F) -> F:

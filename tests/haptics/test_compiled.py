@@ -107,3 +107,57 @@ def test_programs_that_begin_at_once_sweep_without_a_word_and_use_one_cache(tmp_
     (own,) = [path for path in tmp_path.iterdir() if path not in old]
     assert len(own.name) == 16
     assert KEPT_FOLDERS - 1 <= sum(there(old)) <= len(old) - SWEPT_AT_ONCE
+
+
+def said_at_start(folder: Path, environment: dict[str, str]) -> tuple[str, str]:
+    """Start an interpreter that compiles a file in ``folder``; return where it keeps that, and what it said."""
+    program = folder / "program.py"
+    program.write_text(
+        "from study_app.haptics import compiled\n"
+        "@compiled.kernel\n"
+        "def twice(x): return 2 * x\n"
+        "assert twice(21) == 42\n"
+        "print(compiled.CACHE)"
+    )
+    done = subprocess.run(
+        [sys.executable, str(program)],
+        env=os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])} | environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout.strip(), done.stderr
+
+
+@pytest.fixture
+def nowhere(tmp_path: Path) -> Path:
+    """Return a place that no folder can be made in, whoever asks: it is a file."""
+    file = tmp_path / "file"
+    file.write_text("no folder")
+    return file / "cache"
+
+
+about_user_cache = pytest.mark.skipif(sys.platform != "linux", reason="XDG_CACHE_HOME is Linux's")
+
+
+@about_user_cache
+def test_a_cache_that_cannot_be_written_is_kept_in_the_users_folder_with_a_word(tmp_path: Path, nowhere: Path) -> None:
+    at, said = said_at_start(tmp_path, {"NUMBA_CACHE_DIR": str(nowhere), "XDG_CACHE_HOME": str(tmp_path)})
+    assert Path(at).parent == tmp_path / "liquid-study"
+    assert Path(at).is_dir()
+    assert said == f"{nowhere} cannot be written: what is compiled is kept in {tmp_path / 'liquid-study'}\n"
+
+
+@about_user_cache
+def test_where_nothing_can_be_kept_the_program_works_and_says_what_to_do(tmp_path: Path, nowhere: Path) -> None:
+    at, said = said_at_start(tmp_path, {"NUMBA_CACHE_DIR": str(nowhere), "XDG_CACHE_HOME": str(nowhere)})
+    assert at == "None"
+    assert len(said.splitlines()) == 1
+    assert "every start compiles anew" in said
+    assert "NUMBA_CACHE_DIR" in said
+
+
+@about_user_cache
+def test_nobody_hears_of_a_cache_that_works(tmp_path: Path) -> None:
+    assert said_at_start(tmp_path, {"NUMBA_CACHE_DIR": "", "XDG_CACHE_HOME": str(tmp_path)})[1] == ""
