@@ -26,6 +26,7 @@ from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.participant import ParticipantWindow
 from study_app.gui.session_parts import Hand, Parts
 from study_app.gui.slack import Slack
+from study_app.gui.urgency import Urgency
 from study_app.session.events import (
     Begin,
     Broke,
@@ -103,6 +104,7 @@ class SessionBridge(QObject):
         self._hook_before = sys.excepthook
         self._frames = Frames(refresh_hz, parent=self)
         self._frames.due.connect(self._frame)
+        self._urgency = Urgency()
         self._slack = Slack(((self._tiles, TILES_S), (self._traces, TRACES_S), (self._forces, TRACES_S)))
         self.runner.on_change(lambda _state: self._changed())
         self._connect()
@@ -144,6 +146,7 @@ class SessionBridge(QObject):
         """Begin the session."""
         sys.excepthook = self._uncaught
         settle()
+        self._urgency.hurry()
         self._frames.start()
         self._begin()
 
@@ -331,6 +334,7 @@ class SessionBridge(QObject):
             return
         self._gone = True
         self._frames.stop()
+        self._urgency.rest()
         unsettle()
         sys.excepthook = self._hook_before
         self.participant.may_close = True

@@ -12,7 +12,7 @@ if sys.platform != "linux":
 
 import resource
 
-from study_app.haptics.clock_rtkit import make_real_time
+from study_app.haptics.clock_rtkit import make_high_priority, make_real_time
 
 
 class Service:
@@ -74,6 +74,8 @@ class Service:
             asked = self.calls[-1][1].rstrip(b"\0").rsplit(b"\0", 1)[-1]
             if b"MaxRealtimePriority" in asked:
                 body = b"\x01i\0\0" + struct.pack("<i", 15)
+            elif b"MinNiceLevel" in asked:
+                body = b"\x01i\0\0" + struct.pack("<i", -7)
             else:
                 body = b"\x01x\0\0\0\0\0\0" + struct.pack("<q", 200_000)
         kind = 3 if member in self._refuses else 2
@@ -143,3 +145,18 @@ def test_no_bus_is_an_os_error(tmp_path, monkeypatch):
     monkeypatch.setenv("DBUS_SYSTEM_BUS_ADDRESS", f"unix:path={tmp_path / 'none'},guid=0")
     with pytest.raises(FileNotFoundError):
         make_real_time(1)
+
+
+def test_a_thread_goes_before_others_as_far_as_the_service_grants_it(serve, limits):
+    service, path = serve()
+    assert make_high_priority(4711, -10, path) == -7
+    named, body = service.calls[-1]
+    assert (named[3], named[8]) == ("MakeThreadHighPriority", "ti")
+    assert struct.unpack("<Qi", body) == (4711, -7)
+    assert limits == [], "it may compute as long as it likes: it is not real-time"
+
+
+def test_a_thread_that_may_not_go_before_others_is_an_os_error(serve):
+    _, path = serve(refuses=("MakeThreadHighPriority",))
+    with pytest.raises(PermissionError, match="refuses MakeThreadHighPriority"):
+        make_high_priority(1, -10, path)
