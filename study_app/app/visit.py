@@ -16,6 +16,7 @@ from study_app.gui.collector import collecting_here
 from study_app.gui.ending import ended_from_outside
 from study_app.gui.home.place import HomePlace
 from study_app.gui.main_window import MainWindow
+from study_app.gui.screens import place
 from study_app.store.machine import MachineSettings
 
 LOOK_AFTER_MS = 300  # the window stands by then
@@ -81,7 +82,8 @@ class Visit(QObject):
             desk.troubled.connect(self.window.tell)
 
     def open(self) -> None:
-        """Show the window, and look at the machine once it stands."""
+        """Show the window, no larger than the screen, and look at the machine once it stands."""
+        place(self.window, self.window.screen(), corner=False)
         self.window.show()
         if self.machine.trouble:
             self.window.tell("This machine's settings are the defaults", f"{self.machine.trouble}.")

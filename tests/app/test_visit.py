@@ -14,6 +14,7 @@ from study_app.app import live_session
 from study_app.app.visit import Visit
 from study_app.errors import DeviceLost, DeviceNotFound
 from study_app.gui.choices import NewSession
+from study_app.gui.main_window import FULL, LEAST
 from study_app.gui.theme import DARK
 
 CHOSEN = NewSession("demo", "P001", 1, 7, "AK", "en", "mouse", True, None, Path("nowhere"))
@@ -123,3 +124,10 @@ def test_a_theme_that_was_changed_in_the_cockpit_stays(visit: Visit, monkeypatch
     visit.live._cancel()
     assert visit.window.theme is DARK
     assert visit.machine.settings.theme == "dark"
+
+
+def test_the_window_is_no_larger_than_its_screen(visit: Visit) -> None:
+    room = visit.window.screen().availableGeometry().size()
+    assert FULL.height() > room.height()  # else this shows nothing
+    visit.open()
+    assert visit.window.size() == FULL.boundedTo(room).expandedTo(LEAST)
