@@ -24,10 +24,12 @@ CONTROL = np.dtype(
         ("run", np.int64),  # 1 while the loop may go on
         ("stop", np.int64),  # 1 for no force; the loop sets it too, when the device's stop button is down
         ("request", np.int64),  # counts the scenes handed over; the newest is in slot request % 2
+        ("numbers", np.int64),  # counts the times that the scene in force was given the numbers of the spare slot
         ("serial", np.int64, (2,)),  # what telemetry calls the scene of each slot; 0 is rest
         ("period_ns", np.int64),
         # written by the loop
         ("taken", np.int64),  # the request in force
+        ("numbers_taken", np.int64),  # likewise
         ("deadline_ns", np.int64),  # when the next turn is due
         ("turns", np.int64),  # how many were taken
         ("overruns", np.int64),  # deadlines passed over because a turn did not fit
@@ -89,7 +91,7 @@ def run(control: Any, slots: Any, safety: Any, reading: Any, output: Any, device
         _sense(sample, reading, device)
         if sample.buttons & BUTTON_STOP:
             host.stop = 1
-        _take_scene(host, safety[0], sample)
+        _take_scene(host, slots, safety[0], sample)
         if sample.status == STATUS_OK:
             safety[0].stop = host.stop
             if host.taken % 2 == 0:
@@ -128,14 +130,31 @@ def _sense(sample: Any, reading: Any, device: Any) -> None:
 
 
 @kernel
-def _take_scene(host: Any, safety: Any, sample: Any) -> None:
-    """Take the scene that was handed over last, if it is another one."""
-    request = host.request
+def _take_scene(host: Any, slots: Any, safety: Any, sample: Any) -> None:
+    """Take the scene that was handed over last, if it is another one; or its numbers, with which it goes on."""
+    request, numbers = host.request, host.numbers
     if request != host.taken:
         fence()
         host.taken = request
         begin_scene(safety)
+    if numbers != host.numbers_taken:
+        fence()
+        first, second = slots
+        if host.taken % 2 == 0:
+            _take_numbers(host, first, second, 0)
+        else:
+            _take_numbers(host, second, first, 1)
+        host.numbers_taken = numbers
     sample.scene = host.serial[host.taken % 2]
+
+
+@kernel
+def _take_numbers(host: Any, model: Any, spare: Any, slot: int) -> None:
+    """Give a model the constants of the spare one, and its serial; what moves in it stays."""
+    model.parameters[0] = spare.parameters[0]
+    for i in range(model.liquids.shape[0]):
+        model.liquids[i] = spare.liquids[i]
+    host.serial[slot] = host.serial[1 - slot]
 
 
 @kernel
@@ -150,10 +169,19 @@ def _set_deadline(host: Any, ended_ns: int) -> None:
 
 @kernel
 def offer_scene(control: Any, slot: int, serial: int) -> None:
-    """Make the scene in ``slot``, already packed, the one that the next turn takes."""
+    """Make the scene in ``slot``, already packed, the one that the next turn takes; numbers not taken yet are void."""
+    control[0].numbers = control[0].numbers_taken
     control[0].serial[slot] = serial
     fence()
     control[0].request += 1
+
+
+@kernel
+def offer_numbers(control: Any, slot: int, serial: int) -> None:
+    """Give the scene in force the numbers of that in ``slot``, the spare one, from the next turn on."""
+    control[0].serial[slot] = serial
+    fence()
+    control[0].numbers += 1
 
 
 @kernel

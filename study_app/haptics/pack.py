@@ -113,13 +113,57 @@ def pack_into(model: Model, scene: Scene, *, delay_ticks: int = 1) -> None:
     _fill(model, scene, bearable(1 / scene.rate_hz, delay_ticks, scene.velocity), delay_ticks)
 
 
+def adjust_into(model: Model, scene: Scene, *, delay_ticks: int = 1) -> None:
+    """Give memory of `pack` the numbers of a scene built like the one in it (`built_alike`); its state goes on."""
+    scene = resolve(scene)
+    _fill_constants(model, scene, bearable(1 / scene.rate_hz, delay_ticks, scene.velocity), delay_ticks)
+
+
+def built_alike(scene: Scene, other: Scene) -> bool:
+    """Return whether one scene's state means the same to the other: only numbers differ that no state was made with.
+
+    Of rows, effects, laws and kinds nothing may differ, nor how the hand is placed in the scene. A history and a local
+    wake are kept in portions that depend on their numbers.
+    """
+    mine, others = _constants(resolve(scene)), _constants(resolve(other))
+    if any(record.effects & (layout.EFFECT_HISTORY | layout.EFFECT_LOCAL_WAKE) for record in mine.liquids):
+        return False
+    return (
+        len(mine.liquids) == len(others.liquids)
+        and all(np.array_equal(mine.parameters[name], others.parameters[name]) for name in ("scale", "origin_m"))
+        and _whole_numbers(mine.parameters) == _whole_numbers(others.parameters)
+        and _whole_numbers(mine.liquids) == _whole_numbers(others.liquids)
+    )
+
+
+def _constants(scene: Scene) -> Model:
+    """Return a resolved scene's constants, in memory that holds nothing else."""
+    nothing = [layout.records(layout.STATE, 0)] * (len(Model._fields) - 2)
+    model = Model(layout.records(layout.PARAMETERS, 1), layout.records(layout.LIQUID, len(scene.liquids)), *nothing)
+    _fill_constants(model, scene, bearable(1 / scene.rate_hz, 1, scene.velocity), 1)
+    return model
+
+
+def _whole_numbers(rows: Any) -> list[int]:
+    """Return every whole number in records: rows owned, effects, laws, kinds."""
+    if rows.dtype.names is None:
+        return [int(it) for it in rows.ravel()] if rows.dtype.kind == "i" else []
+    return [number for name in rows.dtype.names for number in _whole_numbers(rows[name])]
+
+
 def _rows_needed(scene: Scene) -> Rows:
     return reduce(Rows.plus, (rows_of(liquid, scene.rate_hz) for liquid in scene.liquids), Rows())
 
 
 def _fill(model: Model, scene: Scene, limits: Bearable, delay_ticks: int) -> None:
     """Write constants and a fresh state."""
-    for rows in (model.parameters, model.liquids, model.state, model.liquid_states):
+    for rows in (model.state, model.liquid_states):
+        rows.view(np.uint8)[:] = 0
+    _fill_constants(model, scene, limits, delay_ticks)
+
+
+def _fill_constants(model: Model, scene: Scene, limits: Bearable, delay_ticks: int) -> None:
+    for rows in (model.parameters, model.liquids):
         rows.view(np.uint8)[:] = 0
     parameters = model.parameters[0]
     parameters.scale = scene.scale

@@ -12,7 +12,7 @@ from study_app.haptics.cfunctions import Driver
 from study_app.haptics.clock import Clock, SystemClock
 from study_app.haptics.clock_grants import Grant
 from study_app.haptics.layout import STATUS_DEVICE_LOST, STATUS_NON_FINITE, STATUS_OK, STATUS_STALE_FAULT
-from study_app.haptics.pack import elements_needed
+from study_app.haptics.pack import built_alike, elements_needed
 from study_app.haptics.scene import Scene
 from study_app.haptics.telemetry import Telemetry
 from study_app.haptics.thread import LoopThread
@@ -59,6 +59,7 @@ class Servo:
         self._device = device
         self._scene = Scene(rate_hz=rate_hz)
         self._serial = 0
+        self._rests = True
         self._loading = threading.Lock()
         self._loop = LoopThread(
             device, clock or SystemClock(), self._scene, elements, self.telemetry, real_time=real_time
@@ -88,6 +89,7 @@ class Servo:
 
     def stop(self) -> None:
         """End the loop and wait for it; the last force written is zero. A stopped servo may be started again."""
+        self._rests = True
         self._loop.end()
 
     def load(self, scene: Scene) -> int:
@@ -100,6 +102,31 @@ class Servo:
         ServoFault, DeviceLost
             The servo has stopped itself.
         """
+        return self._present(scene, goes_on=False)
+
+    def adjust(self, scene: Scene) -> int:
+        """Let the next tick go on with the scene in force, its wake and its force kept, with the numbers of ``scene``.
+
+        The force moves by no more than the slew limit in a tick, and the energy account goes on: what the hand did not
+        put in does not come back, whatever the numbers are now. Returns the serial number that telemetry has from then
+        on.
+
+        Raises
+        ------
+        StudyError
+            The scene is not built like the one in force (``pack.built_alike``), or cannot be loaded.
+        ServoFault, DeviceLost
+            The servo has stopped itself.
+        """
+        if not self.may_adjust(scene):
+            raise StudyError("the scene differs from the one in force by more than numbers: load it instead")
+        return self._present(scene, goes_on=True)
+
+    def may_adjust(self, scene: Scene) -> bool:
+        """Return whether `adjust` takes a scene now."""
+        return not self._rests and built_alike(self._scene, scene)
+
+    def _present(self, scene: Scene, *, goes_on: bool) -> int:
         if scene.rate_hz != self.rate_hz:
             raise StudyError(
                 f"the scene is made for {scene.rate_hz:g} Hz but the servo runs at {self.rate_hz:g} Hz: "
@@ -114,13 +141,14 @@ class Servo:
         self.check()
         with self._loading:
             self._serial += 1
-            self._scene = scene
-            self._loop.hand_over(scene, self._serial)
+            self._scene, self._rests = scene, False
+            self._loop.hand_over(scene, self._serial, goes_on=goes_on)
             return self._serial
 
     def rest(self) -> None:
         """Let the next tick present no liquid, scene 0: the force fades to zero."""
         with self._loading:
+            self._rests = True
             self._loop.hand_over(self._scene.model_copy(update={"liquids": ()}), 0)
 
     def stop_force(self) -> None:

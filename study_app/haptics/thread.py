@@ -17,7 +17,16 @@ from study_app.haptics.cfunctions import Driver
 from study_app.haptics.clock import Clock, raise_priority
 from study_app.haptics.clock_grants import NO_THREAD, Blocks, Grant
 from study_app.haptics.layout import READING, STATUS_OK, records
-from study_app.haptics.loop import CONTROL, ClockCalls, DeviceCalls, Output, let_go, offer_scene, run
+from study_app.haptics.loop import (
+    CONTROL,
+    ClockCalls,
+    DeviceCalls,
+    Output,
+    let_go,
+    offer_numbers,
+    offer_scene,
+    run,
+)
 from study_app.haptics.pack import pack, pack_into
 from study_app.haptics.safety import new_safety
 from study_app.haptics.scene import Scene
@@ -99,17 +108,25 @@ class LoopThread:
             self._begin()
         return int(run(*self._arguments, max(turns, 0)))
 
-    def hand_over(self, scene: Scene, serial: int) -> None:
-        """Pack ``scene`` into the spare slot and let the next turn take it; first let it take the one before."""
+    def hand_over(self, scene: Scene, serial: int, *, goes_on: bool = False) -> None:
+        """Pack ``scene`` into the spare slot and let the next turn take it; first let it take the one before.
+
+        With ``goes_on`` the turn takes nothing but its numbers.
+        """
         host = self.control[0]
         patience = time.monotonic() + _PATIENCE_S
-        while self.thread is not None and self.thread.is_alive() and host.taken != host.request:
+        while self.thread is not None and self.thread.is_alive() and not self._all_taken:
             if time.monotonic() > patience:
                 raise self._silence()
             time.sleep(host.period_ns * 1e-9)
         spare = (int(host.request) + 1) % 2
         pack_into(self._slots[spare], scene)
-        offer_scene(self.control, spare, serial)
+        (offer_numbers if goes_on else offer_scene)(self.control, spare, serial)
+
+    @property
+    def _all_taken(self) -> bool:
+        host = self.control[0]
+        return bool(host.taken == host.request and host.numbers_taken == host.numbers)
 
     def end(self) -> None:
         """End the loop, wait for it, and write zero force once more from here; then rest is what it would begin with.

@@ -86,8 +86,9 @@ class Live:
     def feel(self, bench: Workbench, *, anew: bool = False) -> None:
         """Present the felt setting of ``bench`` from the next tick on, and follow the other beside it.
 
-        A scene begins with a fade of 50 ms; one that comes sooner after another waits for its end, the newest counts.
-        What is felt already goes on as it is, unless it is to begin ``anew``: for a hand that may not know.
+        Numbers change under the hand, whose wake goes on (`Servo.adjust`). What changes more begins with a fade of
+        50 ms; if it comes sooner after another it waits for its end, the newest counts. What is felt already goes on as
+        it is, unless it is to begin ``anew``: for a hand that may not know.
 
         Raises
         ------
@@ -102,6 +103,9 @@ class Live:
             self._felt = bench
             for shadow in (self.shadow, *([self._ghost.shadow] if self._ghost is not None else ())):
                 shadow.put_beside(side, self._presentable(bench.setting(side).scene))
+            return
+        if goes_on and self.servo.may_adjust(self._presentable(bench.in_hand.scene)):
+            self._present(bench, goes_on=True)
             return
         self._due = bench
         self._load_what_is_due()
@@ -153,7 +157,9 @@ class Live:
             self._lead()
         else:
             self._ghost = _Ghost(motion, self.servo.rate_hz, self.device.force_limit_n, self.servo.now_ns())
-            self._tell_ghost()
+            if self._felt is not None:
+                a, b = (self._presentable(it.scene) for it in (self._felt.a, self._felt.b))
+                self._ghost.begin(self._felt.felt, a, b)
 
     def point_to(self, x_m: float, y_m: float, z_m: float) -> None:
         """Say where the pointer is [m, hand frame], to a device that has one, unless a path moves it."""
@@ -230,12 +236,17 @@ class Live:
         if self._due is None or (self._loaded_ns is not None and now_ns < self._loaded_ns + SPACING_NS):
             return
         bench, self._due = self._due, None
+        self._loaded_ns = now_ns
+        self._present(bench, goes_on=False)
+
+    def _present(self, bench: Workbench, *, goes_on: bool) -> None:
+        """Let the servo present what is felt, and the shadows follow."""
         a, b = (self._presentable(it.scene) for it in (bench.a, bench.b))
-        serial = self.servo.load(a if bench.felt == "A" else b)
-        self._loaded_ns, self._felt = now_ns, bench
-        self.shadow.expect(serial, bench.felt, a, b)
+        serial = (self.servo.adjust if goes_on else self.servo.load)(a if bench.felt == "A" else b)
+        self._felt = bench
+        self.shadow.expect(serial, bench.felt, a, b, goes_on=goes_on)
         if self._ghost is not None:
-            self._tell_ghost()
+            self._ghost.begin(bench.felt, a, b, goes_on=goes_on)
 
     def _presentable(self, scene: Scene) -> Scene:
         """Return a scene at the servo's rate."""
@@ -251,11 +262,6 @@ class Live:
         motion = led_to(self._programme(self.path), self._hand.aim_m)
         self._hand.follow(motion.t_s, motion.position_m)
 
-    def _tell_ghost(self) -> None:
-        if self._ghost is not None and self._felt is not None:
-            a, b = (self._presentable(it.scene) for it in (self._felt.a, self._felt.b))
-            self._ghost.begin(self._felt.felt, a, b)
-
 
 class _Ghost:
     """A path that nobody's hand goes along: samples as a servo would take them, for a shadow of its own."""
@@ -267,10 +273,10 @@ class _Ghost:
         self._started_ns = self._next_ns = now_ns
         self._serial = 0
 
-    def begin(self, felt: Side, a: Scene, b: Scene) -> None:
+    def begin(self, felt: Side, a: Scene, b: Scene, *, goes_on: bool = False) -> None:
         """Present these from the next sample on."""
         self._serial += 1
-        self.shadow.expect(self._serial, felt, a, b)
+        self.shadow.expect(self._serial, felt, a, b, goes_on=goes_on)
 
     def follow(self, now_ns: int) -> None:
         """Take what a servo would have taken by now; what was waited for too long is passed over."""

@@ -17,7 +17,7 @@ from study_app.haptics.effects.fill import scaled_length
 from study_app.haptics.gate import resolve
 from study_app.haptics.layout import SAMPLE, records
 from study_app.haptics.mirror import new_trail, take_again
-from study_app.haptics.pack import pack, pack_into
+from study_app.haptics.pack import adjust_into, pack, pack_into
 from study_app.haptics.safety import begin_scene, new_safety
 from study_app.haptics.scene import Scene
 from study_app.lab.tail import Tail, tail_of
@@ -65,6 +65,7 @@ class _Presented:
 
     felt: Side
     scenes: dict[Side, Scene]
+    goes_on: bool
 
 
 class Shadow:
@@ -95,9 +96,9 @@ class Shadow:
             half.answer(records(SAMPLE, 0))
             half.restart()
 
-    def expect(self, serial: int, felt: Side, a: Scene, b: Scene) -> None:
-        """Say what the servo will present as scene ``serial``, and what beside it."""
-        self._expected[serial] = _Presented(felt, {"A": a, "B": b})
+    def expect(self, serial: int, felt: Side, a: Scene, b: Scene, *, goes_on: bool = False) -> None:
+        """Say what the servo will present as scene ``serial``, and what beside it; ``goes_on`` if it only adjusts."""
+        self._expected[serial] = _Presented(felt, {"A": a, "B": b}, goes_on)
 
     def put_beside(self, side: Side, scene: Scene) -> None:
         """Exchange the scene of the side that is not felt; nothing happens where it is that already."""
@@ -131,14 +132,16 @@ class Shadow:
         if serial == self._serial:
             return
         self._serial = serial
+        missed = [it for number, it in self._expected.items() if number <= serial]  # some may have no sample at all
         presented = self._expected.get(serial)
         if presented is None:  # rest: a servo that ends, or was told to present nothing
             return
-        self._expected = {number: it for number, it in self._expected.items() if number >= serial}
+        self._expected = {number: it for number, it in self._expected.items() if number > serial}
         felt, beside = self._sides[presented.felt], self._sides[other(presented.felt)]
         if self._felt != presented.felt:
             felt.safety, beside.safety = beside.safety, beside.safety.copy()  # the servo's own goes with what is felt
-        felt.begin(presented.scenes[presented.felt])
+        goes_on = all(it.goes_on for it in missed)
+        (felt.go_on if goes_on else felt.begin)(presented.scenes[presented.felt])
         if beside.scene != presented.scenes[other(presented.felt)]:
             beside.begin(presented.scenes[other(presented.felt)])
         self._felt = presented.felt
@@ -172,6 +175,11 @@ class _Half:
         pack_into(self._model, scene)
         begin_scene(self.safety[0])
         self._trail.view(np.uint8)[:] = 0
+
+    def go_on(self, scene: Scene) -> None:
+        """Take a scene's numbers, as the servo does that adjusts: state and force go on."""
+        self.scene = scene
+        adjust_into(self._model, scene)
 
     def answer(self, samples: Any) -> Any:
         """Return the samples with what comes of them here."""

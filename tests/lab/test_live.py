@@ -12,7 +12,7 @@ if numba.config.DISABLE_JIT:
 from study_app.devices.mouse import MouseDevice
 from study_app.errors import ServoFault, StudyError
 from study_app.haptics.clock import VirtualClock
-from study_app.haptics.layout import LIMITER_NAMES, LIMITER_SLEW, LIMITER_STOP
+from study_app.haptics.layout import LIMITER_ENERGY, LIMITER_FADE, LIMITER_NAMES, LIMITER_SLEW, LIMITER_STOP
 from study_app.haptics.servo import Servo
 from study_app.lab.live import Live, open_live
 from study_app.lab.programmes import REACHED, TITLES, led_to, programme
@@ -29,11 +29,11 @@ def sent_n(live: Live, ticks: int) -> np.ndarray:
 
 def test_a_scene_is_presented_by_the_next_tick_and_felt_whole_within_fifty() -> None:
     live = live_with(scripted())
-    sides = bench("honey", "water")
+    sides = bench("honey", "honey")
     live.feel(sides)
     live.play("circle")
     run(live, 1500)
-    live.feel(sides.change("liquid.density_kg_m3", 700.0))
+    live.feel(sides.switch())
     run(live, 60, batch=1)
     ring = live.servo.telemetry.ring
     assert ring.scene[1499] == 1
@@ -60,6 +60,45 @@ def test_exchanging_what_is_not_felt_leaves_the_servo_alone() -> None:
     live.feel(sides, anew=True)
     run(live, 1)
     assert live.servo.telemetry.ring.scene[1800] == 2
+    live.close()
+
+
+def test_a_number_that_is_dragged_is_felt_by_the_next_tick_with_the_wake_going_on() -> None:
+    live = live_with(scripted())
+    sides = bench()
+    live.feel(sides)
+    live.play("circle")
+    run(live, 3000)
+    for k in range(60):  # a value every 8 ms, from 1000 down to 500 kg/m³
+        live.feel(sides := sides.change("liquid.density_kg_m3", 1000.0 * 0.5 ** ((k + 1) / 60), held=True))
+        run(live, 8, batch=2)
+    ring = live.servo.telemetry.ring
+    assert list(ring.scene[3000:3480:8]) == list(range(2, 62))
+    dragged, wake_mps = ring[3000:3480], np.linalg.norm(ring.wake_mps[2990:3480], axis=1)
+    assert wake_mps.min() > 0.7
+    assert np.abs(np.diff(wake_mps)).max() < 0.01
+    assert not (dragged.limiters & (LIMITER_FADE | LIMITER_ENERGY)).any()
+    assert np.linalg.norm(np.diff(ring.device_force_n[2990:3480], axis=0), axis=1).max() < 0.05
+    assert live.shadow.differing == 0
+    tail = live.tail("A")
+    assert tail is not None
+    assert tail.alive == 1700
+    live.close()
+
+
+def test_a_number_set_while_another_scene_waits_goes_with_it() -> None:
+    live = live_with(scripted())
+    sides = bench()
+    live.feel(sides)
+    run(live, 10)
+    live.feel(sides := sides.switch())  # waits until the fade of the first is over
+    live.feel(sides := sides.change("liquid.density_kg_m3", 3000.0))
+    run(live, 100)
+    assert set(live.servo.telemetry.ring.scene[:110]) == {1, 2}
+    live.feel(sides := sides.switch())
+    live.feel(sides.change("liquid.density_kg_m3", 900.0))  # before a turn took the switch
+    run(live, 900)
+    assert live.shadow.differing == 0
     live.close()
 
 

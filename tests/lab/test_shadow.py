@@ -33,9 +33,11 @@ def test_the_felt_sides_forces_are_the_servos_to_the_last_bit_through_switches_e
     run(live, 700)
     live.feel(sides := sides.change("wake.exponent", 2.0))
     run(live, 10, batch=10)
+    live.feel(sides := sides.change("wake.length", 100.0))
+    run(live, 200)
     live.feel(sides.switch())
     run(live, 900)
-    assert live.shadow.followed == 3110
+    assert live.shadow.followed == 3310
     assert live.shadow.differing == 0
     trace = live.trace()
     assert trace is not None
@@ -80,7 +82,7 @@ def test_a_side_that_is_not_touched_keeps_its_wake_while_the_other_is_edited() -
     live.play("circle")
     run(live, 1000)
     before = live.tail("B")
-    live.feel(sides.change("wake.exponent", 1.0))
+    live.feel(sides.change("wake.length", 1600.0))
     run(live, 2, batch=2)
     felt, beside = live.tail("A"), live.tail("B")
     assert before is not None
