@@ -30,6 +30,7 @@ DISTANCE_MM: Final = (200.0, 3000.0)
 WIDTH_MM: Final = (80.0, 5000.0)
 OFFSET_MS: Final = (0.0, 500.0)
 SPREAD_MS: Final = (0.0, 200.0)
+Place = Annotated[str, Field(pattern=r"^[^\x00]+$")]
 How = Literal["photodiode", "high-speed camera", "data sheet"]
 
 
@@ -65,8 +66,8 @@ class MachineSettings(_Strict):
     screen_width_mm: Annotated[float, Field(ge=WIDTH_MM[0], le=WIDTH_MM[1])] | None = None
     display_offset: DisplayOffset | None = None
     device: Annotated[str, Field(pattern=r"^[a-z][a-z-]*(:.+)?$")] = "mouse"
-    firmware: str | None = None
-    results: str | None = None
+    firmware: Place | None = None
+    results: Place | None = None
     theme: Literal["light", "dark"] = "light"
     sound: bool = False
 

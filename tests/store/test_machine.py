@@ -89,6 +89,8 @@ def _full(_descriptor):
         ('{"theme": "drak"}', 'did you mean "dark"?'),
         ('{"device": "Fal con"}', '"Fal con" is not permitted'),
         ('{"sound": 1}', "must be true or false"),
+        ('{"results": ""}', '"" is not permitted'),
+        (r'{"firmware": "a\u0000b"}', "is not permitted"),
     ],
 )
 def test_a_file_that_makes_no_sense_is_told_in_one_line_and_the_defaults_count(folder, text, said):
