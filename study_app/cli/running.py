@@ -126,7 +126,12 @@ def run(
     "everybody answers by what was felt in one of them. Nothing is measured: those columns say n/a. Sessions are "
     "written whole, without waiting for the disk.",
 )
-@RESULTS
+@click.option(
+    "--results",
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="Study folder; default a new results/<study>-rehearsal-1.",
+)
 @click.pass_context
 def rehearse(
     context: click.Context,

@@ -38,7 +38,7 @@ from study_app.session.simulated import Draw, Explorer, Reacher, Senses, filled_
 from study_app.store import journal
 from study_app.store.description import check_study
 from study_app.store.journal import SessionClock
-from study_app.store.layout import StudyFolder, check_unused, locate
+from study_app.store.layout import StudyFolder, check_unused, locate, rehearsal_folder
 from study_app.store.open_session import SessionStore
 from study_app.store.progress import progress_of
 from study_app.store.resume import reopen
@@ -68,7 +68,7 @@ def rehearse(
     participants : how many
     seed : all randomness comes from it, the key's too
     device : "scripted" or "falcon-emulated"
-    results : study folder; by default ``results/<study>``
+    results : study folder; by default a new ``results/<study>-rehearsal-<n>``
     recordings : whether every turn of the servo and every frame of a trial is kept
     progress : is told a line after each session
 
@@ -88,7 +88,7 @@ def rehearse(
         raise SessionError(f"device '{device}' waits for a person: rehearse on scripted or falcon-emulated")
     source = source_bytes(protocol)
     study = parse(source, str(protocol))
-    folder = Path("results") / study.study.name if results is None else Path(results)
+    folder = rehearsal_folder(Path("results"), study.study.name) if results is None else Path(results)
     check_study(StudyFolder(folder), study.study.name)
     people = [f"P{number:03d}" for number in range(1, participants + 1)]
     for person in people:

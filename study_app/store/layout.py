@@ -155,6 +155,14 @@ def study_folder(results: Path, study: str, *, pilot: bool = False) -> StudyFold
     return StudyFolder(results / (f"{study}-pilot" if pilot else study))
 
 
+def rehearsal_folder(results: Path, study: str) -> Path:
+    """Return a folder for a rehearsal that does not exist yet, apart from every participant's data."""
+    number = 1
+    while (folder := results / f"{study}-rehearsal-{number}").exists():
+        number += 1
+    return folder
+
+
 def check_participant(participant: str, *, pilot: bool = False) -> None:
     """Refuse an id that file names or analysts cannot take.
 

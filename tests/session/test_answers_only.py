@@ -56,6 +56,13 @@ def twelve(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return rehearse_answers("rek2024", participants=12, seed=1, results=folder, felt=made_up())
 
 
+def test_by_default_it_keeps_apart_from_participants(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for number in (1, 2):
+        folder = rehearse_answers("rek2024", participants=1, seed=1, felt=made_up())
+        assert folder == Path("results") / f"rek2024-rehearsal-{number}"
+
+
 def test_the_folder_is_sound_and_every_row_says_simulated(twelve: Path) -> None:
     found = verify(twelve)
     assert (found.errors, found.warnings, found.psychds.errors, found.sessions) == ((), (), (), 12)

@@ -13,17 +13,10 @@ from study_app.gui.home.facts import StudyFacts
 from study_app.gui.labels import label, set_ink
 from study_app.gui.theme import LIGHT, Theme
 from study_app.gui.themed import wear
+from study_app.store.layout import rehearsal_folder
 
 MAX_PARTICIPANTS = 200
 ARGUMENTS = ("-m", "study_app", "rehearse")
-
-
-def rehearsal_folder(results: Path, study: str) -> Path:
-    """Return a folder for a rehearsal that does not exist yet, apart from every participant's data."""
-    number = 1
-    while (folder := results / f"{study}-rehearsal-{number}").exists():
-        number += 1
-    return folder
 
 
 class RehearsalDialog(QDialog):

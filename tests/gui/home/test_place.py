@@ -8,14 +8,15 @@ from PySide6.QtWidgets import QLabel, QPushButton
 
 from study_app.devices.backends import NONE, Backend
 from study_app.gui.devices.view import devices_shown
-from study_app.gui.home.place import HomePlace
 from study_app.gui.home.cards import BrokenCard, StudyCard
 from study_app.gui.home.facts import study_facts
-from study_app.gui.home.rehearsal import RehearsalDialog, rehearsal_folder
+from study_app.gui.home.place import HomePlace
+from study_app.gui.home.rehearsal import RehearsalDialog
 from study_app.gui.main_window import LEAST, MainWindow
 from study_app.gui.theme import DARK
 from study_app.protocol.load import load, source_bytes
 from study_app.store.exclusions import exclude
+from study_app.store.layout import rehearsal_folder
 from study_app.store.machine import MachineSettings
 from study_app.store.session import begin
 
