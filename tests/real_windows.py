@@ -16,6 +16,7 @@ from pathlib import Path
 import pytest
 from PySide6.QtCore import QPoint, QSize
 
+COMPILED_S = 180.0  # by then the force model is compiled on any machine
 NEEDED = ("Xvfb", "xdotool")
 MISSING = [tool for tool in NEEDED if shutil.which(tool) is None]
 needs_display = pytest.mark.skipif(bool(MISSING), reason=f"not installed here: {', '.join(MISSING)}")
@@ -86,7 +87,7 @@ class Program:
             found[:] = [one for one in self.windows(title) if QSize(*self.size(one)) == size]
             return found
 
-        wait_for(look, f"the window {title!r}", 90.0)
+        wait_for(look, f"the window {title!r}", COMPILED_S)
         return found[-1]
 
     def windows(self, title: str) -> list[str]:
