@@ -12,6 +12,7 @@ from PySide6.QtWidgets import (
     QRadioButton,
     QSpinBox,
     QStyle,
+    QStyledItemDelegate,
     QStyleOptionButton,
     QStyleOptionComboBox,
     QStylePainter,
@@ -111,6 +112,10 @@ class Choice(Themed, QComboBox):
 
     A word too long for the field ends in "…", whole in the list and in the tip.
     """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setItemDelegate(QStyledItemDelegate(self))  # the theme gives the list's lines their height
 
     def showPopup(self) -> None:  # noqa: N802 - Qt's name
         """Open the list, as wide as its longest words."""

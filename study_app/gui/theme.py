@@ -176,9 +176,11 @@ QLineEdit[dense='true'], QComboBox[dense='true'] {{ padding: 3px 6px; min-height
 QLineEdit[dense='true']:focus, QComboBox[dense='true']:focus {{ padding: 2px 5px; }}
 QLineEdit[state='changed'], QComboBox[state='changed'] {{ border: 2px solid {t.accent}; padding: 2px 5px; }}
 QLineEdit[state='refused'] {{ border: 2px solid {t.bad}; padding: 2px 5px; }}
+QComboBox {{ combobox-popup: 0; }}
 QComboBox::drop-down {{ border: none; width: 28px; }}
 QComboBox QAbstractItemView {{ background: {t.surface}; color: {t.text}; border: 1px solid {t.ctl};
   selection-background-color: {t.selected}; selection-color: {t.text}; outline: none; }}
+QComboBox QAbstractItemView::item {{ min-height: 30px; padding: 0 8px; }}
 QToolTip {{ background: {t.surface}; color: {t.text}; border: 1px solid {t.ctl}; padding: 4px 8px; }}
 """
 
