@@ -106,6 +106,11 @@ class Picker(Choice):
                 self.addItem(words, value)
         self.setCurrentIndex(self.findData(chosen))
 
+    def show_whole(self, yes: bool) -> None:
+        """Be as wide as the longest words, or cut what is longer than most."""
+        policy = self.SizeAdjustPolicy
+        self.setSizeAdjustPolicy(policy.AdjustToContents if yes else policy.AdjustToMinimumContentsLengthWithIcon)
+
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
         """Paint the list and its icon."""
         super().paintEvent(event)
@@ -165,6 +170,8 @@ class LabHeader(Themed, QWidget):
         if narrow == self._narrow:
             return
         self._narrow = narrow
+        for picker in (self.device, self.path):
+            picker.show_whole(narrow)
         for row in (self._left, self._middle, self._right):
             self._grid.removeItem(row)
         if narrow:

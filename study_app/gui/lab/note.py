@@ -11,7 +11,8 @@ from study_app.gui.lab.view import LabView
 from study_app.gui.labels import Ink, label
 
 SHOWN_AFTER_MS = 300
-WIDTH = 380
+WIDTH, WIDEST, HIGH = 380, 640, 110
+EDGE, FOOT = 16, 56
 
 
 class TankNote(Card):
@@ -76,12 +77,16 @@ class TankNote(Card):
             self._appear()
 
     def place(self) -> None:
-        """Stand in the middle of the tank's lower edge."""
+        """Stand in the middle of the tank's lower edge; what takes many words is wider, and never above the tank."""
         parent = self.parentWidget()
         if parent is not None and not self.isHidden():
-            width = min(WIDTH, parent.width() - 32)
-            self.resize(width, max(self.sizeHint().height(), self.heightForWidth(width)))
-            self.move((parent.width() - width) // 2, parent.height() - self.height() - 56)
+            room = parent.width() - 2 * EDGE
+            width = min(WIDTH, room)
+            if self.heightForWidth(width) > HIGH:
+                width = min(WIDEST, room)
+            self.resize(width, max(self.minimumSizeHint().height(), self.heightForWidth(width)))
+            below = min(FOOT, parent.height() - self.height() - EDGE)
+            self.move((parent.width() - width) // 2, max(0, parent.height() - self.height() - below))
 
     def _put_away(self) -> None:
         """Say this trouble no more; the force is on all the while."""
@@ -112,5 +117,5 @@ def _said(view: LabView) -> tuple[str, Ink, str]:
     if view.trouble:
         return "warning", "bad", view.trouble
     if view.busy:
-        return "clock", "text2", f"{view.busy} …"
+        return "clock", "text2", f"{view.busy}\u00a0…"
     return "stop", "warn", "Force is off"

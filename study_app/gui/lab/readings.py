@@ -21,6 +21,7 @@ NAME_WIDTH = 84
 LINE = 26
 COST_HEIGHT, ERROR_HEIGHT = 236, 3 * LINE + 6  # of what is usual, kept free until it is measured
 UNKNOWN = "–"
+LEAST_NS = 1.0  # that a measurement beside a running servo can tell from nothing
 LimiterState = Literal["acting", "acted", "quiet"]
 
 
@@ -73,8 +74,9 @@ class CostLine(QWidget):
         ns = cost.ns or 0.0
         self.name.show_text(cost.effect)
         self.bar.show_share(ns / dearest_ns if dearest_ns > 0 else 0.0)
-        self.ns.setText(f"{ns:.0f} ns")
-        self.setAccessibleName(f"{cost.effect}: {ns:.0f} ns")
+        words = f"{ns:.0f} ns" if ns >= LEAST_NS else f"< {LEAST_NS:g} ns"
+        self.ns.setText(words)
+        self.setAccessibleName(f"{cost.effect}: {words}")
 
     def show_waiting(self) -> None:
         """Show that the number is not known now."""

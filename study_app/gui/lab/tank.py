@@ -237,6 +237,8 @@ class LabTank(Themed, QWidget):
             return "Tail and arrows are hidden while blind"
         if view.tail is None:
             return "No tail yet" if "wake" in view.workbench.in_hand.scene.liquids[0].effects else "No wake, no tail"
+        if view.tail.segments == 0:
+            return f"At rest, {grouped(view.tail.alive)} of {grouped(view.tail.elements)} elements"
         segments = "1 segment" if view.tail.segments == 1 else f"{view.tail.segments} segments"
         return f"{segments}, {grouped(view.tail.alive)} of {grouped(view.tail.elements)} elements"
 

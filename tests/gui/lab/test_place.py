@@ -124,7 +124,7 @@ def test_waiting_is_told_after_300_ms_and_can_be_cancelled(place: Any, still: La
     assert not place.note.isVisible()
     assert place.note._wait.interval() == SHOWN_AFTER_MS
     qtbot.waitUntil(place.note.isVisible)
-    assert place.note.words.text() == "Opening the Falcon …"
+    assert place.note.words.text() == "Opening the Falcon\u00a0…"
     place.note.cancel.click()
     assert said == [()]
     place.show_view(busy)
@@ -145,6 +145,18 @@ def test_trouble_beside_a_force_that_is_on_can_be_put_away_until_there_is_anothe
     assert place.note.isVisible()
     place.show_view(dataclasses.replace(full, force_on=False))
     assert place.note.fade_in.text() == "Try again"
+
+
+@pytest.mark.parametrize("size", [(928, 560), (1294, 768)])
+def test_a_long_trouble_is_read_whole(place: Any, still: LabView, size: tuple[int, int]) -> None:
+    place.resize(*size)
+    names = ", ".join(f"SpaceMouse of kind {k}" for k in range(14))
+    place.show_view(dataclasses.replace(still, force_on=False, trouble=f"None of these is plugged in: {names}."))
+    settle()
+    note = place.note
+    assert place.tank.rect().contains(note.geometry())
+    assert note.rect().contains(note.words.geometry())
+    assert note.words.height() >= note.words.heightForWidth(note.words.width())
 
 
 def test_what_is_quick_is_not_told(place: Any, still: LabView) -> None:
