@@ -203,11 +203,11 @@ class LabPlace(Place):
         if self.isVisible():
             self.stop_asked.emit()
 
-    def event(self, event: QEvent) -> bool:
+    def changeEvent(self, event: QEvent) -> None:  # noqa: N802 - Qt's name
         """Give the pointer back when the window is left."""
-        if event.type() == QEvent.Type.WindowDeactivate:
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.ActivationChange and not self.isActiveWindow():
             self.tank.let_go()
-        return super().event(event)
 
     def wants_narrow_rail(self) -> bool:
         """Return that it does: parameters, tank and readings stand side by side."""
