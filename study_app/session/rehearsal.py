@@ -275,7 +275,10 @@ class Rehearsal:
             self._poll()
 
     def _advance(self, seconds: float) -> None:
-        self._machine.servo.advance(max(1, round(seconds * self._machine.servo.rate_hz)))
+        """Let the servo take its turns; who ends the program ends them, and without them no time passes."""
+        servo = self._machine.servo
+        if servo.advance(max(1, round(seconds * servo.rate_hz))) == 0 and servo.fault is None:
+            raise SessionError("the rehearsal was ended from outside")
 
     def _do(self, page: TaskPage) -> None:
         """Do a task until its page is left, seeing every frame and feeling every tick."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +13,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from study_app.errors import SessionError, StoreError
+from study_app.haptics.servo import Servo
 from study_app.protocol.model import Reach
 from study_app.protocol.schedule import stream
 from study_app.session import rehearsal
+from study_app.session.feelings import feelings
 from study_app.session.pages import TextPage
 from study_app.session.runner import TankView
 from study_app.session.simulated import Reacher, Senses, choices, reading_s
@@ -190,3 +193,17 @@ def test_a_disk_that_fails_ends_the_rehearsal(tmp_path: Path, monkeypatch: pytes
     monkeypatch.setattr(SessionStore, "append", full)
     with pytest.raises(StoreError, match="no space left"):
         rehearsal.rehearse("demo", participants=1, seed=1, results=tmp_path / "demo")
+
+
+@needs_servo
+def test_a_servo_that_is_ended_from_outside_ends_the_rehearsal(monkeypatch: Any) -> None:
+    turns, advance = count(), Servo.advance
+
+    def ended(self: Servo, ticks: int) -> int:
+        if next(turns) == 50:
+            self._loop.control[0].run = 0  # as a request to terminate does
+        return advance(self, ticks)
+
+    monkeypatch.setattr(Servo, "advance", ended)
+    with pytest.raises(SessionError, match="ended from outside"):
+        feelings(small.protocol(), seed=1, people=1)
