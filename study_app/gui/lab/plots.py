@@ -16,7 +16,7 @@ from study_app.gui.hidden import Hidden
 from study_app.gui.lab.form import HIDDEN
 from study_app.gui.lab.view import SPAN_S, Floats, LabView
 from study_app.gui.labels import label
-from study_app.gui.plots import MINUS, Plot, number, pen
+from study_app.gui.plots import MINUS, Plot, draw_quickly, number, pen
 from study_app.gui.theme import LIGHT, Theme, font
 from study_app.gui.themed import Themed
 
@@ -90,7 +90,7 @@ class Legend(Themed, QWidget):
         painter.setFont(self._font)
         for (style, words), place in zip(self._entries, self._places(), strict=True):
             ink = style.colour(self.theme)
-            painter.setPen(pen(ink, style.width, DASH[style.stroke]))
+            painter.setPen(pen(ink, style.width * self.devicePixelRatioF(), DASH[style.stroke]))
             painter.drawLine(place, place + QPointF(STROKE_WIDTH, 0))
             painter.setPen(QColor(ink if style is LIMIT else self.theme.text2))
             painter.drawText(place + QPointF(STROKE_WIDTH + 6, 4.5), words)
@@ -103,6 +103,8 @@ class CurvePlot(Plot):
         super().__init__()
         self._styles, self._least, self._top, self._peak = styles, least, 0.0, least
         self.curves = [pg.PlotCurveItem(antialias=True) for _ in styles]
+        for curve, style in zip(self.curves, styles, strict=True):
+            draw_quickly(curve, solid=style.stroke == "solid")
         self.limit = pg.InfiniteLine(0.0, angle=0)
         self.limit.setVisible(False)
         for item in (*self.curves, self.limit):
@@ -122,11 +124,10 @@ class CurvePlot(Plot):
 
     def show_curves(self, t_s: Floats, values: tuple[Floats, ...], limit: float | None = None) -> None:
         """Draw ``values``, each (n,), over ``t_s`` (n,), and a limit where there is one."""
-        kept = _thinned(len(t_s))
         peak = max((float(np.nanmax(it)) for it in values if len(it)), default=0.0)
         self._show_top(max(peak, limit or 0.0, self._least))
         for curve, it in zip(self.curves, values, strict=True):
-            curve.setData(t_s[kept], it[kept])
+            curve.setData(*thinned(t_s, it))
         self.limit.setVisible(limit is not None)
         if limit is not None:
             self.limit.setPos(limit)
@@ -135,8 +136,8 @@ class CurvePlot(Plot):
         """Take the colours of ``theme``."""
         super().wear(theme)
         for curve, style in zip(self.curves, self._styles, strict=True):
-            curve.setPen(pen(style.colour(theme), style.width, DASH[style.stroke]))
-        self.limit.setPen(pen(theme.bad, 1.5, DASH["short"]))
+            curve.setPen(self.stroke(style.colour(theme), style.width, DASH[style.stroke]))
+        self.limit.setPen(self.stroke(theme.bad, 1.5, DASH["short"]))
 
     def _show_top(self, peak: float) -> None:
         if SHRINKS_BELOW * self._top <= peak <= self._top:
@@ -226,7 +227,8 @@ def _size(vectors: Floats) -> Floats:
     return np.sqrt(np.einsum("ij,ij->i", vectors, vectors))
 
 
-def _thinned(count: int) -> slice:
-    """Return every so many, the newest among them."""
-    step = max(1, count // POINTS)
-    return slice((count - 1) % step if count else 0, None, step)
+def thinned(t_s: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Return of every so many samples the time of the newest and the largest value: no peak is missed."""
+    step = max(1, len(t_s) // POINTS)
+    first = len(t_s) % step
+    return t_s[first:].reshape(-1, step)[:, -1], values[first:].reshape(-1, step).max(axis=1)

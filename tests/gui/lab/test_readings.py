@@ -11,7 +11,7 @@ import pytest
 from PySide6.QtCore import QRectF
 from PySide6.QtWidgets import QApplication
 
-from study_app.gui.lab.plots import A, B, CurvePlot, _thinned
+from study_app.gui.lab.plots import POINTS, A, B, CurvePlot, thinned
 from study_app.gui.lab.view import CostRow, LabView
 
 
@@ -69,10 +69,22 @@ def test_numbers_of_the_axis_do_not_touch_and_are_inside(plot: CurvePlot, height
 
 
 @pytest.mark.parametrize("count", [0, 1, 7, 240, 241, 2500])
-def test_thinning_keeps_the_newest(count: int) -> None:
-    kept = np.arange(count)[_thinned(count)]
-    assert len(kept) <= 2 * 240
-    assert count == 0 or kept[-1] == count - 1
+def test_thinning_keeps_the_newest_and_every_peak(count: int) -> None:
+    t_s = np.arange(count, dtype=float)
+    for peak in range(max(0, count - 30), count):
+        values = np.zeros(count)
+        values[peak] = 7.0
+        times, kept = thinned(t_s, values)
+        assert len(times) == len(kept) <= 2 * 240
+        assert times[-1] == count - 1
+        assert np.count_nonzero(kept == 7.0) == 1
+
+
+def test_curves_are_as_wide_on_a_dense_screen(plot: CurvePlot, monkeypatch: pytest.MonkeyPatch) -> None:
+    widths = [curve.opts["pen"].widthF() for curve in plot.curves]
+    monkeypatch.setattr(plot, "devicePixelRatioF", lambda: 2.0)
+    plot.wear(plot.theme)
+    assert [curve.opts["pen"].widthF() for curve in plot.curves] == [2 * width for width in widths]
 
 
 def test_both_forces_are_drawn_and_named(place: Any, moved: LabView) -> None:
@@ -80,8 +92,9 @@ def test_both_forces_are_drawn_and_named(place: Any, moved: LabView) -> None:
     assert moved.trace is not None
     (t_b, b), (_t_a, a) = (curve.getData() for curve in place.force.plot.curves)
     assert t_b[-1] == 0
-    assert a[-1] == pytest.approx(np.linalg.norm(moved.trace.force_a_n[-1]))
-    assert b[-1] == pytest.approx(np.linalg.norm(moved.trace.force_b_n[-1]))
+    newest = len(moved.trace.t_s) // POINTS
+    assert a[-1] == pytest.approx(np.linalg.norm(moved.trace.force_a_n[-newest:], axis=1).max())
+    assert b[-1] == pytest.approx(np.linalg.norm(moved.trace.force_b_n[-newest:], axis=1).max())
     assert place.force.legend.accessibleName() == "A, felt now, B, same motion, limit 8 N"
     place.show_view(dataclasses.replace(moved, workbench=moved.workbench.switch()))
     assert place.force.legend.accessibleName() == "A, same motion, B, felt now, limit 8 N"
