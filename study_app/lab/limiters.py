@@ -23,8 +23,8 @@ from study_app.haptics.layout import (
 SPAN_NS: Final = 10_000_000_000
 NOW_NS: Final = 150_000_000
 
-_WORDS: Final = {
-    LIMITER_SLEW: "Slew, 0.5 N a tick",
+WORDS: Final = {
+    LIMITER_SLEW: "Slew",
     LIMITER_FADE: "Fade",
     LIMITER_SLOPE: "Slope",
     LIMITER_NORM: "Force",
@@ -34,6 +34,7 @@ _WORDS: Final = {
     LIMITER_NON_FINITE: "Not a number",
     LIMITER_STOP: "Force stopped",
 }
+"""What people call each limiter, in every window; the order is that of the lab's card."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,17 +57,18 @@ class LimiterCounts:
         if len(samples) == 0:
             return
         newest_ns = int(samples.time_ns[-1])
-        self._batches.append((newest_ns, np.array([np.count_nonzero(samples.limiters & bit) for bit in _WORDS])))
+        self._batches.append((newest_ns, np.array([np.count_nonzero(samples.limiters & bit) for bit in WORDS])))
         while self._batches[0][0] <= newest_ns - SPAN_NS:
             self._batches.popleft()
 
     def told(self, force_limit_n: float) -> tuple[Limiter, ...]:
         """Return every limiter."""
         newest_ns = self._batches[-1][0] if self._batches else 0
-        nothing = np.zeros(len(_WORDS), np.int64)
+        nothing = np.zeros(len(WORDS), np.int64)
         counts = sum((batch for _, batch in self._batches), nothing)
         acting = sum((batch for when, batch in self._batches if when > newest_ns - NOW_NS), nothing)
+        limits = {LIMITER_SLEW: ", 0.5 N a tick", LIMITER_NORM: f", {force_limit_n:g} N"}
         return tuple(
-            Limiter(f"{words}, {force_limit_n:g} N" if bit == LIMITER_NORM else words, int(ticks), bool(now))
-            for (bit, words), ticks, now in zip(_WORDS.items(), counts, acting, strict=True)
+            Limiter(words + limits.get(bit, ""), int(ticks), bool(now))
+            for (bit, words), ticks, now in zip(WORDS.items(), counts, acting, strict=True)
         )

@@ -12,13 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study_app.gui.operator.health import TRACE_STEP_S, TRACE_WINDOW_S
-from study_app.haptics.layout import LIMITER_FADE, LIMITER_NAMES, LIMITER_STOP
+from study_app.haptics.layout import LIMITER_FADE, LIMITER_STOP
+from study_app.lab.limiters import WORDS
 
 Floats = NDArray[np.float64]
 
 STEP_NS = round(TRACE_STEP_S * 1e9)
 ROWS = round(TRACE_WINDOW_S / TRACE_STEP_S) + 2
-BITS = tuple(bit for bit in range(len(LIMITER_NAMES)) if 1 << bit not in {LIMITER_FADE, LIMITER_STOP})
+LIMITERS = tuple(bit for bit in WORDS if bit not in {LIMITER_FADE, LIMITER_STOP})
 """Limiters that are counted: fading in and the stop are no sign of anything, and are said elsewhere."""
 FORCE, SIZE, WAKE = slice(0, 3), 3, 4
 
@@ -48,7 +49,7 @@ class Forces:
         self._written = 0
         self._scene = 0
         self._now_n = self._most_n = 0.0
-        self._limited = np.zeros(len(BITS), np.int64)
+        self._limited = np.zeros(len(LIMITERS), np.int64)
 
     def take(self, samples: Any) -> None:
         """Take new samples, in order (a recarray of ``layout.SAMPLE``)."""
@@ -73,9 +74,7 @@ class Forces:
     def figures(self) -> ForceFigures:
         """Return shares and counts as of now."""
         counted = tuple(
-            (LIMITER_NAMES[bit].replace("_", " "), int(count))
-            for bit, count in zip(BITS, self._limited, strict=True)
-            if count
+            (WORDS[bit].lower(), int(count)) for bit, count in zip(LIMITERS, self._limited, strict=True) if count
         )
         return ForceFigures(self._now_n / self.limit_n, self._most_n / self.limit_n, counted)
 
@@ -104,4 +103,4 @@ class Forces:
         self._most_n = max(self._most_n, float(sizes_n[here].max()))
         acted = limiters[here]
         if acted.any():
-            self._limited += ((acted[:, None] >> np.array(BITS)) & 1).sum(axis=0)
+            self._limited += np.count_nonzero(acted[:, None] & np.array(LIMITERS), axis=0)

@@ -51,7 +51,7 @@ def test_force_wake_share_and_limiters_are_seen(make: Any, world: World) -> None
     assert size_n == pytest.approx(3.0)
     assert card.wake.curve.getData()[1] == pytest.approx(0.5)
     assert rows(bridge)["Force, share of 6 N"] == "50\u2009%, most 50\u2009%"
-    assert rows(bridge)["Limiters acted"] == "norm 7"
+    assert rows(bridge)["Limiters acted"] == "force 7"
     assert bridge.operator.header.blind.word == "Single-blind"
 
 

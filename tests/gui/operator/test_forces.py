@@ -86,11 +86,11 @@ def test_limiters_are_counted_by_tick_in_this_trial_and_those_that_say_nothing_a
     assert forces.figures().limiters == ()
     forces.take(samples(30, first=500, limiters=LIMITER_SLOPE | LIMITER_SLEW))
     forces.take(samples(5, first=530, limiters=LIMITER_NORM | LIMITER_STOP))
-    assert dict(forces.figures().limiters) == {"slope": 30, "norm": 5, "slew": 30}
+    assert dict(forces.figures().limiters) == {"slope": 30, "force": 5, "slew": 30}
     mixed = samples(20, first=535, limiters=LIMITER_NORM)
     mixed.scene[12:] = 2
     forces.take(mixed)
-    assert forces.figures().limiters == (("norm", 8),)
+    assert forces.figures().limiters == (("force", 8),)
 
 
 def test_nothing_felt_has_no_points() -> None:
