@@ -44,7 +44,7 @@ def require() -> None:
         importlib.import_module("pyreadstat")
     except ImportError as error:
         raise AnalysisError(
-            "--sav needs the package 'pyreadstat', which is not installed: pip install 'liquid-study[spss]'"
+            "--sav needs the package 'pyreadstat', which is not installed: pip install pyreadstat"
         ) from error
 
 

@@ -52,7 +52,7 @@ from study_app.store.layout import StudyFolder
 LISTEN_MS: Final = 40
 PATIENCE_S: Final = 0.3
 """What takes longer than this says that it goes on."""
-NO_SAV: Final = "Files for SPSS need the package pyreadstat: pip install 'liquid-study[spss]'"
+NO_SAV: Final = "Files for SPSS need the package pyreadstat: pip install pyreadstat"
 MISTAKE: Final = Trouble(
     "The evaluation was ended by a mistake in the program", "The terminal shows where.", "Look again", "again"
 )

@@ -215,7 +215,7 @@ def test_without_its_library_sav_is_refused_in_one_line_before_anything_is_read(
         return importlib.import_module(name)
 
     monkeypatch.setattr(spss.importlib, "import_module", missing)
-    with pytest.raises(AnalysisError, match=r"--sav needs the package 'pyreadstat'.*liquid-study\[spss\]"):
+    with pytest.raises(AnalysisError, match=r"--sav needs the package 'pyreadstat'.*pip install pyreadstat"):
         export(tmp_path / "nothing", tmp_path / "out", extras=["sav"])
 
 
