@@ -136,6 +136,8 @@ class LiveSession(QObject):
     def end_by_signal(self, number: int) -> None:
         """End because the program is being ended from outside."""
         self.code = 128 + number
+        if self._closed:
+            return
         if self.bridge is not None:
             self.bridge.end_now(f"ended from outside ({signal.Signals(number).name})")
         else:

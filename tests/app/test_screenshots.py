@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from pathlib import Path
 
 import pytest
@@ -35,6 +36,21 @@ def test_a_session_is_held_and_its_cockpit_taken_in_both_themes(qapp, tmp_path, 
     assert Path.cwd() == here
     assert not [window for window in QApplication.topLevelWidgets() if window.isVisible()]
     assert sorted(tmp_path.iterdir()) == sorted(taken)
+
+
+@needs_servo
+def test_a_session_that_cannot_be_taken_is_let_go_of(qapp, tmp_path, monkeypatch):
+    def fails(_held, _name):
+        assert [thread for thread in threading.enumerate() if thread.name == "servo"]
+        raise StudyError("no picture")
+
+    monkeypatch.setattr(session, "TRACED_MS", 0)
+    monkeypatch.setattr(session._Session, "take_cockpit", fails)
+    monkeypatch.setattr("study_app.gui.beginning.MEASURED_S", 0.1)
+    with pytest.raises(StudyError, match="no picture"):
+        screenshots(tmp_path, only="single-blind", tell=lambda _line: None)
+    assert not [window for window in QApplication.topLevelWidgets() if window.isVisible()]
+    assert not [thread for thread in threading.enumerate() if thread.name == "servo"]
 
 
 def test_what_does_not_come_is_named(qapp, tmp_path, monkeypatch):

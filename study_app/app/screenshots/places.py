@@ -19,6 +19,7 @@ WIDE: Final = (1600, 900)
 FELT_MS: Final = 4300
 TESTED_MS: Final = 2500
 PATH: Final = "zigzag"
+KEPT_IN: Final = "~/.config/liquid-study/machine.json"  # in place of a folder that is gone afterwards
 
 
 def take_places(camera: Camera, results: Path, theme: Theme) -> None:
@@ -92,6 +93,7 @@ def _take_machine(camera: Camera, visit: Visit, theme: Theme) -> None:
     visit.window.go("machine")
     camera.take(visit.window, f"machine-{theme.name}", HOME)
     place: Any = visit.window.place("machine")
+    place.show_settings(visit.machine.settings, results="~/results", undo="", kept_in=KEPT_IN)
     place.open_test()
     test = camera.until(lambda: shown(DisplayTest), "the display test")
     test.showNormal()

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import signal
 from pathlib import Path
-from typing import Final
+from typing import Final, Self
 
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
@@ -29,21 +30,22 @@ ANSWERS: Final = (6, 5, 6, None, 3, 7, 2, None, 1)
 
 def take_session(camera: Camera, protocol: Path, results: Path) -> None:
     """Take the pre-flight, every kind of page, and the cockpit of a double-blind study."""
-    _Session(camera, protocol, results).hold()
+    with _Session(camera, protocol, results) as held:
+        held.hold()
 
 
 def take_single_blind(camera: Camera, protocol: Path, results: Path) -> None:
     """Take the cockpit of a study whose operator sees the force."""
-    held = _Session(camera, protocol, results)
-    held.begin(pictures=False)
-    held.to_the_liquids()
-    camera.wait(TRACED_MS)
-    held.take_cockpit("cockpit-single-blind")
-    held.end()
+    with _Session(camera, protocol, results) as held:
+        held.begin(pictures=False)
+        held.to_the_liquids()
+        camera.wait(TRACED_MS)
+        held.take_cockpit("cockpit-single-blind")
+        held.end()
 
 
 class _Session:
-    """One session, gone through page by page."""
+    """One session, gone through page by page; whatever ends it, device and servo are let go of."""
 
     def __init__(self, camera: Camera, protocol: Path, results: Path) -> None:
         chosen = NewSession(
@@ -62,6 +64,13 @@ class _Session:
         self._camera = camera
         self._live = LiveSession(chosen, LIGHT, asks=True)
         self._taken: set[str] = set()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._live.end_by_signal(signal.SIGINT)  # nothing, where it has ended already
+        self._live.wait()
 
     @property
     def _bridge(self) -> SessionBridge:
