@@ -22,6 +22,7 @@ from study_app.errors import DeviceError, StoreError
 from study_app.gui.cards import Icon, Rule
 from study_app.gui.choices import NewSession, draw_seed, study_results
 from study_app.gui.controls import ActionButton, Check, Choice, Number
+from study_app.gui.devices.view import TITLES
 from study_app.gui.home.facts import LANGUAGES, StudyFacts
 from study_app.gui.labels import label, set_ink
 from study_app.gui.screens import screens_shown
@@ -32,13 +33,13 @@ from study_app.store.description import check_study
 from study_app.store.layout import MAX_SESSION, StudyFolder, check_participant, check_unused, suggest_id
 from study_app.store.machine import DEFAULTS, MachineSettings
 
-DEVICE_WORDS = {
-    "mouse": "Mouse (seen, not felt)",
-    "falcon": "Novint Falcon",
-    "spacemouse": "SpaceMouse (seen, not felt)",
-    "scripted": "Scripted hand (moves by itself)",
-    "falcon-emulated": "Emulated Falcon (moves by itself)",
+_NOTES = {
+    "mouse": " (seen, not felt)",
+    "spacemouse": " (seen, not felt)",
+    "scripted": " (moves by itself)",
+    "falcon-emulated": " (moves by itself)",
 }
+DEVICE_WORDS = {name: f"{title}{_NOTES.get(name, '')}" for name, title in TITLES.items()}
 NEEDS_FIRMWARE = "falcon"
 
 

@@ -20,7 +20,7 @@ from study_app.gui.themed import dress
 
 STACKED_BELOW = 1000
 BESIDE = 340
-NO_FILE = "None chosen"
+NO_FILE = "No file chosen"
 
 
 class FirmwareCard(Card):
@@ -72,9 +72,9 @@ class HelpCard(Card):
     def __init__(self) -> None:
         super().__init__("Before the first session", gap=8)
         for words in (
-            "Plug in cable and mains adapter, then Refresh.",
-            "Diagnose … finds, opens, loads, homes and turns it without force, and says what is wrong.",
-            "liquid-study devices calibrate measures how strong it is, with a known weight.",
+            "Plug in cable and mains adapter, then press “Refresh”.",
+            "“Diagnose …” finds, opens, loads, homes and turns it without force, and says what is wrong.",
+            "“liquid-study devices calibrate” measures how strong it is, with a known weight.",
         ):
             line = label(words, "label", "text2", wraps=True)
             line.setFont(font("label", weight=400))

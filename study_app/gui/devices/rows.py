@@ -5,7 +5,7 @@ from __future__ import annotations
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QButtonGroup, QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
-from study_app.gui.cards import Card, Chip, Icon, Rule
+from study_app.gui.cards import Card, Chip, Rule
 from study_app.gui.controls import ActionButton, Radio
 from study_app.gui.devices.view import DeviceShown
 from study_app.gui.labels import label, set_ink
@@ -25,7 +25,6 @@ class DeviceRow(QWidget):
         self.name = shown.name
         self.title: Radio | QLabel = Radio(shown.title) if shown.choosable else label(shown.title, "strong")
         self.title.setFont(font("strong"))
-        self.icon = Icon(shown.icon, "text2", 22)
         self.chip = Chip(small=True)
         self.can = _words("text2")
         self.why = _words("warn")
@@ -39,7 +38,6 @@ class DeviceRow(QWidget):
         if not shown.choosable:
             head.addSpacing(INSET)
         head.addWidget(self.title)
-        head.addWidget(self.icon)
         head.addStretch()
         head.addWidget(self.chip)
         words = QVBoxLayout()

@@ -77,6 +77,7 @@ class RehearsalDialog(QDialog):
         for name, field in (("Simulated participants", self.participants), ("Seed", self.seed)):
             field.setAccessibleName(name)
             one = QVBoxLayout()
+            one.setSpacing(6)
             one.addWidget(label(name, "label", "text2"))
             one.addWidget(field)
             row.addLayout(one, 1)
