@@ -134,6 +134,8 @@ class Visit(QObject):
 
     def end(self) -> None:
         """Let go of what the places hold, and wait for what is under way in other threads: a device may be opening."""
+        if self._home_place is not None:
+            self._home_place.end()
         if self.lab is not None:
             self.lab.end()
         self.devices.wait()

@@ -184,6 +184,11 @@ class HomePlace(Place):
         self._open(dialog)
         dialog.finished.connect(self.show_sessions)
 
+    def end(self) -> None:
+        """Stop a rehearsal that is under way."""
+        for dialog in self.findChildren(RehearsalDialog):
+            dialog.end()
+
     def _open(self, dialog: NewSessionDialog | RehearsalDialog) -> None:
         self.dialog = dialog
         dialog.finished.connect(dialog.deleteLater)

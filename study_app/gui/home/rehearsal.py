@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from PySide6.QtCore import QProcess
+from PySide6.QtCore import QProcess, QTimer
 from PySide6.QtWidgets import QDialog, QHBoxLayout, QProgressBar, QVBoxLayout, QWidget
 
 from study_app.gui.controls import ActionButton, Number
@@ -16,6 +16,7 @@ from study_app.gui.themed import wear
 from study_app.store.layout import rehearsal_folder
 
 MAX_PARTICIPANTS = 200
+PATIENCE_MS = 2000
 ARGUMENTS = ("-m", "study_app", "rehearse")
 
 
@@ -59,12 +60,14 @@ class RehearsalDialog(QDialog):
         self.process = QProcess(self)
         self.process.setProcessChannelMode(QProcess.ProcessChannelMode.MergedChannels)
         self._told = ""
+        self._stopping = False
         self._lay_out()
         wear(self, theme)
         self.start.clicked.connect(self._start)
         self.cancel.clicked.connect(self.reject)
         self.process.readyRead.connect(self._listen)
         self.process.finished.connect(self._finished)
+        self.process.errorOccurred.connect(self._failed)
 
     def _lay_out(self) -> None:
         column = QVBoxLayout(self)
@@ -107,7 +110,16 @@ class RehearsalDialog(QDialog):
         if lines:
             self.said.setText(lines[-1])
 
+    def _failed(self, error: QProcess.ProcessError) -> None:
+        """Say that there was no program to run; whatever else fails ends the process too."""
+        if error == QProcess.ProcessError.FailedToStart:
+            self._told = self.process.errorString()
+            self._finished(-1, QProcess.ExitStatus.CrashExit)
+
     def _finished(self, code: int, _status: QProcess.ExitStatus) -> None:
+        if self._stopping:
+            super().reject()
+            return
         self._listen()
         self.progress.hide()
         if code == 0:
@@ -119,11 +131,20 @@ class RehearsalDialog(QDialog):
         self.cancel.setText("Close")
 
     def reject(self) -> None:
-        """Stop the rehearsal, if it runs, and close."""
-        if self.process.state() != QProcess.ProcessState.NotRunning:
-            self.process.finished.disconnect(self._finished)
+        """Have the rehearsal stop, if it runs, and close once it has."""
+        if self.process.state() == QProcess.ProcessState.NotRunning:
+            super().reject()
+        elif not self._stopping:
+            self._stopping = True
+            self.cancel.setEnabled(False)
+            self.said.setText("Stopping …")
             self.process.terminate()
-            if not self.process.waitForFinished(2000):
+            QTimer.singleShot(PATIENCE_MS, self.process, self.process.kill)
+
+    def end(self) -> None:
+        """Stop the rehearsal and wait for it: the windows are gone."""
+        if self.process.state() != QProcess.ProcessState.NotRunning:
+            self.reject()
+            if not self.process.waitForFinished(PATIENCE_MS):
                 self.process.kill()
-                self.process.waitForFinished(2000)
-        super().reject()
+                self.process.waitForFinished(PATIENCE_MS)

@@ -196,7 +196,7 @@ def test_enter_begins_the_rehearsal_wherever_the_keyboard_is(qtbot, tmp_path, mo
     pressed.setFocus()
     with qtbot.waitSignal(dialog.process.started, timeout=20_000):
         qtbot.keyClick(pressed, Qt.Key.Key_Return)
-    dialog.reject()
+    dialog.end()
     assert dialog.process.state() == QProcess.ProcessState.NotRunning
 
 
@@ -218,9 +218,47 @@ def test_cancelling_a_rehearsal_stops_it(qtbot, tmp_path, monkeypatch):
     monkeypatch.setattr("study_app.gui.home.rehearsal.ARGUMENTS", ("-c", "import time; time.sleep(600)"))
     with qtbot.waitSignal(dialog.process.started, timeout=20_000):
         qtbot.mouseClick(dialog.start, Qt.MouseButton.LeftButton)
-    qtbot.mouseClick(dialog.cancel, Qt.MouseButton.LeftButton)
+    with qtbot.waitSignal(dialog.rejected):
+        qtbot.mouseClick(dialog.cancel, Qt.MouseButton.LeftButton)
+        assert dialog.isVisible()  # and nobody waits
     assert dialog.process.state() == QProcess.ProcessState.NotRunning
     assert not dialog.isVisible()
+
+
+def test_a_rehearsal_that_does_not_listen_is_killed(qtbot, tmp_path, monkeypatch):
+    dialog = RehearsalDialog(study_facts("demo"), tmp_path)
+    qtbot.addWidget(dialog)
+    dialog.open()
+    deaf = (
+        "import signal, time; signal.signal(signal.SIGTERM, signal.SIG_IGN); print('deaf', flush=True); time.sleep(600)"
+    )
+    monkeypatch.setattr("study_app.gui.home.rehearsal.ARGUMENTS", ("-c", deaf))
+    monkeypatch.setattr("study_app.gui.home.rehearsal.PATIENCE_MS", 50)
+    dialog.start.click()
+    qtbot.waitUntil(lambda: dialog.said.text() == "deaf", timeout=20_000)
+    with qtbot.waitSignal(dialog.rejected):
+        dialog.close()
+    assert dialog.process.state() == QProcess.ProcessState.NotRunning
+
+
+def test_a_rehearsal_that_cannot_be_run_says_so(qtbot, tmp_path, monkeypatch):
+    dialog = RehearsalDialog(study_facts("demo"), tmp_path)
+    qtbot.addWidget(dialog)
+    dialog.open()
+    monkeypatch.setattr("study_app.gui.home.rehearsal.sys.executable", str(tmp_path / "nothing"))
+    dialog.start.click()
+    qtbot.waitUntil(lambda: dialog.cancel.text() == "Close")
+    assert dialog.said.text() not in ("", "Rehearsing …")
+
+
+def test_the_end_of_the_program_ends_a_rehearsal(home, qtbot, monkeypatch):
+    monkeypatch.setattr("study_app.gui.home.rehearsal.ARGUMENTS", ("-c", "import time; time.sleep(600)"))
+    home.ask_for_rehearsal(study_facts("demo"))
+    dialog = home.dialog
+    with qtbot.waitSignal(dialog.process.started, timeout=20_000):
+        dialog.start.click()
+    home.end()
+    assert dialog.process.state() == QProcess.ProcessState.NotRunning
 
 
 def test_the_preferred_device_is_shown_as_it_was_found_and_sessions_begin_with_it(home, qtbot):
