@@ -45,6 +45,7 @@ class DevicesDesk(QObject):
         super().__init__()
         self._desk, self._look = desk, look
         self._thread: threading.Thread | None = None
+        self._ended = False
         self.shown: tuple[DeviceShown, ...] = ()
         self.place: DevicesPlace | None = None
         self.dialog: DiagnosisDialog | None = None
@@ -69,15 +70,16 @@ class DevicesDesk(QObject):
 
     def look(self) -> None:
         """Look at the machine, beside the windows."""
-        if self._thread is not None:
+        if self._thread is not None or self._ended:
             return
         if self.place is not None:
             self.place.show_looking(True)
         self._thread = threading.Thread(target=self._see, name="looking for devices", daemon=True)
         self._thread.start()
 
-    def wait(self) -> None:
-        """Wait for a look that is under way."""
+    def end(self) -> None:
+        """Look no more, wait for a look that is under way, and show nothing of it: the windows go."""
+        self._ended = True
         if self._thread is not None:
             self._thread.join(PATIENCE_S)
 
@@ -108,6 +110,8 @@ class DevicesDesk(QObject):
 
     def _end(self, made: object) -> None:
         self._thread = None
+        if self._ended:
+            return
         if self.place is not None:
             self.place.show_looking(False)
         if isinstance(made, Exception):

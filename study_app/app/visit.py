@@ -138,7 +138,7 @@ class Visit(QObject):
             self._home_place.end()
         if self.lab is not None:
             self.lab.end()
-        self.devices.wait()
+        self.devices.end()
         for live in self._called_off:
             live.wait()
 

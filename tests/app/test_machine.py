@@ -11,7 +11,7 @@ from types import SimpleNamespace
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication
-from PySide6.QtWidgets import QMainWindow
+from PySide6.QtWidgets import QApplication, QMainWindow
 
 from study_app.app.devices import DevicesDesk
 from study_app.app.live_session import LiveSession
@@ -139,7 +139,7 @@ def test_a_look_that_fails_is_told(desk, qtbot):
     with qtbot.waitSignal(devices.troubled) as told:
         devices.look()
     assert "no bus" in told.args[1]
-    devices.wait()
+    devices.end()
 
 
 @pytest.fixture
@@ -147,7 +147,8 @@ def visit(qtbot, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     made = Visit()
     qtbot.addWidget(made.window)
-    return made
+    yield made
+    made.end()
 
 
 def test_the_main_window_follows_what_is_set(visit, qtbot, tmp_path):
@@ -267,3 +268,23 @@ def test_a_session_opens_on_the_screen_that_is_set_unless_another_was_chosen(qap
     chosen = NewSession("demo", "P001", 1, 7, "", "en", "mouse", True, None, Path("nowhere"))
     assert LiveSession(chosen, LIGHT)._screens() == 2
     assert LiveSession(replace(chosen, screen=1), LIGHT)._screens() == 1
+
+
+def test_what_is_found_after_the_end_is_not_shown(qtbot, desk):
+    looked, going = threading.Event(), threading.Event()
+
+    def look():
+        going.set()
+        looked.wait(10)
+        return ()
+
+    devices = DevicesDesk(desk, look)
+    found = []
+    devices.looked.connect(found.append)
+    devices.look()
+    assert going.wait(10)
+    looked.set()
+    devices.end()
+    devices.look()  # as a timer may ask that was set before
+    QApplication.processEvents()
+    assert (found, devices._thread) == ([], None)
