@@ -164,24 +164,9 @@ class NewSessionDialog(QDialog):
         change = ActionButton("", "Change …", height=40)
         change.setAutoDefault(False)
         change.clicked.connect(self._choose_folder)
-        verdict = QHBoxLayout()
-        verdict.setSpacing(8)
-        verdict.addWidget(self.verdict_icon, 0, Qt.AlignmentFlag.AlignTop)
-        verdict.addWidget(self.verdict, 1)
         _put(grid, 0, 0, "Participant", self.participant, hint="letters and digits, no name")
         _put(grid, 0, 1, "Session", self.session)
-        self._ways_row = QWidget()
-        ways = QHBoxLayout(self._ways_row)
-        ways.setContentsMargins(26, 0, 0, 0)
-        for way in self.ways:
-            way.setAutoDefault(False)
-            ways.addWidget(way)
-        ways.addStretch()
-        below = QVBoxLayout()
-        below.setSpacing(6)
-        below.addLayout(verdict)
-        below.addWidget(self._ways_row)
-        grid.addLayout(below, 2, 0, 1, 2)
+        grid.addLayout(self._judge(), 2, 0, 1, 2)
         _put(grid, 4, 0, "Seed", _beside(self.seed, another), hint="decides every order; recorded")
         _put(grid, 4, 1, "Operator", self.operator)
         _put(grid, 6, 0, "Language of the participant's pages", self.language)
@@ -193,15 +178,7 @@ class NewSessionDialog(QDialog):
         both.addWidget(self.pilot)
         grid.addLayout(both, 8, 1, 2, 1, Qt.AlignmentFlag.AlignBottom)
         _put(grid, 10, 0, "Results folder of this study", _beside(self.results, change), across=2)
-        find = ActionButton("", "Choose …", height=40)
-        find.setAutoDefault(False)
-        find.clicked.connect(self._choose_firmware)
-        self._firmware_row = QWidget()
-        inside = QGridLayout(self._firmware_row)
-        inside.setContentsMargins(0, 0, 0, 0)
-        inside.setVerticalSpacing(6)
-        hint = "loaded only where it needs it"
-        _put(inside, 1, 0, "Falcon's firmware", _beside(self.firmware, find), hint=hint)
+        self._firmware_row = self._ask_firmware()
         grid.addWidget(self._firmware_row, 12, 0, 1, 2)
         self._firmware_row.setVisible(self._takes_firmware)
         column.addLayout(grid)
@@ -215,6 +192,38 @@ class NewSessionDialog(QDialog):
         foot.addWidget(self.begin)
         column.addSpacing(4)
         column.addLayout(foot)
+
+    def _judge(self) -> QVBoxLayout:
+        """Return the place of the verdict, and below it the ways on where an id is used."""
+        verdict = QHBoxLayout()
+        verdict.setSpacing(8)
+        verdict.addWidget(self.verdict_icon, 0, Qt.AlignmentFlag.AlignTop)
+        verdict.addWidget(self.verdict, 1)
+        self._ways_row = QWidget()
+        ways = QHBoxLayout(self._ways_row)
+        ways.setContentsMargins(26, 0, 0, 0)
+        for way in self.ways:
+            way.setAutoDefault(False)
+            ways.addWidget(way)
+        ways.addStretch()
+        below = QVBoxLayout()
+        below.setSpacing(6)
+        below.addLayout(verdict)
+        below.addWidget(self._ways_row)
+        return below
+
+    def _ask_firmware(self) -> QWidget:
+        """Return the row for a Falcon's firmware."""
+        find = ActionButton("", "Choose …", height=40)
+        find.setAutoDefault(False)
+        find.clicked.connect(self._choose_firmware)
+        row = QWidget()
+        inside = QGridLayout(row)
+        inside.setContentsMargins(0, 0, 0, 0)
+        inside.setVerticalSpacing(6)
+        hint = "loaded only where it needs it"
+        _put(inside, 1, 0, "Falcon's firmware", _beside(self.firmware, find), hint=hint)
+        return row
 
     def _choose_folder(self) -> None:
         chosen = QFileDialog.getExistingDirectory(self, "Results folder of this study", self.results.text())
