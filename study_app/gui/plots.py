@@ -30,6 +30,7 @@ LINE_PX = 16.0  # a line of the plots' texts
 NAME_MARGIN = 1.0  # around names [px]
 NAMES_AFTER_PX = 6.0  # from a curve's end to its name
 HALF_TICK_PX = 24.0  # half of "10 000" under the end of an axis
+DIGIT_PX = 8.5  # a digit of the longest number along an axis, with its share of the gap to the next
 MOST_FOR_NAMES = 0.5  # of that plot's height
 P99_ABOVE = 0.1  # the highest the 99th percentile's line ends above the top grid line [decades]
 NAMES = ("x right", "y up", "z near")
@@ -239,7 +240,6 @@ class LatenessPlot(Plot):
             return
         self._decades = (across, up)
         self._make_room()
-        self.show_ticks("bottom", [(k, number(10.0**k)) for k in range(across + 1)])
         self.show_ticks("left", [(k, number(10.0**k)) for k in range(up + 1)])
 
     def _make_room(self) -> None:
@@ -247,6 +247,8 @@ class LatenessPlot(Plot):
         across, up = self._decades
         beside = min(0.2, HALF_TICK_PX / max(1.0, self.box.width()))  # half of the last tick's text
         self.box.setXRange(-0.02 * across, across * (1 + beside / (1 - beside)), padding=0)
+        apart = 1 if self.box.width() >= DIGIT_PX * (across + 1) * across else 2
+        self.show_ticks("bottom", [(k, number(10.0**k)) for k in range(0, across + 1, apart)])
         line = self.limit_name.textItem.boundingRect().height() + NAME_MARGIN
         share = min(2 * line / max(1.0, self.box.height()), MOST_FOR_NAMES)
         top = (up + P99_ABOVE + 0.3 * share) / (1 - share)
