@@ -13,6 +13,7 @@ from PySide6.QtWidgets import (
     QHBoxLayout,
     QLabel,
     QLineEdit,
+    QScrollArea,
     QVBoxLayout,
     QWidget,
 )
@@ -41,6 +42,7 @@ _NOTES = {
 }
 DEVICE_WORDS = {name: f"{title}{_NOTES.get(name, '')}" for name, title in TITLES.items()}
 NEEDS_FIRMWARE = "falcon"
+FRAME = 60  # of a window, at most
 
 
 class NewSessionDialog(QDialog):
@@ -153,7 +155,9 @@ class NewSessionDialog(QDialog):
         about = f"{self.facts.title}  ·  {self.facts.extent}  ·  {self.facts.duration}"
         column.addWidget(label(about, "body", "text2", wraps=True))
         column.addSpacing(6)
-        grid = QGridLayout()
+        self._inside = QWidget()
+        grid = QGridLayout(self._inside)
+        grid.setContentsMargins(0, 0, 0, 0)
         grid.setHorizontalSpacing(16)
         grid.setVerticalSpacing(6)
         for place in (0, 1):
@@ -181,7 +185,12 @@ class NewSessionDialog(QDialog):
         self._firmware_row = self._ask_firmware()
         grid.addWidget(self._firmware_row, 12, 0, 1, 2)
         self._firmware_row.setVisible(self._takes_firmware)
-        column.addLayout(grid)
+        self._area = QScrollArea()
+        self._area.setWidgetResizable(True)
+        self._area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self._area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self._area.setWidget(self._inside)
+        column.addWidget(self._area, 1)
         column.addSpacing(10)
         column.addWidget(Rule())
         foot = QHBoxLayout()
@@ -192,6 +201,18 @@ class NewSessionDialog(QDialog):
         foot.addWidget(self.begin)
         column.addSpacing(4)
         column.addLayout(foot)
+
+    def _fit(self) -> None:
+        """Be as high as the questions are, but no higher than the screen: then they scroll, and the foot stays."""
+        inside, whole = self._inside.layout(), self.layout()
+        assert inside is not None and whole is not None  # noqa: S101, PT018 - laid out above
+        wide = self.minimumWidth() - whole.contentsMargins().left() - whole.contentsMargins().right()
+        inside.activate()
+        needed = inside.totalHeightForWidth(wide)
+        self._area.setMinimumHeight(0)
+        around = whole.totalMinimumSize().height() - self._area.minimumSizeHint().height()
+        self._area.setMinimumHeight(min(needed, self.screen().availableSize().height() - FRAME - around))
+        self.adjustSize()
 
     def _judge(self) -> QVBoxLayout:
         """Return the place of the verdict, and below it the ways on where an id is used."""
@@ -270,6 +291,7 @@ class NewSessionDialog(QDialog):
             self._say(fault, good=False)
         else:
             self._say(f"{self.participant.text().strip()} is free, session {self.session.value()}", good=True)
+        self._fit()
 
     def _fault(self) -> str:
         """Return why this cannot begin; nothing is touched to find out."""

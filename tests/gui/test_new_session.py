@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QSize, Qt
+from PySide6.QtWidgets import QApplication
 
 from study_app.gui import new_session
 from study_app.gui.choices import MAX_SEED, draw_seed
@@ -214,3 +215,23 @@ def test_enter_presses_the_button_that_has_the_keyboard_and_no_other(dialog, qtb
 def test_enter_in_a_field_begins(dialog, qtbot):
     with qtbot.waitSignal(dialog.accepted):
         qtbot.keyClick(dialog.participant, Qt.Key.Key_Return)
+
+
+def test_the_foot_stays_on_a_small_screen_and_every_question_is_reached(dialog, results, qtbot):
+    class Small:
+        def availableSize(self):  # noqa: N802 - Qt's name
+            return QSize(1024, 640)
+
+    dialog.screen = Small
+    use(results, "P001")
+    dialog.device.setCurrentIndex(dialog.device.findData("falcon"))
+    dialog.participant.setText("P001")
+    dialog.show()
+    QApplication.processEvents()
+    assert dialog.height() <= 640 - 60
+    assert dialog.rect().contains(dialog.begin.mapTo(dialog, dialog.begin.rect().bottomRight()))
+    dialog.seed.setFocus()
+    for _ in range(12):
+        qtbot.keyClick(QApplication.focusWidget(), Qt.Key.Key_Tab)
+        at = QApplication.focusWidget()
+        assert at.visibleRegion().boundingRect() == at.rect()
