@@ -246,8 +246,9 @@ class LatenessPlot(Plot):
         """Keep two lines of text free above the bars: the limit's name stands above that of the 99th percentile."""
         across, up = self._decades
         beside = min(0.2, HALF_TICK_PX / max(1.0, self.box.width()))  # half of the last tick's text
-        self.box.setXRange(-0.02 * across, across * (1 + beside / (1 - beside)), padding=0)
-        apart = 1 if self.box.width() >= DIGIT_PX * (across + 1) * across else 2
+        last = across * (1 + beside / (1 - beside))
+        self.box.setXRange(-0.02 * across, last, padding=0)
+        apart = 1 if self.box.width() >= DIGIT_PX * (across + 1) * (last + 0.02 * across) else 2
         self.show_ticks("bottom", [(k, number(10.0**k)) for k in range(0, across + 1, apart)])
         line = self.limit_name.textItem.boundingRect().height() + NAME_MARGIN
         share = min(2 * line / max(1.0, self.box.height()), MOST_FOR_NAMES)
