@@ -150,6 +150,9 @@ class LabVisit(QObject):
         self._opening.cancel()
         try:
             self._let_go()
+        except StudyError as error:
+            log.warning("the servo did not end as it should: %s", error)
+            self.place.told.emit("The device was not let go of as it should be", f"{error}.")
         finally:
             self._prices.close()
             sys.excepthook = self._hook_before

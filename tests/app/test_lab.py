@@ -123,6 +123,28 @@ def test_entering_opens_and_feels_and_leaving_lets_go_of_everything(felt: LabVis
     assert not felt._frames.isActive()
 
 
+def test_a_servo_that_does_not_end_is_told_of_as_the_place_is_left(
+    felt: LabVisit, prices: Prices, qtbot: Any, monkeypatch: Any, caplog: Any
+) -> None:
+    live = felt.live
+    assert live is not None
+    qtbot.waitUntil(lambda: bool(prices.asked), timeout=SOON_MS)
+    stop = live.servo.stop
+
+    def stuck() -> None:
+        stop()
+        raise ServoFault("the servo is stuck: switch the device off")
+
+    monkeypatch.setattr(live.servo, "stop", stuck)
+    told: list[tuple[str, str]] = []
+    felt.place.told.connect(lambda *words: told.append(words))
+    felt.place.hide()
+    assert [sentence for _, sentence in told] == ["the servo is stuck: switch the device off."]
+    assert prices.closed
+    assert felt.live is None
+    caplog.clear()
+
+
 def test_coming_back_opens_it_again(felt: LabVisit, qtbot: Any) -> None:
     felt.place.hide()
     felt.place.show()
