@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import logging
 import sys
+import traceback
 from collections.abc import Callable
 from functools import wraps
 from types import TracebackType
@@ -171,6 +172,7 @@ class SessionBridge(QObject):
             return
         self.trouble, self.failure = what, error
         log.error("the session broke: %s", what, exc_info=None if isinstance(error, StudyError) else error)
+        traceback.clear_frames(error.__traceback__)  # they may hold a painter, and Qt would paint no window any more
         try:
             if not self.runner.finished:
                 self.runner.post(Broke(self._now(), what))

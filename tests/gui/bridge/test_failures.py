@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pkgutil
 import sys
+import weakref
 
 import pytest
 from PySide6.QtCore import QEvent, Qt, QTimer
@@ -178,5 +179,27 @@ def test_whatever_window_it_happens_in_a_failure_is_zero_force_and_told(
     assert BROKEN in bridge.operator.banner.what.text()
     assert BROKEN in caplog.text
     breaks_here.clear()
+    bridge._hook_before = before
+    caplog.clear()
+
+
+def test_a_painter_that_a_failure_leaves_at_work_is_ended(make, world, qtbot, monkeypatch, caplog):
+    """Else Qt paints no window any more: what failed could not even be read."""
+    left = []
+
+    def broken(_tank, painter, _region):
+        left.append(weakref.ref(painter))
+        raise ValueError(BROKEN)
+
+    bridge = make()
+    before, bridge._hook_before = bridge._hook_before, lambda *_error: None
+    begin_trial(bridge, world)
+    QApplication.processEvents()
+    with monkeypatch.context() as patched:
+        patched.setattr("study_app.gui.scene_view.TankWidget._paint", broken)
+        QTimer.singleShot(0, lambda: paint_tank(bridge))
+        qtbot.waitUntil(lambda: not world.force_is_on)
+    assert [painter() for painter in left] == [None] * len(left)
+    assert left
     bridge._hook_before = before
     caplog.clear()
