@@ -183,6 +183,7 @@ def test_whatever_window_it_happens_in_a_failure_is_zero_force_and_told(
     caplog.clear()
 
 
+@pytest.mark.qt_log_ignore("QBackingStore::endPaint")
 def test_a_painter_that_a_failure_leaves_at_work_is_ended(make, world, qtbot, monkeypatch, caplog):
     """Else Qt paints no window any more: what failed could not even be read."""
     left = []
