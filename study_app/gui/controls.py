@@ -56,6 +56,7 @@ class ActionButton(Themed, PressedByEnter):
         self.setText(text)
         if self._key:
             self.setShortcut(self._key)  # setText clears it
+        self.updateGeometry()  # words that stay ask for no other room, but a sign that comes or goes does
         self.update()
 
     def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name

@@ -244,3 +244,14 @@ def test_the_shape_of_the_window_does_not_tell_whether_the_force_is_hidden(qtbot
         places.append(here)
         window.may_close = True
     assert places[0] == places[1]
+
+
+def test_buttons_have_their_room_again_in_a_window_that_grew(qtbot: Any) -> None:
+    window = OperatorWindow("demo", lateness_limit_s=0.002, reach_m=0.05, pointer=True)
+    qtbot.addWidget(window)
+    window.resize(1024, 640)
+    window.show()
+    qtbot.waitUntil(lambda: window.width() == 1024)
+    window.resize(1600, 900)
+    buttons = (window.buttons.pause, window.buttons.repeat, window.buttons.exclude, window.buttons.end)
+    qtbot.waitUntil(lambda: [button.width() for button in buttons] == [one.sizeHint().width() for one in buttons])
