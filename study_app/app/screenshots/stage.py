@@ -14,7 +14,7 @@ from study_app.store.session import begin
 STUDY: Final = "rek2024"
 PARTICIPANTS: Final = 12
 SEED: Final = 357711
-QUICK: Final = (("min_s", "12"), ("count", "3"), ("dwell_s", "0.8"))
+QUICK: Final = (("min_s", "12"),)
 
 
 def rehearsed(folder: Path) -> Path:
