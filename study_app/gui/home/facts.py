@@ -139,7 +139,7 @@ def held(found: Iterable[SessionFacts], study: str) -> str:
     """Return how many sessions of a study there are: "4 sessions, 3 complete, 1 excluded"."""
     own = [session for session in found if session.study == study and not session.simulated and not session.pilot]
     if not own:
-        return "no session yet"
+        return "no participant yet"
     complete = sum(session.status == "completed" for session in own)
     excluded = sum(session.excluded is not None for session in own)
     return f"{counted(len(own), 'session')}, {complete} complete" + (f", {excluded} excluded" if excluded else "")

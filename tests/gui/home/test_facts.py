@@ -147,7 +147,7 @@ def test_sessions_that_need_care_stand_first_then_the_newest(tmp_path):
 def test_simulated_sessions_are_not_counted_as_held(tmp_path):
     start(tmp_path, "P001", "completed", simulated=True)
     found = sessions(tmp_path, {})
-    assert held(found, "demo") == "no session yet"
+    assert held(found, "demo") == "no participant yet"
     assert found[0].simulated
 
 
@@ -156,7 +156,7 @@ def test_held_sessions_are_counted_with_their_ends(tmp_path):
     start(tmp_path, "P002")
     found = sessions(tmp_path, {})
     assert held(found, "demo") == "2 sessions, 1 complete"
-    assert held(found, "rek2024") == "no session yet"
+    assert held(found, "rek2024") == "no participant yet"
 
 
 def test_a_session_that_is_left_out_says_why(tmp_path):
