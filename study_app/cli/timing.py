@@ -1,8 +1,10 @@
-"""The command that shows how late the servo's turns begin, beside what others do."""
+"""The command that shows how late the servo's turns begin, beside what others do, and how well delays are kept."""
 
 from __future__ import annotations
 
+import os
 import signal
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from study_app.errors import DisplayError
+from study_app.errors import DisplayError, StudyError
 
 if TYPE_CHECKING:
     from study_app.app.timing import WindowsThread
@@ -23,7 +25,12 @@ LOAD = click.Choice(("none", "gui", "gui+cpu"))
 
 @click.command()
 @click.option(
-    "--seconds", type=float, default=10.0, show_default=True, metavar="S", help="How long each loop is timed."
+    "--seconds",
+    type=float,
+    default=10.0,
+    show_default=True,
+    metavar="S",
+    help="How long each loop, or delay, is timed.",
 )
 @click.option(
     "--load", type=LOAD, default="none", show_default=True, help="Paint both windows meanwhile; keep cores busy."
@@ -31,12 +38,21 @@ LOAD = click.Choice(("none", "gui", "gui+cpu"))
 @click.option(
     "--spin", "spin_us", type=float, metavar="US", help="Look at the clock for so long before a deadline [µs]."
 )
+@click.option("--delays", "of_delays", is_flag=True, help="Time the participant's picture instead, delay by delay.")
 @click.option("--to", type=click.Path(path_type=Path), metavar="DIR", help="Folder for tables and figure.")
-def timing(seconds: float, load: LoadName, spin_us: float | None, to: Path | None) -> None:
+def timing(seconds: float, load: LoadName, spin_us: float | None, of_delays: bool, to: Path | None) -> None:
     """Time the servo's turns with every effect on, beside a bare compiled loop, a Python thread and a Qt timer.
 
     All take turns of a quarter second, round about, in each priority class that the system grants. Ctrl+C ends it.
+
+    With --delays a session shows the delays of the thesis' study on screens of 60 and 144 Hz, without load and with it,
+    and its recordings tell how much later than asked for every frame was. No display is needed.
     """
+    if of_delays:
+        if spin_us is not None:
+            raise StudyError("--spin is about the servo's loops: leave it out with --delays")
+        time_delays(seconds, load, to)
+        return
     from study_app.evaluation.output import make_folder
     from study_app.evaluation.timing.files import text, write
     from study_app.evaluation.timing.race import timing as time_loops
@@ -52,6 +68,23 @@ def timing(seconds: float, load: LoadName, spin_us: float | None, to: Path | Non
             ending=ending,
             tell=lambda line: click.echo(line, err=True),
         )
+    click.echo(text(found), nl=False)
+    for written in write(found, to) if to is not None else ():
+        click.echo(written)
+
+
+def time_delays(seconds: float, load: LoadName, to: Path | None) -> None:
+    """Print how well delays are kept; without a display, on none."""
+    from study_app.evaluation.output import make_folder
+    from study_app.evaluation.timing.delays_files import text, write
+
+    if sys.platform == "linux" and not any(map(os.environ.get, ("QT_QPA_PLATFORM", "DISPLAY", "WAYLAND_DISPLAY"))):
+        os.environ["QT_QPA_PLATFORM"] = "offscreen"
+    if to is not None:
+        make_folder(to)
+    from study_app.app.delays import delays
+
+    found = delays(seconds, load, tell=lambda line: click.echo(line, err=True))
     click.echo(text(found), nl=False)
     for written in write(found, to) if to is not None else ():
         click.echo(written)

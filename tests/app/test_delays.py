@@ -1,0 +1,190 @@
+"""Delays as a session keeps them: to the sample in virtual time, and held for real with everything a session has."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QEvent
+from PySide6.QtWidgets import QApplication
+from shiboken6 import isValid
+
+from study_app.app import delays as held
+from study_app.devices.scripted import ScriptedDevice
+from study_app.errors import StudyError
+from study_app.gui.bridge import SessionBridge
+from study_app.gui.operator import OperatorWindow
+from study_app.gui.operator.progress import SessionProgress, stages
+from study_app.gui.operator.view import Session
+from study_app.gui.operator.watch import WatchedJournal
+from study_app.gui.participant import ParticipantWindow
+from study_app.gui.session_parts import Parts
+from study_app.haptics.clock import VirtualClock
+from study_app.haptics.servo import Servo
+from study_app.protocol.load import parse
+from study_app.protocol.schedule import Trial, build_schedule, draw_key, stream
+from study_app.protocol.words import words
+from study_app.session.runner import SETTLED_S
+from tests.compiled import needs_servo
+from tests.session.fakes import FakeJournal
+
+pytestmark = needs_servo
+
+TRIAL_S = 1.0
+ODD_S = (0.0, 0.0503, 0.1, 0.2)
+
+
+class Room:
+    """A session of delays in virtual time: its frames come when a test says so."""
+
+    def __init__(self, servo):
+        self.servo = servo
+        self.protocol = parse(held.study_of_delays(TRIAL_S), "delays.toml")
+        self.schedule = build_schedule(self.protocol, "P001", 1)
+        self.key = draw_key(self.protocol, stream(1, "key").random)
+        self.journal = FakeJournal([])
+        session = Session(
+            protocol=self.protocol,
+            stages=stages(self.protocol, self.schedule),
+            who="Participant P001",
+            expected_s=10.0,
+            answers_of=0,
+            lateness_limit_s=0.002,
+            device_name="Scripted hand",
+            device_kind="simulated",
+            device_rows=(),
+        )
+        parts = Parts(
+            session=session,
+            schedule=self.schedule,
+            key=self.key,
+            language="en",
+            servo=servo,
+            journal=WatchedJournal(self.journal, SessionProgress(self.protocol, self.schedule), self.seconds),
+            clock=self.seconds,
+            aim_m=lambda: (0.0, 0.0, 0.0),
+            recorder=self,
+        )
+        participant = ParticipantWindow(words("en"), clock=self.seconds, windowed=True)
+        operator = OperatorWindow(
+            "delays",
+            lateness_limit_s=0.002,
+            reach_m=0.05,
+            pointer=False,
+            force_limit_n=self.protocol.device.force_limit_n,
+        )
+        for window in (participant, operator):
+            window.show()
+        QApplication.processEvents()
+        self.frames = []
+        self.bridge = SessionBridge(parts, participant, operator)
+        self.bridge.start()
+        self.bridge._frames.stop()
+
+    def seconds(self):
+        return self.servo.now_ns() / 1e9
+
+    # the recorder: keeps the frames of each trial
+
+    def start(self, trial, _attempt, _rate_hz):
+        self.frames.append((trial, []))
+
+    def append(self, samples):
+        pass
+
+    def stop(self):
+        pass
+
+    def frame(self, painted_ns, sample_ns):
+        self.frames[-1][1].append((painted_ns, sample_ns))
+
+    def delay_s(self, trial):
+        (step,) = [step for step in self.schedule.steps if isinstance(step, Trial) and step.number == trial]
+        return self.protocol.delay_s(self.key[step.block][step.code])
+
+
+@pytest.fixture
+def room(qapp, monkeypatch):
+    monkeypatch.setattr(held, "DELAYS_S", ODD_S)
+    device = ScriptedDevice()
+    t_s = np.arange(0, 20, 0.005)
+    device.follow(t_s, np.column_stack((0.03 * np.sin(6 * t_s), 0.02 * np.cos(5 * t_s), 0.02 * np.cos(4 * t_s))))
+    with device, Servo(device, clock=VirtualClock(), elements=2000) as servo:
+        servo.advance(300)  # older than the longest delay
+        made = Room(servo)
+        yield made
+        if isValid(made.bridge):
+            made.bridge._leave()
+        QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+
+
+def test_what_is_drawn_is_of_the_moment_that_was_asked_for_at_every_delay(room):
+    """Frames come at uneven times; each shows the hand where it was, between two samples if need be, and says so."""
+    ticks = [17, 16, 17, 7, 6, 41]
+    samples = []
+    reader = room.servo.telemetry.reader()
+    seen = compared = 0
+    while not room.bridge.runner.finished:
+        room.servo.advance(ticks[seen % len(ticks)])
+        seen += 1
+        samples.append(reader.read())
+        count = len(room.frames[-1][1])
+        room.bridge._frame()
+        trial, frames = room.frames[-1]
+        if len(frames) != count + 1:
+            continue  # the first frame of the next trial comes with the next
+        now_ns, sample_ns = frames[-1]
+        assert now_ns == room.servo.now_ns()
+        assert sample_ns == now_ns - round((room.delay_s(trial) + SETTLED_S) * 1e9)
+        at = np.concatenate([part.time_ns for part in samples])
+        places = np.concatenate([part.position_m for part in samples])
+        if sample_ns < at[0]:
+            continue
+        expected_m = [np.interp(sample_ns, at, places[:, axis]) for axis in range(3)]
+        tank = room.bridge.participant.tank
+        if tank is not None and tank._view.sample_time_ns == sample_ns:
+            assert tank._view.position_m == pytest.approx(expected_m, abs=1e-12)
+            assert tank._ball == tank._placer.place(tuple(tank._view.position_m))
+            compared += 1
+    assert compared > 40 * len(ODD_S)
+    assert {room.delay_s(trial) for trial, _ in room.frames} == set(ODD_S)
+    assert all(len(frames) > 40 for _, frames in room.frames)
+
+
+def test_plots_and_bookkeeping_take_nothing_from_a_frame(room, monkeypatch):
+    """What else a frame's turn does comes after the view was painted, so that it makes no picture older."""
+    order = []
+    lookout, tank = type(room.bridge.lookout), type(room.bridge.participant.tank)
+    for kind, name in ((lookout, "look"), (lookout, "show_traces"), (lookout, "show_forces"), (tank, "show_view")):
+        plain = getattr(kind, name)
+        monkeypatch.setattr(
+            kind, name, lambda self, *given, plain=plain, name=name: (order.append(name), plain(self, *given))[1]
+        )
+    room.bridge.participant.painted.connect(lambda _sample_ns: order.append("painted"))
+    room.servo.advance(17)
+    room.bridge._slack._works[1].done_ns = room.bridge._slack._works[2].done_ns = None
+    monkeypatch.setattr(type(room.bridge._frames), "next_ns", 1 << 62)
+    room.bridge._frame()
+    assert order == ["show_view", "painted", "look", "show_traces", "show_forces"]
+
+
+def test_a_session_of_delays_is_held_and_its_recordings_are_read(qapp, monkeypatch):
+    """The whole of it, for a moment: windows, servo, store; what comes of it is what was asked for, however late."""
+    monkeypatch.setattr(held, "DELAYS_S", (0.0, 0.2))
+    monkeypatch.setattr(held, "VIRTUAL_HZ", (60.0,))
+    lines = []
+    found = held.delays(0.5, "gui", tell=lines.append)
+    assert lines == ["virtual, 60 Hz, the tank alone", "virtual, 60 Hz, beside the cockpit"]
+    assert found.loads == ("none", "gui")
+    for load in found.loads:
+        trials = found.on("virtual, 60 Hz", load)
+        assert [trial.delay_s for trial in trials] == [0.0, 0.2]
+        for trial in trials:
+            assert trial.paced == "by the clock"
+            assert trial.frames > 2
+            assert (trial.errors_ms > 1e3 * SETTLED_S - 0.001).all(), "nothing is drawn before it was settled"
+
+
+@pytest.mark.parametrize("seconds", [0.0, 0.4, 601.0, float("nan")])
+def test_times_that_make_no_sense_are_refused(seconds):
+    with pytest.raises(StudyError, match=r"each delay is shown for 0\.5 to 600 s"):
+        held.delays(seconds, "none")
