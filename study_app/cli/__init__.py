@@ -47,7 +47,23 @@ def commands(context: click.Context) -> None:
         context.exit(app.home())
 
 
-for module in (running, results, report, power, model, accuracy, stability, identify, solver, soak, timing, screenshots, falcon):
+MODULES = (
+    running,
+    results,
+    report,
+    power,
+    model,
+    accuracy,
+    stability,
+    identify,
+    solver,
+    soak,
+    timing,
+    screenshots,
+    falcon,
+)
+
+for module in MODULES:
     for command in vars(module).values():
         if isinstance(command, click.Command):
             commands.add_command(command)
