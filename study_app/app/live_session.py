@@ -66,6 +66,12 @@ def hold(chosen: NewSession, tell: Callable[[str], object] | None) -> int:
     return live.code
 
 
+def load_windows() -> None:
+    """Load what a session's windows are made of, beside the note: it takes a third of a second, and makes no object."""
+    import study_app.app.preflight  # noqa: PLC0415
+    import study_app.gui.session_windows  # noqa: F401, PLC0415
+
+
 class LiveSession(QObject):
     """One session from the operator's choices to the closed journal.
 
@@ -105,11 +111,9 @@ class LiveSession(QObject):
         self._go_on(self._open)
 
     def _open(self) -> None:
-        from study_app.gui.session_windows import who  # noqa: PLC0415 - pyqtgraph: only once it is needed
-
         if self._unread and self._tell is not None:
             self._tell(self._unread)
-        self.note = OpeningWindow(f"Preparing {Path(self.chosen.source).stem}", who(self.chosen), theme=self.theme)
+        self.note = OpeningWindow(f"Preparing {Path(self.chosen.source).stem}", self.chosen.who, theme=self.theme)
         self.note.cancelled.connect(self._cancel)
         place(self.note, self.note.screen(), corner=False)
         self.note.show()
@@ -147,6 +151,7 @@ class LiveSession(QObject):
         """Compile, open, start and measure, in a thread of its own; whatever comes of it goes to ``_begin``."""
         machine: Machine | None = None
         try:
+            load_windows()
             study = load(self.chosen.source)
             machine = open_machine(self.chosen, study, tell=self._said.emit, cancelled=lambda: self._closed)
             made: object = Ready(machine, measured(machine, self.chosen, sleep=self._ending.wait))
@@ -187,10 +192,9 @@ class LiveSession(QObject):
     def _ask(self, made: Ready) -> None:
         """Show the operator what was found; the session begins when that is accepted."""
         from study_app.app.preflight import Preflight  # noqa: PLC0415 - pyqtgraph: only once it is needed
-        from study_app.gui.session_windows import who  # noqa: PLC0415
 
         shown_on, _ = self._screens()
-        asked = Preflight(self.chosen, load(self.chosen.source), made, shown_on, who(self.chosen), self.theme)
+        asked = Preflight(self.chosen, load(self.chosen.source), made, shown_on, self.chosen.who, self.theme)
         asked.started.connect(lambda ready: self._go_on(lambda: self._open_windows(ready)))
         asked.failed.connect(lambda error: self._go_on(lambda: self._open_windows(error)))
         asked.cancelled.connect(self._cancel)

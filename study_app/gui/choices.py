@@ -41,6 +41,12 @@ class NewSession:
     resumes: Path | None = None
     firmware: Path | None = None
 
+    @property
+    def who(self) -> str:
+        """Whose session it is, in the operator's words."""
+        kind = "  ·  pilot" if self.pilot else ""
+        return f"Participant {self.participant}  ·  session {self.session}  ·  seed {self.seed}{kind}"
+
 
 def resumed(
     session_folder: Path,

@@ -98,12 +98,6 @@ def open_windows(
     return bridge
 
 
-def who(chosen: NewSession) -> str:
-    """Return whose session it is, in the operator's words."""
-    kind = "  ·  pilot" if chosen.pilot else ""
-    return f"Participant {chosen.participant}  ·  session {chosen.session}  ·  seed {chosen.seed}{kind}"
-
-
 def _excluder(chosen: NewSession) -> Callable[[int | None, str], None]:
     """Return what leaves the session, or one of its trials, out of the analysis for a reason."""
 
@@ -120,7 +114,7 @@ def _facts(chosen: NewSession, protocol: Protocol, schedule: Schedule, machine: 
     return Session(
         protocol=protocol,
         stages=stages(protocol, schedule),
-        who=who(chosen),
+        who=chosen.who,
         expected_s=expected_duration_s(protocol),
         answers_of=protocol.responses_per_participant(),
         lateness_limit_s=protocol.limits.lateness_ms / 1000,

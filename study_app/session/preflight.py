@@ -7,17 +7,19 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import Literal, TypeAlias
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from study_app.haptics.clock_grants import NO_THREAD, Grant
 from study_app.haptics.limits import refuses
-from study_app.haptics.telemetry import Timing
 from study_app.protocol.describe import expected_duration_s
 from study_app.protocol.model import Protocol
 from study_app.protocol.squares import enrolment
+
+if TYPE_CHECKING:
+    from study_app.haptics.telemetry import Timing  # the compiler: whoever measures has loaded it
 
 Verdict: TypeAlias = Literal["ok", "warning", "failure"]
 
