@@ -11,6 +11,8 @@ from PySide6.QtGui import QScreen
 
 from study_app.devices import kind_of
 from study_app.errors import DeviceError, StoreError
+from study_app.gui.frames import BY_CLOCK, LOCKED
+from study_app.gui.graphics import has_card
 from study_app.gui.screens import describe_screen, screen_shown, screens_shown
 from study_app.gui.settings.place import MachinePlace
 from study_app.gui.theme import DARK, LIGHT, Theme
@@ -57,10 +59,15 @@ def text_scale_on(settings: MachineSettings, screen: QScreen) -> float:
 
 
 def described(settings: MachineSettings, participant: QScreen, operator: QScreen) -> dict[str, Any]:
-    """Return what the receipt says of the screens: what the system tells, and what was measured of the first."""
+    """Return what the receipt says of the screens: what the system tells, and what was measured of the first.
+
+    ``frames`` is what the participant's follow: a screen tells of its swaps where a graphics card draws.
+    """
     shown = screen_shown(participant)
+    frames = {"frames": LOCKED if has_card() else BY_CLOCK}
+    measured = settings.describe(shown.name, shown.width_px, shown.width_mm)
     return {
-        "participant": describe_screen(participant) | settings.describe(shown.name, shown.width_px, shown.width_mm),
+        "participant": describe_screen(participant) | frames | measured,
         "operator": describe_screen(operator),
     }
 

@@ -1,7 +1,8 @@
-"""How soon a window is visible, from the start of the program, with a warm compile cache.
+"""How soon the program answers and shows its windows, with a warm compile cache, and what it loads until then.
 
-Starts ``liquid-study`` (home) and ``liquid-study run`` as a user would, on whatever display there is (without one on
-Qt's offscreen platform), and prints when each window was first painted. Run by itself:
+Starts ``liquid-study --help``, ``liquid-study`` (home) and ``liquid-study run`` as a user would, on what display there
+is (without one on Qt's offscreen platform), and prints when each had answered or was first painted; then the modules
+that took longest to load until then, each without what it loads itself. Markdown, ready for the README. Run by itself:
 
     python tests/benchmarks/startup.py [--runs 5]
 """
@@ -53,35 +54,78 @@ else:
 """
 
 
-def once(kind: str, windows: tuple[str, ...]) -> dict[str, float]:
-    """Start the program once; return the seconds until each window was painted."""
-    environment = dict(os.environ)
-    if not environment.get("DISPLAY") and not environment.get("WAYLAND_DISPLAY"):
-        environment["QT_QPA_PLATFORM"] = "offscreen"
+WINDOWS = {"home": ("MainWindow",), "run": ("OpeningWindow", "OperatorWindow", "ParticipantWindow")}
+BEGIN = "<!-- start-up: printed by python tests/benchmarks/startup.py -->"
+END = "<!-- end of start-up -->"
+LIMITS_S = {"help": 0.3, "MainWindow": 2.0, "OpeningWindow": 2.0}
+NAMES = {
+    "help": "`--help`, printed",
+    "MainWindow": "home window",
+    "OpeningWindow": "`run`: note while all is made ready",
+    "OperatorWindow": "`run`: cockpit (2 s of measuring are in it)",
+    "ParticipantWindow": "`run`: participant's window",
+}
+DEAREST = 10
+
+
+def environment() -> dict[str, str]:
+    """Return the surroundings that the program is started in."""
+    found = dict(os.environ)
+    if not found.get("DISPLAY") and not found.get("WAYLAND_DISPLAY"):
+        found["QT_QPA_PLATFORM"] = "offscreen"
+    return found
+
+
+def once(kind: str, *options: str) -> tuple[dict[str, float], str]:
+    """Start the program once; return the seconds until it had answered or shown each window, and its errors."""
     with tempfile.TemporaryDirectory() as folder:
+        command = [sys.executable, *options]
+        if kind == "help":
+            command += ["-m", "study_app", "--help"]
+        else:
+            command += ["-c", PROBE, kind, ",".join(WINDOWS[kind]), str(Path(folder) / "demo")]
         began = time.time()
-        command = [sys.executable, "-c", PROBE, kind, ",".join(windows), str(Path(folder) / "demo")]
-        done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False, timeout=600)
+        done = subprocess.run(command, capture_output=True, text=True, env=environment(), check=False, timeout=600)
+        ended = time.time()
+    if kind == "help":
+        return {"help": ended - began}, done.stderr
     seen = [line.split() for line in done.stdout.splitlines() if line.startswith("VISIBLE")]
-    if len(seen) != len(windows):
-        sys.exit(f"{kind}: saw {[name for _, name, _ in seen]} of {windows}\n{done.stderr}")
-    return {name: float(at) - began for _, name, at in seen}
+    if len(seen) != len(WINDOWS[kind]):
+        sys.exit(f"{kind}: saw {[name for _, name, _ in seen]} of {WINDOWS[kind]}\n{done.stderr}")
+    return {name: float(at) - began for _, name, at in seen}, done.stderr
+
+
+def dearest(kind: str) -> list[tuple[str, float, float]]:
+    """Return the modules that took longest until the program stood: name, by itself and with what it loads [ms]."""
+    _, said = once(kind, "-X", "importtime")
+    rows = []
+    for line in said.splitlines():
+        words = line.removeprefix("import time:").split("|")
+        if len(words) == 3 and words[0].strip().isdigit():
+            rows.append((words[2].strip(), int(words[0]) / 1e3, int(words[1]) / 1e3))
+    return sorted(rows, key=lambda row: -row[1])[:DEAREST]
 
 
 def main() -> None:
-    """Print a table: the first start (which may compile), then median and slowest of the warm ones."""
+    """Print both tables."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--runs", type=int, default=5)
     runs = parser.parse_args().runs
-    print(f"{'window':<34}{'first':>8}{'median':>9}{'slowest':>9}   seconds from the start of the program")
-    for kind, windows in (
-        ("home", ("MainWindow",)),
-        ("run", ("OpeningWindow", "OperatorWindow", "ParticipantWindow")),
-    ):
-        times = [once(kind, windows) for _ in range(runs + 1)]
-        for name in windows:
-            first, *warm = (seconds[name] for seconds in times)
-            print(f"{kind + ': ' + name:<34}{first:>8.2f}{statistics.median(warm):>9.2f}{max(warm):>9.2f}")
+    print(f"{BEGIN}\n\n| from the start of the program until | median of {runs} | slowest | promised |")
+    print("| --- | --: | --: | --: |")
+    for kind in ("help", *WINDOWS):
+        once(kind)  # the first may compile
+        times = [once(kind)[0] for _ in range(runs)]
+        for name in times[0]:
+            seconds = [one[name] for one in times]
+            limit = f"{LIMITS_S[name]:g} s" if name in LIMITS_S else ""
+            print(f"| {NAMES[name]} | {statistics.median(seconds):.2f} s | {max(seconds):.2f} s | {limit} |")
+    tables = {kind: dearest(kind) for kind in ("help", *WINDOWS)}
+    print(f"\nThe {DEAREST} modules that took longest to load until then, each by itself [ms]:\n")
+    print("| `--help` | home | `run` |\n| --- | --- | --- |")
+    for row in zip(*tables.values(), strict=True):
+        print(f"| {' | '.join(f'`{name}` {alone_ms:.1f}' for name, alone_ms, _ in row)} |")
+    print(f"\n{END}")
 
 
 if __name__ == "__main__":
