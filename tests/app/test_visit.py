@@ -91,10 +91,10 @@ def test_a_session_that_was_not_begun_is_told_so(visit: Visit, monkeypatch: Any,
 
 
 def test_a_mistake_before_the_first_window_leads_home_again(visit: Visit, monkeypatch: Any, capsys: Any) -> None:
-    def broken(_chosen: NewSession) -> str:
+    def broken(*_given: Any, **_named: Any) -> None:
         raise TypeError("nobody is there")
 
-    monkeypatch.setattr("study_app.gui.session_windows.who", broken)
+    monkeypatch.setattr(live_session, "OpeningWindow", broken)
     visit._start(CHOSEN)
     assert visit.window.isVisible()
     assert visit.live is None
