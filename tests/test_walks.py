@@ -218,16 +218,19 @@ class ByMouse(Person):
     def _reached_more(self, page: TaskPage, before: int, ended: Callable[[], bool]) -> bool:
         return self._reached(page) > before or ended()
 
+    def _astray(self) -> int:
+        """Return how far the pointer is from the middle [px]; the program puts it back there from beyond a quarter."""
+        x, y = self._pointer()
+        return abs(x - self._middle.x()) + abs(y - self._middle.y())
+
     def move(self, right_px: int) -> None:
         """Move the mouse, no faster than the pointer is put back into the middle of the tank."""
         strays = min(self._plan.width(), self._plan.height()) // 4
         while right_px:
             step = max(-400, min(400, right_px))
-            x, y = self._pointer()
             self.program.xdotool("mousemove_relative", "--", str(step), "0")
             right_px -= step
-            if abs(x + step - self._middle.x()) + abs(y - self._middle.y()) > strays:
-                wait_for(lambda: self._pointer() == (self._middle.x(), self._middle.y()), "the pointer in the middle")
+            wait_for(lambda: self._astray() <= strays, "the pointer near the middle")
 
     def _pointer(self) -> tuple[int, int]:
         place = dict(

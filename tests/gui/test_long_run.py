@@ -28,7 +28,7 @@ def test_half_an_hour_under_load_drops_nothing_drifts_by_nothing_and_takes_no_me
     assert found.dropped == 0
     assert found.counts.missing == 0
     assert found.counts.drift_ns == 0
-    assert abs(found.growth_bytes) <= FLAT_BYTES
+    assert found.growth_bytes <= FLAT_BYTES  # what other tests left may go meanwhile
     assert windows.frames > 20
 
 
