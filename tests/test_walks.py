@@ -194,6 +194,7 @@ class ByMouse(Person):
         self.click(self.window, *(place_in(self._plan, part) for part in (*cells, widget.button)))
 
     def leave_tank(self) -> None:
+        self._take_focus()
         self.move(80)
         self.move(-80)
         self.program.xdotool("click", "1")
@@ -204,6 +205,7 @@ class ByMouse(Person):
         assert isinstance(task, Reach)
         px_per_m = SHARE_OF_SCREEN * SCREEN_PX / page.workspace_m[1]
         here_m = -page.workspace_m[0] / 2
+        self._take_focus()
         self.move(-round(1.1 * page.workspace_m[0] * px_per_m))
         while not ended():
             reached = self._reached(page)
@@ -211,6 +213,10 @@ class ByMouse(Person):
             self.move(round((x_m - here_m) * px_per_m))
             here_m = x_m
             wait_for(partial(self._reached_more, page, reached, ended), f"a target of trial {page.trial}", 20.0)
+
+    def _take_focus(self) -> None:
+        """Do as a window manager, which there is none here: what was clicked last has the keyboard, and the pointer."""
+        self.program.xdotool("windowfocus", self.window)
 
     def _reached(self, page: TaskPage) -> int:
         return sum(event["trial"] == page.trial for event in self.program.events("target_reached"))
