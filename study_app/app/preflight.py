@@ -11,7 +11,8 @@ from PySide6.QtCore import QObject, QTimer, Signal
 from PySide6.QtGui import QScreen
 
 from study_app.errors import StudyError
-from study_app.evaluation.appraiser import Appraiser, Costs, Errors
+from study_app.evaluation.appraised import Costs, Errors
+from study_app.evaluation.appraiser import Appraiser
 from study_app.gui.beginning import Ready, measured
 from study_app.gui.choices import NewSession
 from study_app.gui.preflight.view import preflight_view

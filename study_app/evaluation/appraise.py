@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from study_app.evaluation import references
-from study_app.evaluation.appraiser import Costs, EffectCost, Errors
+from study_app.evaluation.appraised import Costs, EffectCost, Errors
 from study_app.evaluation.cost import measure
 from study_app.haptics.gate import ORDER, calls_for, resolve
 from study_app.haptics.motion import Motion

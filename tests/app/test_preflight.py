@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QApplication
 from study_app.app import preflight
 from study_app.app.preflight import Appraisal, Preflight
 from study_app.errors import DeviceLost
-from study_app.evaluation.appraiser import Costs, Errors
+from study_app.evaluation.appraised import Costs, Errors
 from study_app.gui.beginning import Ready
 from study_app.gui.choices import NewSession
 from study_app.gui.theme import LIGHT

@@ -14,7 +14,8 @@ if numba.config.DISABLE_JIT:
     pytest.skip("costs are those of compiled code", allow_module_level=True)
 
 from study_app.evaluation import appraise
-from study_app.evaluation.appraiser import Appraiser, Costs, serve
+from study_app.evaluation.appraised import Costs
+from study_app.evaluation.appraiser import Appraiser, serve
 from study_app.haptics.scene import Ewma, Line, Raw
 from study_app.protocol.load import load_scenes
 
