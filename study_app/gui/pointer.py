@@ -105,8 +105,21 @@ class PointerCapture(QObject):
         else:
             self._move(right, -down, 0.0)
         if not self._returning and _apart(place, middle) > min(self._widget.width(), self._widget.height()) // 4:
+            self._bring_back(middle)
+
+    def _bring_back(self, middle: QPoint) -> None:
+        """Put the pointer into the middle, and follow it from there.
+
+        On X11 the answer to the question where it is comes after the jump, and Qt then delivers only the last of all
+        motions, so that the next one is counted from the middle. Elsewhere motions from before may still come: until
+        one is nearer to the middle than to the last place, they are counted from there.
+        """
+        QCursor.setPos(middle)
+        if QGuiApplication.platformName() == "xcb":
+            QCursor.pos()
+            self._last = middle
+        else:
             self._returning = True
-            QCursor.setPos(middle)
 
     def _hold(self, event: QMouseEvent) -> None:
         bit = BUTTONS.get(event.button(), 0)
