@@ -7,10 +7,9 @@ import io
 from pathlib import Path
 from typing import Final
 
-from study_app.evaluation.style import file_bytes
 from study_app.evaluation.timing.delays import BESIDE, Delayed, Shown
 from study_app.evaluation.timing.delays_figure import draw
-from study_app.store.atomic import write_file
+from study_app.evaluation.timing.reported import write_report
 
 BEGIN: Final = "<!-- delays: printed by liquid-study timing --delays --to DIR -->"
 END: Final = "<!-- end of delays -->"
@@ -47,12 +46,8 @@ def write(found: Delayed, to: Path) -> tuple[Path, ...]:
     StoreError
         A file cannot be written.
     """
-    figure = draw(found)
-    contents = {"txt": text(found).encode(), "md": markdown(found).encode(), "csv": csv_text(found).encode()}
-    contents |= {kind: file_bytes(figure, kind, "How well delays are kept") for kind in ("png", "svg")}
-    for kind, content in contents.items():
-        write_file(to / f"delays.{kind}", content)
-    return tuple(to / f"delays.{kind}" for kind in contents)
+    texts = {"txt": text(found), "md": markdown(found), "csv": csv_text(found)}
+    return write_report(to, "delays", texts, draw(found), "How well delays are kept")
 
 
 def text(found: Delayed) -> str:

@@ -7,10 +7,9 @@ import io
 from pathlib import Path
 from typing import Final
 
-from study_app.evaluation.style import file_bytes
 from study_app.evaluation.timing.figure import LOADS, draw
 from study_app.evaluation.timing.found import PERCENTILES, Lane, Timed
-from study_app.store.atomic import write_file
+from study_app.evaluation.timing.reported import write_report
 
 BEGIN: Final = "<!-- timing: printed by liquid-study timing --to DIR -->"
 END: Final = "<!-- end of timing -->"
@@ -56,12 +55,8 @@ def write(found: Timed, to: Path) -> tuple[Path, ...]:
     StoreError
         A file cannot be written.
     """
-    figure = draw(found)
-    contents = {"txt": text(found).encode(), "md": markdown(found).encode(), "csv": csv_text(found).encode()}
-    contents |= {kind: file_bytes(figure, kind, "How late turns begin") for kind in ("png", "svg")}
-    for kind, content in contents.items():
-        write_file(to / f"timing.{kind}", content)
-    return tuple(to / f"timing.{kind}" for kind in contents)
+    texts = {"txt": text(found), "md": markdown(found), "csv": csv_text(found)}
+    return write_report(to, "timing", texts, draw(found), "How late turns begin")
 
 
 def text(found: Timed) -> str:
