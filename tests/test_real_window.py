@@ -21,7 +21,9 @@ from study_app.gui.pages.questionnaire import QuestionnaireWidget
 from study_app.gui.participant import ParticipantWindow
 from study_app.gui.preflight.window import FULL as PREFLIGHT
 from study_app.protocol.files import source_bytes
+from study_app.protocol.load import parse
 from study_app.protocol.words import words
+from study_app.store.resume import check_can_go_on
 from tests.compiled import needs_servo
 from tests.gui.small import ManualClock, questionnaire
 from tests.real_windows import Program, needs_display, virtual_display, wait_for
@@ -68,7 +70,10 @@ def test_a_session_by_keys_and_clicks_from_the_home_window_into_the_csv(display,
     assert {row["code"] for row in rows} < {"L1", "L2", "L3"}
     assert {row["simulated"] for row in rows} == {"false"}
     assert responses(tmp_path) == rows
-    assert program.events("session_ended")[0]["status"] == "aborted"
+    assert program.events("session_ended") == []
+    (folder,) = tmp_path.glob("results/rek2024/data/sub-P042/ses-01")
+    study = source_bytes(str(tmp_path / "protocols" / "rek2024.toml"))
+    check_can_go_on(folder, parse(study, "rek2024"), study)
 
 
 def begin_session(program: Program, qtbot) -> None:

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import numpy as np
 import pandas as pd
 
 from study_app.analysis.decided import Decided
-from study_app.analysis.judging import alone, judged
-from study_app.analysis.measures import Array, by_participant
+from study_app.analysis.failures import Failure, Failures
+from study_app.analysis.judging import FDR, alone, in_family, judged
+from study_app.analysis.measures import Array, medians, presentations
 from study_app.analysis.questions import Block
 from study_app.analysis.results import BlockFound, Tested, Waiting
+from study_app.analysis.statistics.families import false_discovery
 from study_app.analysis.statistics.friedman import DRAWN_UP_TO, friedman
 from study_app.analysis.statistics.global_permutation import global_permutation
 from study_app.analysis.statistics.missing import skillings_mack
@@ -23,7 +25,15 @@ from study_app.analysis.statistics.outcome import DRAWS, FEW, Outcome, told
 from study_app.analysis.statistics.paired import paired
 from study_app.analysis.tables import Study
 
+T = TypeVar("T")
+U = TypeVar("U")
+
 SEALED: Final = "after unblinding: the key is sealed, and this needs to know which setting is which"
+OMNIBUS: Final = "test of settings"
+OVER_ALL: Final = "test over all statements"
+SESSIONS: Final = "comparison of sessions"
+AGAIN: Final = "the same asked with other assumptions"
+
 MANY: Final = DRAWN_UP_TO
 """Above so many participants p of single statements is approximated, and no mixed model is fitted."""
 
@@ -37,7 +47,12 @@ FLOOR: Final = 0.05
 
 @dataclass(frozen=True)
 class Asked:
-    """A block's answers as arrays (participants, settings), settings in their order; NaN where one is missing."""
+    """A block's answers as arrays, settings in their order; NaN where one is missing.
+
+    ``values`` (participants, settings) are the medians of ``single`` answers (participants, settings, presentations);
+    ``sessions`` of the same shape are the sessions in which these were given. ``verdicts_only``: leave out what decides
+    no verdict, for thousands of simulated studies.
+    """
 
     block: Block
     decided: Decided
@@ -45,6 +60,11 @@ class Asked:
     values: Mapping[str, Array]
     seed: int
     each: Callable[[str], object]
+    failures: Failures
+    single: Mapping[str, Array]
+    sessions: Mapping[str, Array]
+    planning: bool = True
+    verdicts_only: bool = False
 
     @property
     def n(self) -> int:
@@ -53,8 +73,13 @@ class Asked:
 
     @property
     def k(self) -> int:
-        """How many settings there are."""
-        return len(self.block.codes)
+        """How many settings there are; conditions of one delay are one."""
+        return len(set(self.block.columns.values()))
+
+    def attempt(self, what: str, compute: Callable[[], T], empty: U) -> tuple[T | U, tuple[Waiting, ...]]:
+        """Return what ``compute`` finds; where it fails ``empty``, and that ``what`` is not there and why."""
+        found = self.failures.attempt(what, compute, block=self.block.id)
+        return (empty, (Waiting(what, found.why),)) if isinstance(found, Failure) else (found, ())
 
     @property
     def draws(self) -> int:
@@ -73,21 +98,60 @@ class Asked:
         return min(MOST_DRAWS, max(usual, math.ceil(members / (FLOOR * self.decided.alpha))))
 
 
-def asked(study: Study, block: Block, seed: int, each: Callable[[str], object]) -> Asked:
+def asked(
+    study: Study, block: Block, seed: int, each: Callable[[str], object], failures: Failures, *, planning: bool = True
+) -> Asked:
     """Collect a block's answers; ``each`` is told every statement that is begun."""
     answers = study.answers(block)
     people = tuple(sorted(map(str, answers["participant"].unique())))
     by_item = dict(iter(answers.groupby("item", sort=False)))
     empty = answers.iloc[:0]
-    values = {
-        item.id: by_participant(by_item.get(item.id, empty), people, block.codes, item.id) for item in block.items
+    given = {
+        item.id: presentations(by_item.get(item.id, empty), people, block.columns, item.id) for item in block.items
     }
-    return Asked(block, study.decided, people, values, seed, each)
+    single = {item: answers_ for item, (answers_, _) in given.items()}
+    sessions = {item: numbers for item, (_, numbers) in given.items()}
+    return of_tables(
+        block, study.decided, people, single, sessions, seed=seed, each=each, failures=failures, planning=planning
+    )
 
 
-def head(study: Study, of: Asked) -> dict[str, Any]:
-    """Return what every block's finding says: settings, statements, counts."""
+def of_tables(
+    block: Block,
+    decided: Decided,
+    people: tuple[str, ...],
+    single: Mapping[str, Array],
+    sessions: Mapping[str, Array] | None = None,
+    *,
+    seed: int = 1,
+    each: Callable[[str], object] = str,
+    failures: Failures | None = None,
+    planning: bool = True,
+    verdicts_only: bool = False,
+) -> Asked:
+    """Return a block's answers from tables of single answers (participants, settings, presentations) of each item.
+
+    Without ``sessions``, arrays of the same shape, all answers are of one session.
+    """
+    return Asked(
+        block,
+        decided,
+        people,
+        {item: medians(answers) for item, answers in single.items()},
+        seed,
+        each,
+        Failures() if failures is None else failures,
+        single,
+        {item: np.ones_like(answers) for item, answers in single.items()} if sessions is None else sessions,
+        planning,
+        verdicts_only,
+    )
+
+
+def head(study: Study | None, of: Asked) -> dict[str, Any]:
+    """Return what every block's finding says: settings, statements, counts; without a study no measures."""
     block = of.block
+    (by_session, absent), failed = of.attempt(SESSIONS, lambda: compared_sessions(of), ((), ()))
     return {
         "id": block.id,
         "title": block.title,
@@ -100,9 +164,65 @@ def head(study: Study, of: Asked) -> dict[str, Any]:
         "labels": block.labels,
         "measures": tuple(
             {str(name): None if pd.isna(value) else value for name, value in row.items()}
-            for row in study.aggregate(block).to_dict("records")
+            for row in ([] if study is None else study.aggregate(block).to_dict("records"))
         ),
+        "presentations": presented(of.single.values()),
+        "replicated_ms": _replicated(block),
+        "sessions": session_numbers(of.sessions.values()),
+        "by_session": by_session,
+        "absent": (*absent, *failed),
     }
+
+
+def presented(single: Iterable[Array]) -> tuple[int, int]:
+    """Return the fewest and the most single answers that a participant gave to one statement on one setting."""
+    counts = np.concatenate([(~np.isnan(values)).sum(axis=2).ravel() for values in single] or [np.zeros(0)])
+    given = counts[counts > 0]
+    return (int(given.min()), int(given.max())) if len(given) else (0, 0)
+
+
+def session_numbers(sessions: Iterable[Array]) -> tuple[int, ...]:
+    """Return the numbers of the sessions in which answers were given."""
+    return tuple(sorted({int(one) for numbers in sessions for one in np.unique(numbers[~np.isnan(numbers)])}))
+
+
+def _replicated(block: Block) -> tuple[float, ...]:
+    """Return the delays that were presented under more than one condition."""
+    if block.kind != "delays" or not block.revealed:
+        return ()
+    columns = list(block.columns.values())
+    return tuple(delay for place, delay in enumerate(block.delays_ms) if columns.count(place) > 1)
+
+
+def compared_sessions(of: Asked) -> tuple[tuple[Tested, ...], tuple[Waiting, ...]]:
+    """Test in every statement whether sessions are answered alike, by the participants who came to all of them.
+
+    A participant's answers in a session are their median over the settings that he or she answered in all sessions.
+    """
+    numbers = session_numbers(of.sessions.values())
+    if len(numbers) < 2:
+        return (), ()
+    outcomes = {}
+    for item in of.block.items:
+        of.each(f"{item.short}, sessions")
+        each = np.stack(
+            [
+                medians(np.where(of.sessions[item.id] == number, of.single[item.id], np.nan))[:, :, None]
+                for number in numbers
+            ],
+            axis=2,
+        )[..., 0]
+        common = np.asarray(~np.isnan(each).any(axis=2))
+        levels = medians(np.where(common[..., None], each, np.nan).transpose(0, 2, 1))
+        outcomes[item.id] = (
+            paired(levels[:, 0], levels[:, 1], alpha=of.decided.alpha)
+            if len(numbers) == 2
+            else friedman(levels, draws=of.draws, seed=of.seed)
+        )
+    ps = in_family(outcomes, of.decided.alpha, f"{of.block.id}: sessions", false_discovery, FDR, primary=False)
+    if all(one.outcome.n == 0 for one in ps):
+        return (), (Waiting(SESSIONS, f"nobody answered the same setting in all of sessions {numbers}"),)
+    return ps, ()
 
 
 def sealed(study: Study, of: Asked) -> BlockFound:
@@ -110,10 +230,10 @@ def sealed(study: Study, of: Asked) -> BlockFound:
     waiting = ["comparison of two settings", "test over all statements", "test of recognition"]
     if of.block.kind == "delays":
         waiting = ["test of a trend (Page)", "lowest delay that shows", "test of equivalence", "detection threshold"]
-    omnibus, absent = compared(of)
-    return BlockFound(
-        **head(study, of), omnibus=omnibus, absent=(*absent, *(Waiting(what, SEALED) for what in waiting))
-    )
+    (omnibus, absent), failed = of.attempt(OMNIBUS, lambda: compared(of), ((), ()))
+    told = head(study, of)
+    absent = (*told.pop("absent"), *absent, *failed, *(Waiting(what, SEALED) for what in waiting))
+    return BlockFound(**told, omnibus=omnibus, absent=absent)
 
 
 def compared(of: Asked) -> tuple[tuple[Tested, ...], tuple[Waiting, ...]]:
@@ -125,13 +245,13 @@ def compared(of: Asked) -> tuple[tuple[Tested, ...], tuple[Waiting, ...]]:
 
 def _omnibus(values: Array, of: Asked) -> Outcome:
     if of.k == 2:
-        return paired(values[:, 0], values[:, 1])
+        return paired(values[:, 0], values[:, 1], alpha=of.decided.alpha)
     return friedman(values, draws=of.draws, seed=of.seed)
 
 
 def over_all(of: Asked) -> Outcome | None:
     """Test once over all statements whether the settings are answered alike."""
-    if of.k < 2:
+    if of.k < 2 or of.verdicts_only:
         return None
     of.each("all statements")
     return global_permutation(np.array(list(of.values.values())), draws=of.draws_over_all, seed=of.seed)
@@ -144,13 +264,18 @@ def asked_again(
 
     ``columns`` (settings, columns) are what the mixed model tests, ``what`` names it.
     """
+    if of.verdicts_only:
+        return (), (), ()
     absent = []
     mixed: tuple[Tested, ...] = ()
     reason = _no_model(of)
     if reason:
         absent.append(Waiting(f"mixed model of {what}", reason))
     else:
-        models = _each(of, lambda values: ordinal(values, columns))
+        models = {}
+        for item in of.block.items:
+            of.each(item.short)
+            models[item.id] = ordinal(of.single[item.id], columns, sessions=of.sessions[item.id])
         mixed = tuple(alone(model, item, of.decided, f"{of.block.id}: mixed model") for item, model in models.items())
     gaps = {item: values for item, values in of.values.items() if np.isnan(values).any()}
     incomplete: tuple[Tested, ...] = ()

@@ -40,7 +40,11 @@ if TYPE_CHECKING:
 
 Tell: TypeAlias = Callable[[Answer], object]
 
-TITLES: Final = {"recognition": "What each liquid was named", "movement": "Reaching over added delay"}
+TITLES: Final = {
+    "recognition": "What each liquid was named",
+    "movement": "Reaching over added delay",
+    "threshold": "When a delay is noticed",
+}
 EVALUATION: Final = 0.7
 """The share of an evaluation in what comes after the first figures; the rest is drawing."""
 
@@ -166,7 +170,7 @@ def _evaluate(study: Study, tell: Tell, stop: Callable[[], bool]) -> None:
         tell(Progress(what, share))
 
     going("testing", 0.0)
-    results = evaluate(study, progress=lambda what, share: going(what, EVALUATION * share))
+    results = evaluate(study, progress=lambda what, share: going(what, EVALUATION * share), planning=False)
     for drawn, picture in enumerate(pictures(study, results, ("svg",)), start=1):
         title = _title(study, picture.name)
         tell(FigureDrawn(picture.name, title, picture.caption, picture.files["svg"]))
@@ -216,7 +220,8 @@ def _write_report(order: WriteReport, tell: Tell, stop: Callable[[], bool]) -> D
         _go_on(stop)
         tell(Progress(what, share))
 
-    return Done(report(order.folder, order.to, progress=going, warn=warnings.append), tuple(warnings))
+    written = report(order.folder, order.to, progress=going, warn=warnings.append, failed=warnings.append)
+    return Done(written, tuple(warnings))
 
 
 def _go_on(stop: Callable[[], bool]) -> None:

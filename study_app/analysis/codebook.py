@@ -9,6 +9,7 @@ from typing import Any
 
 from study_app import __version__
 from study_app.analysis.measures import AGREEMENT, LEVELS, QUARTILES
+from study_app.analysis.questions import Block
 from study_app.analysis.tables import Study
 from study_app.store import blinding
 from study_app.store.columns import MISSING, Column
@@ -17,7 +18,8 @@ from study_app.store.columns import MISSING, Column
 def codebook_bytes(study: Study, files: Mapping[str, Iterable[Column]]) -> bytes:
     """Return the codebook as JSON; ``files`` maps names to their columns."""
     described = {name: [_described(column) for column in columns] for name, columns in files.items()}
-    return f"{json.dumps(_codebook(study, described), indent=2, ensure_ascii=False)}\n".encode()
+    text = json.dumps(_codebook(study, described), indent=2, ensure_ascii=False)
+    return f"{text}\n".encode("utf-8", "backslashreplace")
 
 
 def head(study: Study) -> dict[str, Any]:
@@ -53,6 +55,7 @@ def _codebook(study: Study, files: Mapping[str, Any]) -> dict[str, Any]:
                 "title": block.title,
                 "levels": {str(level): label for level, label in zip(LEVELS, block.labels, strict=True)},
                 "cannot_judge": block.cannot_judge,
+                **_presentations(study, block),
                 "items": [{"id": item.id, "text": item.text, "short": item.short} for item in block.items],
                 "settings": [
                     {
@@ -71,9 +74,27 @@ def _codebook(study: Study, files: Mapping[str, Any]) -> dict[str, Any]:
         "measures": {
             "quartiles": QUARTILES,
             "agree_percent": f"levels {AGREEMENT[0]} to {AGREEMENT[-1]}, of the valid answers",
+            "repeated": "of a participant's repeated answers the median, except where single answers are used: the "
+            "mixed model, the detection threshold, and the counts of levels",
             "counted": "main trials of completed sessions; of a repeated trial the last attempt; nothing excluded",
         },
         "files": files,
+    }
+
+
+def _presentations(study: Study, block: Block) -> dict[str, Any]:
+    """Return how many answers a participant gave to a statement on one setting, and in which sessions."""
+    answers = study.answers(block)
+    given = answers[answers["response"].notna()].assign(column=answers["code"].map(block.columns))
+    counts = given.groupby(["participant", "column", "item"]).size()
+    return {
+        "answers_per_participant_setting_and_item": [int(counts.min()), int(counts.max())] if len(counts) else [0, 0],
+        "sessions": sorted({int(number) for number in given["session"]}),
+        "replicates": [
+            codes
+            for place in sorted(set(block.columns.values()))
+            if len(codes := [code for code, column in block.columns.items() if column == place]) > 1
+        ],
     }
 
 

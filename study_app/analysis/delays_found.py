@@ -2,30 +2,48 @@
 
 from __future__ import annotations
 
-import numpy as np
+from dataclasses import replace
+from functools import lru_cache
+from typing import Final
 
-from study_app.analysis.answered import MANY, Asked, asked_again, head, over_all
+import numpy as np
+from scipy.special import stdtr
+
+from study_app.analysis.answered import AGAIN, MANY, OVER_ALL, Asked, asked_again, head, over_all
 from study_app.analysis.judging import judged
-from study_app.analysis.results import Against, BlockFound, Lowest, Tested, Waiting, p_of_difference
-from study_app.analysis.statistics.equivalence import tost
+from study_app.analysis.measures import Array
+from study_app.analysis.results import Against, BlockFound, Lowest, Tested, Waiting
+from study_app.analysis.statistics.equivalence import SAME, Equivalence, tost
+from study_app.analysis.statistics.equivalence_power import participants_needed
 from study_app.analysis.statistics.families import holm
+from study_app.analysis.statistics.paired import signed, signed_p
 from study_app.analysis.statistics.threshold import Threshold, noticed
 from study_app.analysis.statistics.trend import page, step_down
 from study_app.analysis.tables import Study
 
+TREND: Final = "test of a trend (Page)"
+LOWEST: Final = "lowest delay that shows"
+EQUIVALENCE: Final = "test of equivalence"
+ONE_DELAY: Final = "the block has one delay: there is nothing to compare it with"
+THRESHOLD: Final = "detection threshold"
 
-def delays_found(study: Study, of: Asked) -> BlockFound:
+
+def delays_found(study: Study | None, of: Asked) -> BlockFound:
     """Return the tests of a block of delays whose settings are known, shortest delay first."""
-    delays_ms = [setting.delay_ms or 0.0 for setting in of.block.settings]
-    trends, no_trends = _trends(of)
-    lowest, no_lowest = _lowest(of, trends, delays_ms)
-    against, no_against = _against(of, delays_ms)
-    threshold, no_threshold = _threshold(of, delays_ms)
+    delays_ms = list(of.block.delays_ms)
+    overall, failed = of.attempt(OVER_ALL, lambda: over_all(of), None)
+    (trends, no_trends), failed_trends = of.attempt(TREND, lambda: _trends(of), ((), ()))
+    (lowest, no_lowest), failed_lowest = of.attempt(LOWEST, lambda: _lowest(of, trends, delays_ms), ((), ()))
+    (against, no_against), failed_against = of.attempt(EQUIVALENCE, lambda: _against(of, delays_ms), ((), ()))
+    (threshold, no_threshold), failed_threshold = of.attempt(THRESHOLD, lambda: _threshold(of, delays_ms), (None, ()))
     per_100_ms = np.array(delays_ms)[:, None] / 100
-    mixed, incomplete, not_again = asked_again(of, per_100_ms, "the delay")
+    (mixed, incomplete, not_again), failed_again = of.attempt(
+        AGAIN, lambda: asked_again(of, per_100_ms, "the delay"), ((), (), ())
+    )
+    told = head(study, of)
     return BlockFound(
-        **head(study, of),
-        overall=over_all(of),
+        **{name: value for name, value in told.items() if name != "absent"},
+        overall=overall,
         trends=trends,
         lowest=lowest,
         against=against,
@@ -33,11 +51,17 @@ def delays_found(study: Study, of: Asked) -> BlockFound:
         threshold=threshold,
         mixed=mixed,
         incomplete=incomplete,
-        absent=(*no_trends, *no_lowest, *no_against, *no_threshold, *not_again),
+        absent=(
+            *told["absent"],
+            *(*failed, *failed_trends, *failed_lowest, *failed_against, *failed_threshold, *failed_again),
+            *(*no_trends, *no_lowest, *no_against, *no_threshold, *not_again),
+        ),
     )
 
 
 def _trends(of: Asked) -> tuple[tuple[Tested, ...], tuple[Waiting, ...]]:
+    if of.k < 2:
+        return (), (Waiting(TREND, ONE_DELAY),)
     outcomes = {}
     for item in of.block.items:
         direction = of.decided.direction(item.id)
@@ -47,7 +71,7 @@ def _trends(of: Asked) -> tuple[tuple[Tested, ...], tuple[Waiting, ...]]:
     undirected = [item.short for item in of.block.items if item.id not in outcomes]
     why = f"the protocol does not say whether answers should rise or fall with delay ({', '.join(undirected)})"
     found = judged(outcomes, of.decided, f"{of.block.id}: trend over delay")
-    return found, (Waiting("test of a trend (Page)", why),) if undirected else ()
+    return found, (Waiting(TREND, why),) if undirected else ()
 
 
 def _lowest(
@@ -62,35 +86,74 @@ def _lowest(
         found.append(Lowest(one.item, steps, one.members))
     if trends and not showing:
         why = "no statement shows a trend over all delays; that is not evidence that none is noticed"
-        return (), (Waiting("lowest delay that shows", why),)
+        return (), (Waiting(LOWEST, why),)
     return tuple(found), ()
 
 
 def _against(of: Asked, delays_ms: list[float]) -> tuple[tuple[Against, ...], tuple[Waiting, ...]]:
     """Compare every delay with the shortest one, by the bound that was decided."""
     bound = of.decided.equivalence_bound
+    if of.k < 2:
+        return (), (Waiting(EQUIVALENCE, ONE_DELAY),)
     if bound is None:
         why = "the protocol decided no bound of equivalence, and one chosen now would be chosen by the answers"
-        return (), (Waiting("test of equivalence", why),)
+        return (), (Waiting(EQUIVALENCE, why),)
     found = []
     for item in of.block.items:
         of.each(item.short)
         values = of.values[item.id]
         for place, delay_ms in enumerate(delays_ms[1:], start=1):
             differences = values[:, place] - values[:, 0]
-            tested = tost(differences, bound, alpha=of.decided.alpha, seed=of.seed, checks=of.n <= MANY)
+            tested = _tost(of, differences, bound)
+            if of.planning:
+                tested = replace(tested, n_needed=participants_needed(differences, bound, of.decided.alpha))
             found.append((item.id, delay_ms, tested))
-    adjusted = holm([p_of_difference(tested) for _, _, tested in found])
+    adjusted = holm([tested.p_difference for _, _, tested in found])
     return tuple(
-        Against(item, delay_ms, delays_ms[0], tested, p, len(found), of.decided.direction(item))
+        Against(item, delay_ms, delays_ms[0], tested.judged(p, len(found)), p, len(found), of.decided.direction(item))
         for (item, delay_ms, tested), p in zip(found, adjusted, strict=True)
     ), ()
+
+
+def _tost(of: Asked, differences: Array, bound: float) -> Equivalence:
+    """Compare one delay with the shortest; where verdicts alone are asked for, only as far as they need it."""
+    not_equal = _not_equivalent(differences, bound, of.decided.alpha) if of.verdicts_only else None
+    if not_equal is not None:
+        return not_equal
+    return tost(differences, bound, alpha=of.decided.alpha, seed=of.seed, checks=of.n <= MANY)
+
+
+def _not_equivalent(differences: Array, bound: float, alpha: float) -> Equivalence | None:
+    """Return a comparison that the t tests do not show to be equivalent, without what its verdict does not need.
+
+    None where it may be equivalent: all tests are then needed.
+    """
+    n, sd = len(differences), float(np.std(differences, ddof=1)) if len(differences) > 1 else 0.0
+    if np.isnan(differences).any() or sd <= SAME:
+        return None
+    mean, error = float(differences.mean()), sd / np.sqrt(n)
+    p = float(stdtr(n - 1, (abs(mean) - bound) / error))
+    p_different = 2 * float(stdtr(n - 1, -abs(mean) / error))
+    if p <= alpha:
+        return None
+    by_ranks = None
+    if p_different <= alpha:
+        ranks, signs = signed(differences)
+        by_ranks, _, _ = signed_p(ranks, int(ranks[signs > 0].sum()), "two-sided")
+    found = _of_size(n, bound, alpha)
+    return replace(found, effect=mean, sd=sd, p=p, p_different=p_different, p_different_ranks=by_ranks)
+
+
+@lru_cache(maxsize=64)
+def _of_size(n: int, bound: float, alpha: float) -> Equivalence:
+    """Return a comparison of so many participants whose numbers are to be replaced."""
+    return replace(tost(np.arange(n) * bound, bound, alpha=alpha, checks=False), interval=None, beyond=None)
 
 
 def _up_to(against: tuple[Against, ...]) -> dict[str, float | None]:
     """Return the longest delay up to which all are equivalent, by statement: a fixed order, so nothing is corrected.
 
-    Equivalent counts only where the tests without normality agree.
+    Equivalent is only what every test shows.
     """
     found: dict[str, float | None] = {}
     stopped = set()
@@ -106,6 +169,6 @@ def _up_to(against: tuple[Against, ...]) -> dict[str, float | None]:
 def _threshold(of: Asked, delays_ms: list[float]) -> tuple[Threshold | None, tuple[Waiting, ...]]:
     item = of.decided.noticed
     if item is None or item not in of.values:
-        return None, (Waiting("detection threshold", "the protocol names no statement that asks for it"),)
+        return None, (Waiting(THRESHOLD, "the protocol names no statement that asks for it"),)
     of.each("detection threshold")
-    return noticed(of.values[item], delays_ms), ()
+    return noticed(of.single[item], delays_ms, seed=of.seed), ()

@@ -6,13 +6,14 @@ from collections.abc import Callable
 from functools import partial
 from typing import Final, TypeAlias
 
-from study_app.analysis.answered import asked, sealed
+from study_app.analysis.answered import Asked, asked, sealed
 from study_app.analysis.conduct import delivered, orders
 from study_app.analysis.delays_found import delays_found
+from study_app.analysis.failures import Ended, Failure, Failures
 from study_app.analysis.liquids_found import liquids_found
 from study_app.analysis.performance import Performance, performance
 from study_app.analysis.questions import Block
-from study_app.analysis.results import BlockFound, Results
+from study_app.analysis.results import BlockFound, Results, Waiting
 from study_app.analysis.tables import Study
 
 Progress: TypeAlias = Callable[[str, float], object]
@@ -26,24 +27,49 @@ def silent(_what: str, _share: float) -> None:
     """Tell nobody."""
 
 
-def evaluate(study: Study, *, seed: int = SEED, progress: Progress = silent) -> Results:
+def evaluate(study: Study, *, seed: int = SEED, progress: Progress = silent, planning: bool = True) -> Results:
     """Test everything that the answers and recordings of a study can answer.
 
     While the key is sealed only counts and comparisons of codes are there; ``BlockFound.absent`` says what waits, and
-    what so few participants could not show.
+    what so few participants could not show. A part that fails is in ``Results.failures`` and, with the reason, in its
+    block's ``absent``; everything else is there. ``planning``: whether to
+    compute how many participants each comparison would need, which is most of the work.
     """
+    failures = Failures()
+    try:
+        return _evaluated(study, seed, failures, partial(_ending, progress), planning=planning)
+    except Ended as ended:
+        raise ended.error from None
+
+
+def _ending(progress: Progress, what: str, share: float) -> None:
+    """Tell of progress; what that raises ends the evaluation."""
+    try:
+        progress(what, share)
+    except BaseException as error:
+        raise Ended(error) from error
+
+
+def _evaluated(study: Study, seed: int, failures: Failures, progress: Progress, *, planning: bool) -> Results:
     blocks = []
     for number, block in enumerate(study.blocks):
         each = partial(_testing, progress, 0.5 * number / len(study.blocks))
-        blocks.append(_block(study, block, seed, each))
+        found = failures.attempt(
+            "all tests", partial(_block, study, block, seed, each, failures, planning=planning), block=block.id
+        )
+        blocks.append(_without_tests(block, found) if isinstance(found, Failure) else found)
+    shown = failures.attempt("the delays as they were shown", lambda: delivered(study))
+    run = failures.attempt("the orders as run", lambda: orders(study))
+    moved = failures.attempt("motion and force", lambda: _performance(study, progress))
     return Results(
         decided=study.decided,
         people=study.people,
         blocks=tuple(blocks),
-        delivered=delivered(study),
-        orders=orders(study),
-        performance=_performance(study, progress),
+        delivered=() if isinstance(shown, Failure) else shown,
+        orders={} if isinstance(run, Failure) else run,
+        performance=None if isinstance(moved, Failure) else moved,
         seed=seed,
+        failures=tuple(failures.found),
     )
 
 
@@ -51,11 +77,33 @@ def _testing(progress: Progress, share: float, what: str) -> None:
     progress(f"testing: {what}", share)
 
 
-def _block(study: Study, block: Block, seed: int, each: Callable[[str], object]) -> BlockFound:
-    of = asked(study, block, seed, each)
-    if not block.revealed:
-        return sealed(study, of)
-    return delays_found(study, of) if block.kind == "delays" else liquids_found(study, of)
+def _block(
+    study: Study, block: Block, seed: int, each: Callable[[str], object], failures: Failures, *, planning: bool
+) -> BlockFound:
+    of = asked(study, block, seed, each, failures, planning=planning)
+    return found_in(study, of) if block.revealed else sealed(study, of)
+
+
+def found_in(study: Study | None, of: Asked) -> BlockFound:
+    """Test everything that a block's answers can answer, its settings being known; without a study no measures."""
+    return delays_found(study, of) if of.block.kind == "delays" else liquids_found(study, of)
+
+
+def _without_tests(block: Block, failure: Failure) -> BlockFound:
+    """Return a block of which nothing could be computed."""
+    return BlockFound(
+        id=block.id,
+        title=block.title,
+        kind=block.kind,
+        revealed=block.revealed,
+        n=0,
+        settings=block.settings,
+        names=tuple(block.name(setting) for setting in block.settings),
+        items=block.items,
+        labels=block.labels,
+        measures=(),
+        absent=(Waiting(failure.what, failure.why),),
+    )
 
 
 def _performance(study: Study, progress: Progress) -> Performance | None:

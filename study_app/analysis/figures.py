@@ -70,13 +70,13 @@ def delays(
     answers = study.answers(block)
     people = sorted(answers["participant"].unique())
     plots = [
-        multiples.Plot(item.short, by_participant(answers, people, block.codes, item.id), lowest.get(item.id))
+        multiples.Plot(item.short, by_participant(answers, people, block.columns, item.id), lowest.get(item.id))
         for item in block.items
     ]
     return multiples.draw(
         plots,
         block.codes,
-        [setting.delay_ms or 0.0 for setting in block.settings] if block.revealed else None,
+        block.delays_ms if block.revealed else None,
         title=captions.title(block),
         marks=marks(study),
         counts=captions.counts(study, block),

@@ -38,15 +38,16 @@ def in_family(
     correct: Correct,
     correction: str,
     *,
-    primary: bool,
+    primary: bool | Sequence[bool],
 ) -> tuple[Tested, ...]:
-    """Return tests that are corrected together."""
+    """Return tests that are corrected together; ``primary``: all of them, or for each whether it is."""
+    of_primary = [primary] * len(outcomes) if isinstance(primary, bool) else primary
     ps = [outcome.p for outcome in outcomes.values()]
     found = []
     for place, ((item, outcome), p) in enumerate(zip(outcomes.items(), correct(ps), strict=True)):
         least = correct([*ps[:place], outcome.smallest_p, *ps[place + 1 :]])[place]
-        said = verdict(p, least, alpha, primary=primary)
-        found.append(Tested(item, outcome, family, len(ps), correction, p, primary, said))
+        said = verdict(p, least, alpha, primary=of_primary[place])
+        found.append(Tested(item, outcome, family, len(ps), correction, p, of_primary[place], said))
     return tuple(found)
 
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import combinations
+from typing import Final
 
 import numpy as np
 
-from study_app.analysis.answered import Asked, asked_again, compared, head, over_all
+from study_app.analysis.answered import AGAIN, OMNIBUS, OVER_ALL, Asked, asked_again, compared, head, over_all
 from study_app.analysis.judging import HOLM, in_family, verdict
 from study_app.analysis.results import BlockFound, Named, Pair, Tested, Waiting
 from study_app.analysis.statistics.families import holm
@@ -16,27 +17,38 @@ from study_app.analysis.statistics.paired import paired
 from study_app.analysis.statistics.recognition import MOST, named, recognition
 from study_app.analysis.tables import Study
 
+PAIRS: Final = "comparison of two settings"
+RECOGNITION: Final = "test of recognition"
 
-def liquids_found(study: Study, of: Asked) -> BlockFound:
+
+def liquids_found(study: Study | None, of: Asked) -> BlockFound:
     """Return the tests of a block of liquids whose settings are known."""
-    omnibus, no_omnibus = compared(of)
-    pairs, no_pairs = _pairs(of, omnibus)
-    recognised, no_names = _recognised(of)
-    mixed, incomplete, not_again = asked_again(of, None, "the settings")
+    overall, failed = of.attempt(OVER_ALL, lambda: over_all(of), None)
+    (omnibus, no_omnibus), failed_omnibus = of.attempt(OMNIBUS, lambda: compared(of), ((), ()))
+    (pairs, no_pairs), failed_pairs = of.attempt(PAIRS, lambda: pairs_of(of, omnibus), ((), ()))
+    (recognised, no_names), failed_names = of.attempt(RECOGNITION, lambda: _recognised(of), (None, ()))
+    (mixed, incomplete, not_again), failed_again = of.attempt(
+        AGAIN, lambda: asked_again(of, None, "the settings"), ((), (), ())
+    )
+    told = head(study, of)
     return BlockFound(
-        **head(study, of),
-        overall=over_all(of),
+        **{name: value for name, value in told.items() if name != "absent"},
+        overall=overall,
         omnibus=omnibus,
         pairs=pairs,
         named=recognised,
         mixed=mixed,
         incomplete=incomplete,
-        absent=(*no_omnibus, *no_pairs, *no_names, *not_again),
+        absent=(
+            *told["absent"],
+            *(*failed, *failed_omnibus, *failed_pairs, *failed_names, *failed_again),
+            *(*no_omnibus, *no_pairs, *no_names, *not_again),
+        ),
     )
 
 
-def _pairs(of: Asked, omnibus: tuple[Tested, ...]) -> tuple[tuple[Pair, ...], tuple[Waiting, ...]]:
-    """Compare settings two by two, in the statements that differ at all."""
+def pairs_of(of: Asked, omnibus: tuple[Tested, ...]) -> tuple[tuple[Pair, ...], tuple[Waiting, ...]]:
+    """Return the comparisons of settings two by two, in the statements that differ at all, and why there are none."""
     count = of.k * (of.k - 1) // 2
     if of.k < 3:
         return (), ()
@@ -47,32 +59,35 @@ def _pairs(of: Asked, omnibus: tuple[Tested, ...]) -> tuple[tuple[Pair, ...], tu
             f"{told(of.n)} cannot show it: the smallest p that {told(of.n, 'pair')} can give is {smallest:.4g}, after "
             f"Holm's correction over {count} pairs {corrected:.4g}, which is above {of.decided.alpha:g}"
         )
-        return (), (Waiting("comparison of two settings", why),)
+        return (), (Waiting(PAIRS, why),)
     differing = [one.item for one in omnibus if one.verdict in ("shown", "suggested")]
     if not differing:
-        return (), (Waiting("comparison of two settings", "no statement tells the settings apart as a whole"),)
-    return tuple(pair for item in differing for pair in _of_item(of, item)), ()
+        return (), (Waiting(PAIRS, "no statement tells the settings apart as a whole"),)
+    return _over_all_pairs(of, differing), ()
 
 
-def _of_item(of: Asked, item: str) -> list[Pair]:
-    places = list(combinations(range(of.k), 2))
-    values = of.values[item]
-    outcomes: dict[str, Outcome] = {
-        f"{first},{second}": paired(values[:, first], values[:, second]) for first, second in places
-    }
-    judged = in_family(
-        outcomes,
-        of.decided.alpha,
-        f"{of.block.id}: pairs within {item}",
-        holm,
-        HOLM,
-        primary=of.decided.is_primary(item),
-    )
+def _over_all_pairs(of: Asked, items: list[str]) -> tuple[Pair, ...]:
+    """Compare the settings two by two in the statements ``items``, all pairs of all of them in one Holm family.
+
+    Where one liquid differs from all others, every statement is opened, and each holds pairs that do not differ.
+    """
     codes = of.block.codes
-    return [
+    compared = {
+        f"{item} {first} {second}": (item, first, second)
+        for item in items
+        for first, second in combinations(range(of.k), 2)
+    }
+    outcomes: dict[str, Outcome] = {
+        name: paired(of.values[item][:, first], of.values[item][:, second], alpha=of.decided.alpha)
+        for name, (item, first, second) in compared.items()
+    }
+    family = f"{of.block.id}: all pairs of settings"
+    primary = [of.decided.is_primary(item) for item, _, _ in compared.values()]
+    judged = in_family(outcomes, of.decided.alpha, family, holm, HOLM, primary=primary)
+    return tuple(
         Pair(codes[first], codes[second], replace(one, item=item))
-        for (first, second), one in zip(places, judged, strict=True)
-    ]
+        for (item, first, second), one in zip(compared.values(), judged, strict=True)
+    )
 
 
 def _recognised(of: Asked) -> tuple[Named | None, tuple[Waiting, ...]]:
@@ -80,9 +95,9 @@ def _recognised(of: Asked) -> tuple[Named | None, tuple[Waiting, ...]]:
     labels = of.decided.names
     right = tuple(setting.label for setting in of.block.settings)
     if not of.decided.named_in(of.block) or not any(right):
-        return None, (Waiting("test of recognition", "the protocol does not say which statements name these liquids"),)
+        return None, (Waiting(RECOGNITION, "the protocol does not say which statements name these liquids"),)
     if not 2 <= of.k <= MOST or len(labels) < 2:
-        return None, (Waiting("test of recognition", f"it needs 2 to {MOST} settings and two names"),)
+        return None, (Waiting(RECOGNITION, f"it needs 2 to {MOST} settings and two names"),)
     ratings = np.stack([of.values[label] for label in labels], axis=2)
     truth = [None if label is None else labels.index(label) for label in right]
     found = recognition(named(ratings), truth, len(labels), seed=of.seed)

@@ -107,22 +107,51 @@ def quartiles(values: Array) -> tuple[float, float, float]:
     return float(q1), float(median), float(q3)
 
 
-def by_participant(answers: pd.DataFrame, participants: Sequence[str], codes: Sequence[str], item: str) -> Array:
+def presentations(
+    answers: pd.DataFrame, participants: Sequence[str], columns: Mapping[str, int], item: str
+) -> tuple[Array, Array]:
+    """Return every single answer to a statement, and the session it was given in.
+
+    Parameters
+    ----------
+    columns : mapping of str to int
+        The column of each code; codes of one column are presentations of one setting.
+
+    Returns
+    -------
+    (participants, settings, presentations) array, array of the same shape
+        In the order of sessions and trials, NaN where there is none.
+    """
+    chosen = answers[(answers["item"] == item) & answers["response"].notna()]
+    order = [name for name in ("session", "trial") if name in chosen]
+    chosen = chosen.sort_values(order, kind="stable") if order else chosen
+    rows = {participant: row for row, participant in enumerate(participants)}
+    people = np.array([rows[str(one)] for one in chosen["participant"]], dtype=np.int64)
+    places = np.array([columns[str(one)] for one in chosen["code"]], dtype=np.int64)
+    settings = len(set(columns.values()))
+    number = chosen.groupby([people, places]).cumcount().to_numpy() if len(chosen) else people
+    shape = (len(participants), settings, int(number.max()) + 1 if len(number) else 1)
+    values, sessions = np.full(shape, np.nan), np.full(shape, np.nan)
+    values[people, places, number] = chosen["response"].to_numpy(dtype=float)
+    sessions[people, places, number] = chosen["session"].to_numpy(dtype=float) if "session" in chosen else 1.0
+    return values, sessions
+
+
+def medians(values: Array) -> Array:
+    """Return the medians (participants, settings) of (participants, settings, presentations), NaN where none is."""
+    there = ~np.isnan(values)
+    found = np.full(values.shape[:2], np.nan)
+    some = there.any(axis=2)
+    found[some] = np.nanmedian(values[some], axis=1)
+    return found
+
+
+def by_participant(answers: pd.DataFrame, participants: Sequence[str], columns: Mapping[str, int], item: str) -> Array:
     """Return one value per participant and setting for a statement: the median over repeated presentations.
 
     Returns
     -------
-    (participants, codes) array
-        NaN where a participant gave no valid answer.
+    (participants, settings) array
+        NaN where a participant gave no valid answer. ``columns`` as in :func:`presentations`.
     """
-    chosen = answers[(answers["item"] == item) & answers["response"].notna()]
-    values = np.full((len(participants), len(codes)), np.nan)
-    rows = {participant: row for row, participant in enumerate(participants)}
-    columns = {code: column for column, code in enumerate(codes)}
-    places = [
-        np.array([rows[str(one)] for one in chosen["participant"]], dtype=np.int64),
-        np.array([columns[str(one)] for one in chosen["code"]], dtype=np.int64),
-    ]
-    medians = pd.Series(chosen["response"].to_numpy(dtype=float)).groupby(places).median()
-    values[medians.index.get_level_values(0), medians.index.get_level_values(1)] = medians.to_numpy()
-    return values
+    return medians(presentations(answers, participants, columns, item)[0])

@@ -19,8 +19,11 @@ def write_files(to: Path, files: Mapping[str, bytes]) -> tuple[Path, ...]:
     Raises
     ------
     AnalysisError
-        The folder cannot be written; it is as before.
+        The folder cannot be written, or a file would lie outside of it; it is as before.
     """
+    for name in files:
+        if not (to / name).resolve().is_relative_to(to.resolve()):
+            raise AnalysisError(f"{name!r} would be written outside of {to}: nothing was written")
     token = secrets.token_hex(4)
     staged = {name: (to / name).with_name(f".{Path(name).name}.{token}.tmp") for name in files}
     within = sorted({folder for path in staged.values() for folder in (path.parent, *path.parent.parents)})

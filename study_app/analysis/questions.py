@@ -8,14 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final, Literal, TypeAlias
+from typing import Any, Final, TypeAlias
 
+from study_app.protocol.blocks import Compared
 from study_app.store.blinding import Key
 
-Kind: TypeAlias = Literal["liquids", "delays"]
+Kind: TypeAlias = Compared
 
 DELAY_PREFIX: Final = "D"
-"""Codes of delay settings are D1, D2 …: what tells a block of delays while the conditions are sealed."""
+"""Codes of delay settings are D1, D2 …: what tells a block of delays in sealed receipts of earlier versions."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,8 +46,8 @@ class Setting:
 class Block:
     """A main block with a questionnaire: ``settings`` in code order, once known in the order of the conditions.
 
-    A block compares ``delays`` if it has one liquid under several delays, otherwise ``liquids``. ``labels`` name the
-    seven levels, lowest first; ``cannot_judge`` is the answer off the scale, or None.
+    ``kind`` is what the block compares, as its receipt says. ``labels`` name the seven levels, lowest first;
+    ``cannot_judge`` is the answer off the scale, or None.
     """
 
     id: str
@@ -61,6 +62,18 @@ class Block:
     def codes(self) -> tuple[str, ...]:
         """The codes of the settings, in their order."""
         return tuple(setting.code for setting in self.settings)
+
+    @property
+    def columns(self) -> dict[str, int]:
+        """The column of each code in tables of answers: conditions of one delay are replicates of it, in one column."""
+        if self.kind == "delays" and self.revealed:
+            return {setting.code: self.delays_ms.index(setting.delay_ms or 0.0) for setting in self.settings}
+        return {code: place for place, code in enumerate(self.codes)}
+
+    @property
+    def delays_ms(self) -> tuple[float, ...]:
+        """The delays of the settings, each once, shortest first; 0 while they are not known."""
+        return tuple(sorted({setting.delay_ms or 0.0 for setting in self.settings}))
 
     @property
     def codes_as_dealt(self) -> tuple[str, ...]:
@@ -131,9 +144,9 @@ def _block(protocol: Mapping[str, Any], block: Mapping[str, Any], language: str,
     scale = protocol["scales"][questionnaire["scale"]]
     off_scale = scale["cannot_judge"]
     settings = tuple(Setting(code) for code in block["codes"])
-    kind: Kind = "delays" if block["code_prefix"] == DELAY_PREFIX else "liquids"
+    kind: Kind = block.get("compares") or ("delays" if block["code_prefix"] == DELAY_PREFIX else "liquids")
     if key is not None:
-        settings, kind = _opened(key, block["id"], block["codes"])
+        settings, kind = _opened(key, block["id"], block["codes"], block.get("compares"))
     return Block(
         id=block["id"],
         title=text_in(block["title"], language),
@@ -148,12 +161,17 @@ def _block(protocol: Mapping[str, Any], block: Mapping[str, Any], language: str,
     )
 
 
-def _opened(key: Key, block: str, codes: Sequence[str]) -> tuple[tuple[Setting, ...], Kind]:
-    """Return the settings by name: delays ascending, anything else in the order of the protocol's conditions."""
+def _opened(key: Key, block: str, codes: Sequence[str], kind: Kind | None) -> tuple[tuple[Setting, ...], Kind]:
+    """Return the settings by name: delays ascending, liquids in the order of the protocol's conditions.
+
+    Without ``kind``, in receipts of earlier versions, one liquid under several delays is a block of delays.
+    """
     known = settings_of(key)
     settings = [known[block, code] for code in codes]
-    delays = {setting.delay_ms for setting in settings}
-    if len(delays) > 1 and len({setting.liquid for setting in settings}) == 1:
+    if kind is None:
+        delays = {setting.delay_ms for setting in settings}
+        kind = "delays" if len(delays) > 1 and len({setting.liquid for setting in settings}) == 1 else "liquids"
+    if kind == "delays":
         return tuple(sorted(settings, key=lambda setting: setting.delay_ms or 0.0)), "delays"
     order = list(key.tables["conditions"])
     return tuple(sorted(settings, key=lambda setting: order.index(setting.condition))), "liquids"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from itertools import chain
@@ -16,7 +15,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from study_app.errors import AnalysisError
-from study_app.store.columns import MISSING, Column, Kind, header
+from study_app.store.columns import MISSING, Column, Kind, columns_held, header
+from study_app.store.parsing import parse_json
 
 _ARRAYS: Final[dict[str, tuple[Any, Callable[[Any, Any], Any]]]] = {
     "integer": (np.int64, pd.arrays.IntegerArray),
@@ -55,6 +55,8 @@ def tables(paths: Sequence[Path], columns: tuple[Column, ...]) -> tuple[pd.DataF
 def rows(path: Path, columns: tuple[Column, ...]) -> list[list[str]]:
     """Read the cells of a table, whose header and row lengths must be those of the dictionary.
 
+    Columns that the version which wrote it did not have yet hold n/a.
+
     Raises
     ------
     AnalysisError
@@ -68,7 +70,8 @@ def rows(path: Path, columns: tuple[Column, ...]) -> list[list[str]]:
         raise AnalysisError(f"{path} cannot be read ({why}): {_again(path)}, or mend the permissions") from error
     except (UnicodeDecodeError, csv.Error) as error:
         raise AnalysisError(f"{path} is damaged ({error}): {_again(path)}") from error
-    names = header(columns)
+    held = columns_held(found[0] if found else (), columns)
+    names = header(held)
     if not found or tuple(found[0]) != names:
         raise AnalysisError(
             f"{path} does not begin with the columns of this table: it was changed, or written by another version of "
@@ -81,6 +84,9 @@ def rows(path: Path, columns: tuple[Column, ...]) -> list[list[str]]:
                 f"{path}, row {number}: {len(row)} cells instead of {len(names)}: the file was cut off or changed; "
                 f"{_again(path)}"
             )
+    if held != columns:
+        at = {name: index for index, name in enumerate(names)}
+        found = [[row[at[it.name]] if it.name in at else MISSING for it in columns] for row in found]
     return found
 
 
@@ -93,7 +99,7 @@ def document(path: Path) -> dict[str, Any]:
         It cannot be read or is none.
     """
     try:
-        found = json.loads(path.read_bytes())
+        found = parse_json(path.read_bytes())
     except OSError as error:
         raise unreadable(path, error) from error
     except ValueError as error:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, fields, is_dataclass
 from typing import Any, Literal, TypeAlias
 
 from study_app.analysis.decided import Decided, Direction
+from study_app.analysis.failures import Failure
 from study_app.analysis.performance import Performance
 from study_app.analysis.questions import Item, Kind, Setting
 from study_app.analysis.statistics.equivalence import Equivalence
@@ -43,7 +44,7 @@ class Tested:
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """Two settings (codes) compared in one statement; the family is the pairs of the statement."""
+    """Two settings (codes) compared in one statement; the family is all pairs that are compared in the block."""
 
     first: str
     second: str
@@ -88,8 +89,8 @@ class Lowest:
 class Against:
     """One delay compared with the shortest in one statement.
 
-    ``p_adjusted`` is p of a difference (``p_of_difference``), corrected over the ``members`` comparisons of the block;
-    ``expected`` the direction that was stated before the study, None where none was.
+    ``found`` holds the verdict; ``p_adjusted`` is p of a difference, corrected over the ``members`` comparisons of
+    the block; ``expected`` the direction that was stated before the study, None where none was.
     """
 
     item: str
@@ -102,24 +103,14 @@ class Against:
 
     @property
     def verdict(self) -> Nearness:
-        """What may be said: "equivalent" where the tests without normality agree, "different" by the corrected p."""
-        if self.found.verdict == "equivalent" and self.found.checks_agree is not False:
-            return "equivalent"
-        shown = self.p_adjusted is not None and self.p_adjusted <= self.found.alpha
-        return "different" if shown else "inconclusive"
+        """What may be said: "equivalent" where every test shows it, "different" by the corrected p."""
+        return self.found.verdict
 
     @property
     def as_expected(self) -> bool:
         """Whether answers went where they were expected to, or nothing was expected."""
         away = self.found.effect or 0.0
         return self.expected is None or (away > 0) == (self.expected == "increasing")
-
-
-def p_of_difference(found: Equivalence) -> float | None:
-    """Return p that a delay differs from the shortest at all: the larger of the t test's and the signed ranks'."""
-    if found.p_different is None or found.p_different_ranks is None:
-        return found.p_different
-    return max(found.p_different, found.p_different_ranks)
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,7 +128,9 @@ class BlockFound:
     ``settings`` are in their order, ``delays_ms`` theirs once known where the block compares delays. ``measures`` has a
     row a setting and statement. ``omnibus`` compares all settings, ``trends`` follow the delay; ``mixed`` and
     ``incomplete`` ask the same again with other assumptions. ``equivalent_up_to`` maps statements to the longest delay
-    up to which every delay is equivalent to the shortest.
+    up to which every delay is equivalent to the shortest. ``presentations`` are the fewest and the most single answers
+    that one participant gave to a statement on one setting; ``replicated_ms`` the delays that several conditions
+    present; ``by_session`` compares ``sessions``, where there are several.
     """
 
     id: str
@@ -162,13 +155,17 @@ class BlockFound:
     mixed: tuple[Tested, ...] = ()
     incomplete: tuple[Tested, ...] = ()
     absent: tuple[Waiting, ...] = ()
+    presentations: tuple[int, int] = (1, 1)
+    replicated_ms: tuple[float, ...] = ()
+    sessions: tuple[int, ...] = (1,)
+    by_session: tuple[Tested, ...] = ()
 
     @property
     def delays_ms(self) -> tuple[float, ...]:
-        """The delays asked for, in order; empty while they are not known or where liquids are compared."""
+        """The delays asked for, in order, each once; empty while they are not known or where liquids are compared."""
         if self.kind != "delays" or not self.revealed:
             return ()
-        return tuple(setting.delay_ms or 0.0 for setting in self.settings)
+        return tuple(sorted({setting.delay_ms or 0.0 for setting in self.settings}))
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,7 +189,7 @@ class Delivered:
 
 @dataclass(frozen=True, slots=True)
 class Results:
-    """All that was found in a study."""
+    """All that was found in a study; ``failures`` are the parts that could not be computed."""
 
     decided: Decided
     people: tuple[str, ...]
@@ -201,6 +198,7 @@ class Results:
     orders: Mapping[str, Evenness]
     performance: Performance | None
     seed: int
+    failures: tuple[Failure, ...] = ()
 
 
 def plain(value: Any) -> Any:

@@ -17,6 +17,7 @@ from study_app.errors import AnalysisError
 from study_app.store.blinding import Key
 from study_app.store.columns import TABLES
 from study_app.store.layout import SessionFolder
+from study_app.store.parsing import check_study_name
 
 
 @dataclass(frozen=True)
@@ -53,17 +54,22 @@ def read_session(folder: SessionFolder, key: Key | None, like: Session | None = 
         if like is not None and protocol == like.protocol:
             protocol = like.protocol
         head = protocol["study"]
-        study, title, version = str(head["name"]), text_in(head["title"], spoken(protocol)), str(head["version"])
+        study, title, version = (
+            check_study_name(head["name"]),
+            text_in(head["title"], spoken(protocol)),
+            str(head["version"]),
+        )
         facts = {
             "participant": folder.participant,
             "session": folder.number,
             **{name: receipt[name] for name in ("simulated", "pilot", "status", "language", "started_at", "ended_at")},
             "device": receipt["device"].get("name"),
+            "protocol_version": version,
             "key_hash": receipt["key_hash"],
             **{name: receipt.get(name) for name in ("seed", "protocol_hash", "version")},
         }
         blocks = like.blocks if like is not None and protocol is like.protocol else main_blocks(protocol, key)
-    except (KeyError, TypeError, AttributeError) as error:
+    except (KeyError, TypeError, AttributeError, ValueError) as error:
         raise AnalysisError(
             f"{folder.receipt} does not describe the session ({type(error).__name__}: {error}): it was changed, or "
             "written by another version of the program; restore it from a copy"

@@ -80,6 +80,12 @@ class Study:
         return self.participants[self.participants["excluded"]]
 
     @property
+    def versions(self) -> tuple[str, ...]:
+        """The versions of the protocol under which the sessions that count were run; of none, the first session's."""
+        counted = self.participants.loc[self.participants["counted"], "protocol_version"]
+        return tuple(sorted(set(map(str, counted)))) or (self.version,)
+
+    @property
     def simulated(self) -> bool:
         """Whether any participant was simulated."""
         return bool(self.participants["simulated"].any())

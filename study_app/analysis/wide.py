@@ -58,7 +58,7 @@ def _name(cells: Cells) -> str:
 def _answers(study: Study, cells: Cells, people: list[str]) -> pd.api.extensions.ExtensionArray:
     answers = study.answers(cells.block)
     here = answers[(answers["code"] == cells.setting.code) & (answers["item"] == cells.item.id)]
-    values = by_participant(here, people, [cells.setting.code], cells.item.id)[:, 0]
+    values = by_participant(here, people, {cells.setting.code: 0}, cells.item.id)[:, 0]
     missing = np.isnan(values)
     known = np.where(missing, 0, values)
     if (known == np.floor(known)).all():

@@ -193,7 +193,7 @@ class _Showing:
 
         def end(_number: int) -> None:
             self._ended = True
-            bridge.end_now("no more was wanted")
+            bridge.leave_now()
 
         def follow(_state: object) -> None:
             if bridge.runner.finished:

@@ -1,12 +1,12 @@
 """One session, from the operator's choices to the closed journal.
 
 However a session's windows go away (its end, Ctrl+C, a signal, a failure in here), the servo is stopped with zero force
-and the journal is closed with a status. Nothing is created on the disk before device and servo are ready.
+and the journal is closed. Only the operator's "End session" writes an end; every other session stays unfinished and can
+be resumed. Nothing is created on the disk before device and servo are ready.
 """
 
 from __future__ import annotations
 
-import signal
 import threading
 import traceback
 from collections.abc import Callable
@@ -138,12 +138,12 @@ class LiveSession(QObject):
             QApplication.processEvents()
 
     def end_by_signal(self, number: int) -> None:
-        """End because the program is being ended from outside."""
+        """Leave the session, which stays unfinished, because the program is being ended from outside."""
         self.code = 128 + number
         if self._closed:
             return
         if self.bridge is not None:
-            self.bridge.end_now(f"ended from outside ({signal.Signals(number).name})")
+            self.bridge.leave_now()
         else:
             self._close()
 

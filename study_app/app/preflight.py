@@ -6,6 +6,7 @@ import threading
 from collections.abc import Iterable
 from dataclasses import replace
 from datetime import datetime
+from typing import NamedTuple
 
 from PySide6.QtCore import QObject, QTimer, Signal
 from PySide6.QtGui import QScreen
@@ -13,12 +14,14 @@ from PySide6.QtGui import QScreen
 from study_app.errors import StudyError
 from study_app.evaluation.appraised import Costs, Errors
 from study_app.evaluation.appraiser import Appraiser
+from study_app.evaluation.fastest import Stroke, fastest_stroke
 from study_app.gui.beginning import Ready, measured
 from study_app.gui.choices import NewSession
 from study_app.gui.preflight.view import preflight_view
 from study_app.gui.preflight.window import PreflightWindow
 from study_app.gui.screens import place
 from study_app.gui.theme import Theme
+from study_app.haptics.dynamics import Dynamics
 from study_app.haptics.scene import Scene
 from study_app.protocol.model import Protocol
 from study_app.session.preflight import Facts, checks
@@ -27,16 +30,31 @@ LOOK_MS = 100
 PATIENCE_S = 10.0
 
 
-class Appraisal:
-    """What the dearest scene of a study costs, and how far the least true is off; asked one scene after another."""
+class Asked(NamedTuple):
+    """A scene to ask about: of which liquid it is, and the fastest stroke in it."""
 
-    def __init__(self, scenes: Iterable[Scene]) -> None:
+    liquid: str
+    scene: Scene
+    stroke: Stroke
+
+
+class Appraisal:
+    """What the dearest scene of a study costs, and how far the least true is off; asked one scene after another.
+
+    ``withheld`` is the share of each liquid's force that is withheld in the fastest stroke on a device of these
+    ``dynamics``, once all are known.
+    """
+
+    def __init__(self, scenes: Iterable[Asked], dynamics: Dynamics) -> None:
         self._waiting = list(scenes)
+        self.dynamics = dynamics
         self._asked = 0
         self._appraiser = Appraiser()
         self.tick_s: float | None = None
         self.error_n: float | None = None
+        self.withheld: dict[str, float] | None = None
         self._errors_n: list[float | None] = []
+        self._shares: dict[str, float] = {}
         self._ask()
 
     @property
@@ -55,15 +73,18 @@ class Appraisal:
                 news = True
                 continue
             self._errors_n.append(told.force_n if isinstance(told, Errors) else None)
-            self._waiting.pop(0)
+            liquid = self._waiting.pop(0).liquid
+            if isinstance(told, Errors) and told.withheld is not None:
+                self._shares[liquid] = max(told.withheld, self._shares.get(liquid, 0.0))
             self._ask()
             if not self._waiting:
-                self.error_n, news = _largest(self._errors_n), True
+                self.error_n, self.withheld, news = _largest(self._errors_n), self._shares, True
         return news
 
     def _ask(self) -> None:
         if self._waiting:
-            self._asked = self._appraiser.ask(self._waiting[0])
+            _, scene, stroke = self._waiting[0]
+            self._asked = self._appraiser.ask(scene, stroke, self.dynamics)
 
     def close(self) -> None:
         """Let go of who was asked."""
@@ -89,7 +110,7 @@ class Preflight(QObject):
         self._who = who
         self._measuring: threading.Thread | None = None
         self._ending = threading.Event()
-        self._appraisal = Appraisal(_scenes(protocol))
+        self._appraisal = Appraisal(_scenes(protocol), _dynamics(ready.facts, protocol))
         self.window = PreflightWindow(protocol.limits.lateness_ms * 1e3, theme=theme)
         self.window.start_asked.connect(self._start)
         self.window.again_asked.connect(self._again)
@@ -119,7 +140,8 @@ class Preflight(QObject):
 
     @property
     def _facts(self) -> Facts:
-        return replace(self._ready.facts_with(self._screen), tick_s=self._appraisal.tick_s)
+        found = self._appraisal
+        return replace(self._ready.facts_with(self._screen), tick_s=found.tick_s, withheld=found.withheld)
 
     def _show(self) -> None:
         facts = self._facts
@@ -169,6 +191,10 @@ class Preflight(QObject):
         self._measuring = None
         if isinstance(found, Facts):
             self._ready = replace(self._ready, facts=found)
+            dynamics = _dynamics(found, self._protocol)
+            if dynamics != self._appraisal.dynamics:  # the delay has changed since, and with it what is withheld
+                self._appraisal.close()
+                self._appraisal, self._appraised = Appraisal(_scenes(self._protocol), dynamics), False
             self._show()
         else:
             self.failed.emit(found)
@@ -186,7 +212,23 @@ def _largest(errors_n: list[float | None]) -> float | None:
     return max(known, default=None) if len(known) == len(errors_n) else None
 
 
-def _scenes(protocol: Protocol) -> tuple[Scene, ...]:
-    """Return the study's scenes, each once."""
-    scenes = (protocol.scene_for(condition) for condition in protocol.conditions)
-    return tuple(dict.fromkeys(scene for scene in scenes if len(scene.liquids) == 1))
+def _dynamics(facts: Facts, protocol: Protocol) -> Dynamics:
+    """Return the device's dynamics, with the delay that the servo uses now where the device measures it."""
+    if facts.dynamics.delay_s is None:
+        return facts.dynamics
+    return facts.dynamics._replace(delay_s=facts.delay_ticks / protocol.device.rate_hz)
+
+
+def _scenes(protocol: Protocol) -> tuple[Asked, ...]:
+    """Return the study's scenes of one liquid, each once, with the fastest stroke of the tasks that it is felt in."""
+    found: dict[Scene, Asked] = {}
+    for block in protocol.blocks.values():
+        stroke = fastest_stroke(protocol.tasks[block.task], protocol.device.workspace_m)
+        for condition in block.conditions:
+            scene = protocol.scene_for(condition)
+            if len(scene.liquids) != 1:
+                continue
+            before = found.get(scene)
+            if before is None or stroke.speed_mps > before.stroke.speed_mps:
+                found[scene] = Asked(scene.liquids[0].id, scene, stroke)
+    return tuple(found.values())

@@ -25,8 +25,8 @@ from study_app.protocol.load import load, load_scene
 from study_app.protocol.tasks import Explore
 from study_app.protocol.words import words
 from study_app.session.pages import TaskPage
-from study_app.session.runner import TankView
 from study_app.session.tasks import TaskView
+from study_app.session.trial import TankView
 
 FRAME_MS, TRACE_MS, TILES_MS = 16, 33, 500
 HEARTBEAT_MS = 100  # Python hears Ctrl+C only while it runs; Qt waits outside it

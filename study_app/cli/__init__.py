@@ -26,6 +26,7 @@ from study_app.cli import (
     solver,
     stability,
     timing,
+    validate,
 )
 from study_app.cli.devices import devices
 from study_app.cli.words import EXIT_USER_ERROR
@@ -51,6 +52,7 @@ MODULES = (
     running,
     results,
     report,
+    validate,
     power,
     model,
     accuracy,

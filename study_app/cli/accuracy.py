@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from study_app.cli.words import Target
+
 if TYPE_CHECKING:
     from study_app.haptics.motion import Motion
     from study_app.haptics.scene import Scene
@@ -24,7 +26,7 @@ DEFAULT_PATH = "stir"
     metavar="PATH",
     help="Motion CSV, or a programmed path: stir, circle, reverse, reach …",
 )
-@click.option("--to", type=click.Path(path_type=Path), metavar="DIR", help="Folder for table and figure; else printed.")
+@click.option("--to", type=Target(), metavar="DIR", help="Folder for table and figure; else printed.")
 def accuracy(scene: str | None, liquid: str | None, path: str, to: Path | None) -> None:
     """Show what accuracy costs in time: how wrong each model of a liquid is, and how long it takes.
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from study_app.cli.model import assignment
+from study_app.cli.words import Target
 
 
 @click.command()
@@ -22,7 +23,7 @@ from study_app.cli.model import assignment
     show_default=True,
     help="Where the CSV has no velocities: without lag, as a real force follows them, or by the scene's filter.",
 )
-@click.option("--to", type=click.Path(path_type=Path), metavar="DIR", help="Folder for preset, residuals and figure.")
+@click.option("--to", type=Target(), metavar="DIR", help="Folder for preset, residuals and figure.")
 def identify(
     measured: Path, scene: str, liquid: str, names: str, changes: tuple[str, ...], velocity: str, to: Path | None
 ) -> None:

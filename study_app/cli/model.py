@@ -6,12 +6,14 @@ from pathlib import Path
 
 import click
 
+from study_app.cli.words import Target
+
 
 @click.command()
 @click.option("--scene", required=True, metavar="FILE", help="Protocol or scene file, or the name of a shipped one.")
 @click.option("--liquid", required=True, metavar="NAME", help="Id of the liquid in that file.")
 @click.option("--path", required=True, metavar="PATH", help="Motion CSV, or a programmed path: circle, line, stop …")
-@click.option("--out", required=True, type=click.Path(path_type=Path), metavar="OUT", help="CSV to write.")
+@click.option("--out", required=True, type=Target(), metavar="OUT", help="CSV to write.")
 @click.option("--set", "changes", multiple=True, metavar="NAME=VALUE", help="Override a parameter; may come again.")
 def simulate(scene: str, liquid: str, path: str, out: Path, changes: tuple[str, ...]) -> None:
     """Compute the force along a motion, with the servo's own tick, without a device or a clock.
@@ -52,7 +54,7 @@ def scene(scene: str, liquid: str | None) -> None:
 
 
 @click.command()
-@click.option("--to", required=True, type=click.Path(path_type=Path), metavar="DIR", help="Folder to write into.")
+@click.option("--to", required=True, type=Target(), metavar="DIR", help="Folder to write into.")
 def figures(to: Path) -> None:
     """Draw the thesis' Figs 3 to 8 anew: force over time on programmed paths, with captions."""
     from study_app.evaluation.figures import figures as draw

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from study_app.cli.words import FILE
+from study_app.cli.words import FILE, Target
 
 SIZES = (5, 8, 12, 16, 20, 24)
 EXIT_CANCELLED = 130
@@ -44,7 +44,7 @@ def _sizes(_context: click.Context, _option: click.Parameter, value: str) -> tup
     "the same.",
 )
 @click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True)
-@click.option("--to", type=click.Path(path_type=Path), metavar="DIR", help="Folder for tables and figures.")
+@click.option("--to", type=Target(), metavar="DIR", help="Folder for tables and figures.")
 def power(
     protocol: str, sizes: tuple[int, ...], studies: int, jobs: int, engine: str, seed: int, to: Path | None
 ) -> None:

@@ -7,20 +7,32 @@ from pathlib import Path
 
 import click
 
+from study_app.cli.words import EXIT_FOUND, Target
+
 
 @click.command()
 @click.argument("results", type=click.Path(path_type=Path))
-@click.option("--to", type=click.Path(path_type=Path), required=True, metavar="DIR", help="Where the report goes.")
+@click.option("--to", type=Target(), required=True, metavar="DIR", help="Where the report goes.")
 def report(results: Path, to: Path) -> None:
-    """Write the report of a study: tests, figures, tables, what can be said and what cannot, and how to repeat it."""
+    """Write the report of a study: tests, figures, tables, what can be said and what cannot, and how to repeat it.
+
+    Ends with exit code 3 where a section could not be computed: the report names it, and holds everything else.
+    """
     from study_app.analysis.report.writing import report as write_report
 
     line = _Line()
+    failed: list[str] = []
     try:
-        files = write_report(results, to, progress=line, warn=lambda words: click.echo(words, err=True))
+        files = write_report(
+            results, to, progress=line, warn=lambda words: click.echo(words, err=True), failed=failed.append
+        )
     finally:
         line.clear()
     click.echo(f"{files[0]}  and {len(files) - 1} files beside it")
+    for words in failed:
+        click.echo(words, err=True)
+    if failed:
+        click.get_current_context().exit(EXIT_FOUND)
 
 
 class _Line:

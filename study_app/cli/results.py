@@ -7,12 +7,12 @@ from pathlib import Path
 
 import click
 
-from study_app.cli.words import EXIT_FOUND, SESSION
+from study_app.cli.words import EXIT_FOUND, SESSION, Target
 
 
 @click.command()
 @click.argument("results", type=click.Path(path_type=Path))
-@click.option("--to", required=True, type=click.Path(path_type=Path), metavar="DIR", help="Folder to write into.")
+@click.option("--to", required=True, type=Target(), metavar="DIR", help="Folder to write into.")
 @click.option(
     "--wide", is_flag=True, help="Also the answers with a row a participant, a column a statement and setting."
 )
@@ -36,7 +36,7 @@ def export(results: Path, to: Path, *, wide: bool, parquet: bool, sav: bool, psy
 
 @click.command()
 @click.argument("results", type=click.Path(path_type=Path))
-@click.option("--to", required=True, type=click.Path(path_type=Path), metavar="DIR", help="Folder to write into.")
+@click.option("--to", required=True, type=Target(), metavar="DIR", help="Folder to write into.")
 def plot(results: Path, to: Path) -> None:
     """Draw the responses: by code until unblinded, by name after."""
     from study_app.analysis.figures import plot as plot_study

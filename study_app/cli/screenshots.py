@@ -7,9 +7,11 @@ from pathlib import Path
 
 import click
 
+from study_app.cli.words import Target
+
 
 @click.command()
-@click.option("--to", type=click.Path(path_type=Path), required=True, metavar="DIR", help="Folder for the pictures.")
+@click.option("--to", type=Target(), required=True, metavar="DIR", help="Folder for the pictures.")
 @click.option("--only", type=click.Choice(("places", "session", "single-blind")), help="Some of them; default: all.")
 def screenshots(to: Path, only: str | None) -> None:
     """Take pictures of every window in both themes, of the real program; takes some minutes and needs no display."""

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import click
 
 from study_app.cli.timing import LOAD, windows_thread
-from study_app.cli.words import EXIT_FOUND
+from study_app.cli.words import EXIT_FOUND, Target
 
 if TYPE_CHECKING:
     from study_app.evaluation.timing.load import LoadName
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 @click.option("--protocol", default="rek2024", show_default=True, metavar="FILE", help="Whose liquids are felt.")
 @click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True)
 @click.option("--load", type=LOAD, default="none", help="Paint both windows of a session meanwhile; keep cores busy.")
-@click.option("--to", type=click.Path(path_type=Path), metavar="DIR", help="Folder to write the report into, too.")
+@click.option("--to", type=Target(), metavar="DIR", help="Folder to write the report into, too.")
 @click.pass_context
 def soak(
     context: click.Context, hours: float, protocol: str, seed: int, load: LoadName, to: Path | None, *, virtual: bool

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+from study_app.cli.words import Target
+
 
 @click.command()
 @click.option(
@@ -14,9 +16,7 @@ import click
     help="Solve the flow again instead of using the stored tables: some 5 minutes of one core, 15 on busy ones; needs "
     "the extra cfd (pip install ngsolve, 350 MB).",
 )
-@click.option(
-    "--to", type=click.Path(path_type=Path), metavar="DIR", help="Folder for tables and figure; else printed."
-)
+@click.option("--to", type=Target(), metavar="DIR", help="Folder for tables and figure; else printed.")
 def cfd(to: Path | None, *, solve: bool) -> None:
     """Fit models of honey and glycerin to the force that a fluid solver finds; say what stays wrong.
 

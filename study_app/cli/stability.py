@@ -9,37 +9,41 @@ from typing import TYPE_CHECKING
 
 import click
 
-from study_app.cli.words import EXIT_FOUND
+from study_app.cli.words import EXIT_FOUND, Target
 
 if TYPE_CHECKING:
     from study_app.evaluation.stability.verdict import Verdict
 
 
 @click.command()
-@click.option("--to", type=click.Path(path_type=Path), metavar="DIR", help="Write table, map, failing cases, summary.")
+@click.option("--to", type=Target(), metavar="DIR", help="Write table, map, failing cases, summary.")
 @click.option(
     "--case", "line", metavar="LINE", help='Judge one case alone, such as "liquid=honey rate_hz=250 delay=4".'
 )
 @click.option(
     "--table", type=click.Path(path_type=Path), metavar="FILE", help="Only measure the table of slope limits."
 )
+@click.option("--withheld", is_flag=True, help="Only the share of each liquid's force that safety withholds.")
 @click.option("--seed", default="stability", show_default=True, help="What the cases are drawn from.")
-@click.option("--cases", type=click.IntRange(1), metavar="N", help="Only N of them.")
-def stability(to: Path | None, line: str | None, table: Path | None, seed: str, cases: int | None) -> None:
-    """Sweep thousands of closed loops with the safety layer off and on, and say which are unstable.
+@click.option("--cases", type=click.IntRange(1), metavar="N", help="Only N cases of each group.")
+def stability(
+    to: Path | None, line: str | None, table: Path | None, withheld: bool, seed: str, cases: int | None
+) -> None:
+    """Simulate thousands of closed loops with the safety layer off and on, and print which are unstable.
 
-    Each has a liquid, a scale, a rate, a delay, an estimator, a device and a hand. Ends with 3 if one is unstable with
-    safety on.
+    Each has a liquid, a scale, a rate, a delay, an estimator, a device and a hand; further groups have a second model
+    of hand and device, a delay that is misjudged, lost samples, releases in mid-stroke, and the driver of the Falcon in
+    front of its emulator. Ends with 3 if one is unstable with safety on.
     """
     from study_app.evaluation.stability import sweep as found
-    from study_app.evaluation.stability.cases import parse, some, sweep
+    from study_app.evaluation.stability.cases import parse
     from study_app.evaluation.stability.fidelity import fidelities
-    from study_app.evaluation.stability.verdict import judge
+    from study_app.evaluation.stability.groups import groups, some, sweep
 
     if line is not None:
         case = parse(line)
         click.echo(str(case))
-        verdicts = [judge(case, safe=safe) for safe in (False, True)]
+        verdicts = found.verdicts_on(case)
         click.echo("\n".join(found.in_words(verdict) for verdict in verdicts))
         _end(verdicts[-1:])
         return
@@ -47,7 +51,10 @@ def stability(to: Path | None, line: str | None, table: Path | None, seed: str, 
         found.write_limits(table, _progress("limits"))
         click.echo(table)
         return
-    swept = found.run_sweep(some(sweep(seed), cases), _progress("cases"))
+    if withheld:
+        _print_withheld()
+        return
+    swept = found.run_sweep(some(sweep(seed), cases), groups(seed, cases), _progress("verdicts"))
     compared = fidelities()
     click.echo(found.summary(swept, compared))
     if to is not None:
@@ -56,6 +63,16 @@ def stability(to: Path | None, line: str | None, table: Path | None, seed: str, 
         click.echo("\nunstable with safety on; each again by --case:", err=True)
         click.echo("\n".join(str(verdict.case) for verdict in swept.unstable), err=True)
     _end(swept.unstable)
+
+
+def _print_withheld() -> None:
+    """Print the shares of force withheld; end with 3 if a goal is not met."""
+    from study_app.evaluation.stability.withheld import measure, report
+
+    shares = measure()
+    click.echo(report(shares))
+    if not all(share.met for share in shares):
+        click.get_current_context().exit(EXIT_FOUND)
 
 
 def _end(verdicts: Sequence[Verdict]) -> None:

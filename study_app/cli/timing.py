@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from study_app.cli.words import Target
 from study_app.errors import DisplayError, StudyError
 
 if TYPE_CHECKING:
@@ -39,7 +40,7 @@ LOAD = click.Choice(("none", "gui", "gui+cpu"))
     "--spin", "spin_us", type=float, metavar="US", help="Look at the clock for so long before a deadline [µs]."
 )
 @click.option("--delays", "of_delays", is_flag=True, help="Time the participant's picture instead, delay by delay.")
-@click.option("--to", type=click.Path(path_type=Path), metavar="DIR", help="Folder for tables and figure.")
+@click.option("--to", type=Target(), metavar="DIR", help="Folder for tables and figure.")
 def timing(seconds: float, load: LoadName, spin_us: float | None, of_delays: bool, to: Path | None) -> None:
     """Time the servo's turns with every effect on, beside a bare compiled loop, a Python thread and a Qt timer.
 

@@ -15,7 +15,8 @@ from study_app.devices.base import Device
 from study_app.devices.hand import HAND, move_hand
 from study_app.devices.hand_orders import HandOrders
 from study_app.haptics.cfunctions import READ, READ_LOST, READ_NEW, READ_NOTHING_NEW, WRITE, c_function, record_at
-from study_app.haptics.layout import READING, records
+from study_app.haptics.dynamics import Dynamics
+from study_app.haptics.layout import COMMAND, READING, records
 from study_app.haptics.plant import HANDLE, let_go, measure, move, push
 
 SIMULATED = np.dtype(
@@ -32,6 +33,7 @@ SIMULATED = np.dtype(
 
 _simulated_at = record_at(SIMULATED)
 _reading_at = record_at(READING)
+_command_at = record_at(COMMAND)
 
 _LONGEST_STEP_S = 0.05  # a loop that stood still for longer must not spend longer still on catching up
 
@@ -58,6 +60,12 @@ class SimulatedDevice(HandOrders, Device):
         self.read, self.write = _functions()
         self.hold(0.0, 0.0, 0.0)
 
+    @property
+    def dynamics(self) -> Dynamics:
+        """The handle's own numbers; its delay as it is at 1 kHz."""
+        handle = self._state.handle
+        return Dynamics(1e-3 * float(handle.delay), float(handle.quantum_m), float(handle.mass_kg))
+
     def unplug(self) -> None:
         """Answer no more, as a device whose cable was pulled."""
         self._state.unplugged = 1
@@ -83,6 +91,7 @@ class SimulatedDevice(HandOrders, Device):
             "stiffness_npm": float(handle.stiffness_npm),
             "damping_nspm": float(handle.damping_nspm),
             "quantum_m": float(handle.quantum_m),
+            "dynamics": self.dynamics.describe(),
         }
 
     def __enter__(self) -> Self:
@@ -117,10 +126,11 @@ def _read(context: int, now_ns: int, reading: int) -> int:
     out = _reading_at(reading)
     measure(device.handle, out.position_m)
     out.buttons = device.buttons
+    out.delay_ticks = device.handle.delay
     return READ_NEW
 
 
-def _write(context: int, fx: float, fy: float, fz: float) -> int:
-    device = _simulated_at(context)
-    push(device.handle, fx, fy, fz)
+def _write(context: int, command: int) -> int:
+    device, force_n = _simulated_at(context), _command_at(command).force_n
+    push(device.handle, force_n[0], force_n[1], force_n[2])
     return READ_LOST if device.unplugged != 0 else 0

@@ -1,8 +1,9 @@
 """The process that appraises scenes, from both its ends.
 
 It begins as the least important one of the machine, before it loads anything, so that it takes nothing from a servo.
-A question is a line of JSON, {"number": 3, "scene": {...}}; its answers are lines with the same number and "costs",
-then "errors", or with "why" nothing could be measured.
+A question is a line of JSON, {"number": 3, "scene": {...}, "stroke": [5.0, 0.03], "dynamics": [0.001, 3.8e-05, 0.1]};
+stroke and dynamics of the device are null or left out where no stroke is asked about. Its answers are lines with the
+same number and "costs", then "errors", or with "why" nothing could be measured.
 """
 
 from __future__ import annotations
@@ -15,13 +16,15 @@ import sys
 import threading
 from collections.abc import Iterable
 from contextlib import suppress
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any, Final, TextIO, TypeAlias
 
 from study_app.errors import StudyError
 from study_app.evaluation.appraised import Costs, EffectCost, Errors
+from study_app.evaluation.fastest import Stroke, withheld_share
+from study_app.haptics.dynamics import UNKNOWN, Dynamics
 from study_app.haptics.scene import Scene
 
 NICEST: Final = 19
@@ -53,10 +56,14 @@ class Appraiser:
         """Whether there still is somebody to ask."""
         return not self._closed and self._process.poll() is None
 
-    def ask(self, scene: Scene) -> int:
-        """Ask about a scene; return the number that its answers have. Answers to earlier questions may still come."""
+    def ask(self, scene: Scene, stroke: Stroke | None = None, dynamics: Dynamics = UNKNOWN) -> int:
+        """Ask about a scene, and about a stroke in it on a device of these dynamics; return the number of the answers.
+
+        Answers to earlier questions may still come.
+        """
         self._asked += 1
-        question = {"number": self._asked, "scene": scene.model_dump(mode="json")}
+        question = {"number": self._asked, "scene": scene.model_dump(mode="json"), "stroke": stroke}
+        question |= {"dynamics": dynamics if stroke is not None else None}
         with suppress(OSError, ValueError):  # it ended, or was closed: `works` says so
             assert self._process.stdin is not None  # noqa: S101 - made so
             self._process.stdin.write(json.dumps(question) + "\n")
@@ -114,7 +121,9 @@ def serve(questions: Iterable[str], answers: TextIO) -> None:
         try:
             _tell(answers, asked["number"], costs=asdict(costs(scene)))
             if waiting.empty():
-                _tell(answers, asked["number"], errors=asdict(errors(scene)))
+                stroke = asked.get("stroke")
+                share = withheld_share(scene, Stroke(*stroke), Dynamics(*asked["dynamics"])) if stroke else None
+                _tell(answers, asked["number"], errors=asdict(replace(errors(scene), withheld=share)))
         except StudyError as error:
             _tell(answers, asked["number"], why=str(error))
 

@@ -21,19 +21,22 @@ from numpy.typing import NDArray
 
 from study_app.errors import StoreError
 from study_app.haptics.compiled import kernel
-from study_app.haptics.layout import LIMITER_FADE, LIMITER_STOP, SAMPLE, STATUS_DEVICE_LOST, records
+from study_app.haptics.dynamics import Dynamics, dynamics_from
+from study_app.haptics.layout import LIMITER_FADE, SAMPLE, records
+from study_app.haptics.mirror import take_sample, was_lost_at_read
 from study_app.haptics.pack import pack
 from study_app.haptics.safety import SCENE_FADE_S, START_FADE_S, begin_scene, new_safety
 from study_app.haptics.scene import Scene
-from study_app.haptics.tick import tick
 from study_app.protocol.model import Protocol
 from study_app.store import blinding, journal, receipt, recording
 from study_app.store.atomic import is_there
-from study_app.store.events import check_fields
 from study_app.store.journal import Line
 from study_app.store.layout import locate
 
 NAMED_SECONDS = 8
+_FORCES = ("force_n", "command_n", "device_force_n")
+_ROUNDING = 1e-9
+_FLOAT32 = 2.0**-23  # of the greater ones, a column's own precision
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,16 +75,20 @@ def replay(session_folder: Path) -> Replayed:
     began = time.perf_counter()
     study, session = locate(session_folder)
     lines = journal.read(session.journal)
-    check_fields(session.journal, lines)
     kept = receipt.read(session.receipt)
     key = blinding.read_key(study.path)
     if key.hash != kept["key_hash"]:
         raise StoreError(f"{study.key} is not the key that {session.path} ran under: restore it from a copy")
-    protocol, limit_n = _ran(session.receipt, kept, key)
-    _again(records(SAMPLE, 0), Scene(), limit_n, None)  # loads the compiled code: no part of what computing takes
+    protocol, devices = _ran(session.receipt, kept, key)
+    _again(records(SAMPLE, 0), Scene(), *devices[None], None)  # loads the compiled code: no part of what is measured
     found = _Found()
     before: _Before | None = None
-    for started, line in _presented(lines):
+    resumed_at: str | None = None
+    for started, line, resumed in _presented(lines):
+        if resumed != resumed_at:  # another program ran the servo: nothing goes on from the recording before
+            before, resumed_at = None, resumed
+        if resumed not in devices:
+            raise StoreError(f"{session.receipt} lacks the device since {resumed}: restore it from a copy")
         name = f"trial {started['trial']}, attempt {started['attempt']}"
         if line is None or line["event"] == "recording_lost":
             why = "no line of the journal says why" if line is None else line["reason"]
@@ -94,7 +101,7 @@ def replay(session_folder: Path) -> Replayed:
         scene = protocol.scene_for(key.condition(started["block"], started["code"]))
         samples, checks = recording.read_samples(path), recording.read_checks(path)
         start = time.perf_counter()
-        before = _again(samples, scene, limit_n, before)
+        before = _again(samples, scene, *devices[resumed], before)
         found.compare(name, samples, before, checks)
         found.computed_s += time.perf_counter() - start
     return found.replayed(time.perf_counter() - began)
@@ -115,12 +122,12 @@ class _Before:
     knows_its_start: bool = True
 
 
-def _again(samples: Any, scene: Scene, limit_n: float, before: _Before | None) -> _Before:
+def _again(samples: Any, scene: Scene, limit_n: float, dynamics: Dynamics, before: _Before | None) -> _Before:
     """Return the forces of ``samples`` computed again, in a copy; the scene that is theirs is the last one's."""
     out = samples.copy()
     serial = int(out.scene[-1]) if len(out) else 0
-    rest = pack(scene.model_copy(update={"liquids": ()}))
-    model = pack(scene)
+    rest = pack(scene.model_copy(update={"liquids": ()}), dynamics=dynamics)
+    model = pack(scene, dynamics=dynamics)
     first = 0
     shared = _shared(before, out)
     if before is not None and shared is not None:
@@ -146,7 +153,7 @@ def _shared(before: _Before | None, out: Any) -> int | None:
 
 
 def _copy_forces(known: Any, out: Any) -> None:
-    for name in ("force_n", "device_force_n"):
+    for name in ("velocity_mps", "wake_mps", "force_n", "command_n", "device_force_n", "limiters", "status"):
         out[name] = known[name]
 
 
@@ -157,7 +164,7 @@ def _assume(safety: Any, sample: Any) -> None:
     safety.turn_ns = safety.usable_ns = sample.time_ns
     safety.fade = 0.0 if fades else 1.0
     safety.fade_s = START_FADE_S if fades else SCENE_FADE_S
-    safety.slewed_n[:] = sample.device_force_n
+    safety.slewed_n[:] = sample.command_n
 
 
 @kernel
@@ -169,18 +176,14 @@ def _run(
         sample = out[i]
         if i > 0 and sample.scene != out[i - 1].scene:
             begin_scene(safety)
-        if sample.status == STATUS_DEVICE_LOST and sample.fresh == 0:
-            for axis in range(3):
-                sample.force_n[axis] = 0.0
-                sample.device_force_n[axis] = 0.0
+        if was_lost_at_read(sample):
             continue
-        safety.stop = 1 if sample.limiters & LIMITER_STOP else 0
         if sample.scene == serial and serial != 0:
-            tick(model, safety, sample)
+            take_sample(model, safety, sample, True)
         elif sample.scene == serial_before and serial_before != 0:
-            tick(earlier, safety, sample)
+            take_sample(earlier, safety, sample, True)
         else:
-            tick(rest, safety, sample)
+            take_sample(rest, safety, sample, True)
 
 
 class _Found:
@@ -225,18 +228,43 @@ class _Found:
         self.seconds += sum(
             min((second + 1) * checks.rows, len(samples)) <= whole for second in range(len(checks.device_force))
         )
-        for what, kept, forces in (
-            ("force on the hand", checks.device_force, again.samples.device_force_n),
-            ("force of the liquids", checks.effect_force, again.samples.force_n),
-        ):
-            sums = recording.crcs(forces, checks.rows)
-            seconds = [
-                second
-                for second, (one, other) in enumerate(zip(kept, sums, strict=True))
-                if one != other and min((second + 1) * checks.rows, len(samples)) <= whole
-            ]
+        differing = _other_sums(checks, again.samples) | _other_columns(checks, samples, again.samples)
+        for what, found in differing.items():
+            seconds = [second for second in found if min((second + 1) * checks.rows, len(samples)) <= whole]
             if seconds:
-                self.differences.append(f"{name}: the {what} differs in {_listed(seconds)} of {len(sums)} seconds")
+                lasted = len(checks.device_force)
+                self.differences.append(f"{name}: the {what} differs in {_listed(seconds)} of {lasted} seconds")
+
+
+def _other_sums(checks: recording.Checks, again: Any) -> dict[str, list[int]]:
+    """Return the seconds whose exact forces have another CRC."""
+    found = {}
+    for what, kept, forces in (
+        ("force on the hand", checks.device_force, again.device_force_n),
+        ("force of the liquids", checks.effect_force, again.force_n),
+    ):
+        sums = recording.crcs(forces, checks.rows)
+        found[what] = [second for second, (one, other) in enumerate(zip(kept, sums, strict=True)) if one != other]
+    return found
+
+
+def _other_columns(checks: recording.Checks, samples: Any, again: Any) -> dict[str, list[int]]:
+    """Return the seconds in which a recorded column is further from what is recomputed than its rounding.
+
+    Of the samples before the trial's own scene nothing but the forces is known.
+    """
+    found = {}
+    own = samples.scene == samples.scene[-1]
+    for name, step in recording.ROUNDED_TO.items():
+        recorded, computed = (np.nan_to_num(it[name].reshape(len(samples), -1)) for it in (samples, again))
+        permitted = step * (0.5 + _ROUNDING) + np.abs(computed) * _FLOAT32
+        known = True if name in _FORCES else own
+        rows = np.flatnonzero((np.abs(recorded - computed) > permitted).any(axis=1) & known)
+        found[f"column {name}"] = np.unique(rows // checks.rows).tolist()
+    for name in ("limiters", "status"):
+        rows = np.flatnonzero((samples[name] != again[name]) & own)
+        found[f"column {name}"] = np.unique(rows // checks.rows).tolist()
+    return found
 
 
 def _until_gap(ticks: NDArray[np.int64]) -> int:
@@ -251,24 +279,37 @@ def _listed(seconds: list[int]) -> str:
     return f"second {shown}{more}"
 
 
-def _presented(lines: Sequence[Line]) -> Iterator[tuple[Line, Line | None]]:
+def _presented(lines: Sequence[Line]) -> Iterator[tuple[Line, Line | None, str | None]]:
     """Yield the line of each presentation that was to be recorded, and the line about its recording, if there is one.
 
-    In the order of presentation.
+    In the order of presentation, each with the time at which the session had been resumed last, None before that.
     """
     events = ("recorded", "recording_lost")
     told = {(line["trial"], line["attempt"]): line for line in lines if line["event"] in events}
     if not lines or not lines[0].get("recordings"):
         return
+    resumed_at: str | None = None
     for line in lines:
-        if line["event"] == "trial_started":
-            yield line, told.get((line["trial"], line["attempt"]))
+        if line["event"] == "session_resumed":
+            resumed_at = line["at"]
+        elif line["event"] == "trial_started":
+            yield line, told.get((line["trial"], line["attempt"])), resumed_at
 
 
-def _ran(path: Path, kept: Mapping[str, Any], key: blinding.Key) -> tuple[Protocol, float]:
-    """Return the protocol and the limit of the force [N] of the session whose receipt was ``kept`` at ``path``."""
+def _ran(
+    path: Path, kept: Mapping[str, Any], key: blinding.Key
+) -> tuple[Protocol, dict[str | None, tuple[float, Dynamics]]]:
+    """Return the protocol of the session whose receipt was ``kept`` at ``path``, and the devices that it ran on.
+
+    A device is its force limit [N] and its dynamics, by the time at which the session was resumed with it; that of the
+    session's beginning is under None.
+    """
     try:
-        return _whole(kept["protocol"], key), float(kept["device"].get("force_limit_n", np.inf))
+        described = {None: kept["device"]} | {entry["at"]: entry["device"] for entry in kept.get("resumed", ())}
+        devices = {
+            at: (float(device.get("force_limit_n", np.inf)), dynamics_from(device)) for at, device in described.items()
+        }
+        return _whole(kept["protocol"], key), devices
     except KeyError as lacking:
         raise StoreError(f"{path} lacks {lacking}: restore it from a copy") from lacking
     except (AttributeError, TypeError, ValueError):  # said without the reason, which would tell conditions

@@ -156,12 +156,17 @@ class SessionBridge(QObject):
         self._post(Begin(self._now()))
         self._tiles()
 
-    def end_now(self, reason: str) -> None:
-        """End without a question: the program is being ended. Zero force, journal closed with a status."""
+    def leave_now(self) -> None:
+        """Zero force and no windows, without a question: the session stays unfinished and can be resumed."""
         self.parts.servo.stop_force()
-        if not self.runner.finished:
-            self._end("aborted", reason)
+        if not self._gone and not self.runner.finished:
+            self._break_off()
         self._leave()
+
+    @_guarded
+    def _break_off(self) -> None:
+        """Pause, so that a trial under way is journalled as interrupted."""
+        self._post(PauseAsked(self._now(), "program"))
 
     def fail(self, error: BaseException) -> None:
         """Zero force, then say what failed: to the journal, if it still takes it, and to the operator."""
@@ -319,13 +324,13 @@ class SessionBridge(QObject):
 
     @_guarded
     def _close(self) -> None:
-        """Close the operator's window when all is over; else zero force and a question; asked again, end."""
+        """Close the operator's window when all is over; else zero force and a question; asked again, leave."""
         if self.runner.finished:
             self._leave()
             return
         self.parts.servo.stop_force()
         if self.operator.question is not None:
-            self.end_now("the window was closed")
+            self.leave_now()
             return
         self.operator.ask_to_end()
         self._post(ForceStopped(self._now(), "operator"))

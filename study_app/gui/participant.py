@@ -43,7 +43,7 @@ from study_app.session.pages import (
 )
 
 if TYPE_CHECKING:
-    from study_app.session.runner import TankView
+    from study_app.session.trial import TankView
 
 LEAST_SIZE = QSize(1024, 640)
 WINDOWED_SIZE = QSize(1366, 768)
@@ -174,6 +174,8 @@ class ParticipantWindow(QWidget):
     def _put(self, made: PageWidget | TankWidget) -> None:
         """Put a widget in place of the present one."""
         old = self._widget
+        if isinstance(old, TankWidget):
+            old.painted.disconnect(self.painted)  # a late frame of one trial's tank must not begin the next trial
         made.setGeometry(self._room())
         if isinstance(made, TankWidget):
             made.prepare()

@@ -37,7 +37,7 @@ from study_app.session.pages import TaskPage
 
 if TYPE_CHECKING:
     from study_app.protocol.words import Words
-    from study_app.session.runner import TankView
+    from study_app.session.trial import TankView
 
 # Where the tank lies in the window, in shares of it.
 AREA = (0.075, 0.122, 0.85, 0.712)

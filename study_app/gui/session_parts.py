@@ -12,7 +12,7 @@ from study_app.protocol.schedule import Schedule
 from study_app.session.pages import Page
 from study_app.session.ports import RecorderPort, ServoPort
 from study_app.session.resume import FIRST, Start
-from study_app.session.runner import TankView
+from study_app.session.trial import TankView
 
 
 class ServoPanel(ServoPort, Protocol):

@@ -5,10 +5,10 @@ gets addresses as plain numbers, so that one specialisation serves all of them. 
 driver in C offers its functions as anything that has an ``address``.
 
 ==========  ======================================================================================================
-``READ``    ``int32 (intp context, int64 now_ns, intp reading)``: fill one ``layout.READING`` record; return
-            ``READ_NEW``, ``READ_NOTHING_NEW`` or ``READ_LOST``
-``WRITE``   ``int32 (intp context, float64 fx, float64 fy, float64 fz)``: force on the hand [N], hand frame;
-            return 0, or ``READ_LOST``
+``READ``    ``int32 (intp context, int64 now_ns, intp reading)``: fill the ``layout.READING`` record at the address
+            ``reading``, no further than its ``size_bytes``; return ``READ_NEW``, ``READ_NOTHING_NEW`` or ``READ_LOST``
+``WRITE``   ``int32 (intp context, intp command)``: send the force of the ``layout.COMMAND`` record at the address
+            ``command``; where another force is sent, say so in it; return 0, or ``READ_LOST``
 ``NOW``     ``int64 (intp context)``: monotonic time [ns]
 ``SLEEP``   ``int64 (intp context, int64 deadline_ns)``: return not before the deadline; gives the time then [ns]
 ==========  ======================================================================================================
@@ -27,9 +27,10 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 from study_app.haptics.compiled import CACHE  # decided before the first is made
+from study_app.haptics.dynamics import Dynamics
 
 READ = types.int32(types.intp, types.int64, types.intp)
-WRITE = types.int32(types.intp, types.float64, types.float64, types.float64)
+WRITE = types.int32(types.intp, types.intp)
 NOW = types.int64(types.intp)
 SLEEP = types.int64(types.intp, types.int64)
 
@@ -42,8 +43,8 @@ class Driver(Protocol):
     """What the servo needs of a device, and no more (``devices.base.Device`` is the whole).
 
     ``name`` is the word that ``open_device`` takes, ``read`` and ``write`` are C functions (whatever has an
-    ``address``), ``context`` is the address of the device's own memory, handed to both, and ``force_limit_n`` the
-    greatest force it may be asked for [N].
+    ``address``), ``context`` is the address of the device's own memory, handed to both, ``force_limit_n`` the
+    greatest force it may be asked for [N], and ``dynamics`` what it measured of itself when it was opened.
     """
 
     name: str
@@ -51,6 +52,11 @@ class Driver(Protocol):
     write: Any
     context: int
     force_limit_n: float
+
+    @property
+    def dynamics(self) -> Dynamics:
+        """What it measured of itself when it was opened."""
+        ...
 
 
 _alloca_once: Any = cgutils.alloca_once

@@ -6,19 +6,22 @@ buoyancy and weight, which only lend energy, and Δp the step of the hand in the
 
 The account E begins at 0 with a scene and holds at most what the liquid can return::
 
-    E ← min(E - f·Δp, reserve),    reserve = (4/27) c |v_wake|³ N T / scale + m |v - v_current|² / (2 scale)
+    E ← min(E - f·Δp, reserve),    reserve = (4/27) c |v_wake|³ N T / scale + m |v - v_current|² / (2 scale) + K τ P
 
 A wake of speed u gives a body of speed v the power c (u - v)² v, at most that at v = u/3, and it lasts for N ticks of
 T. m is the added mass and, with a history, its inertia in a sway of 1 Hz, 3πR² √(2µρ/ω) (Landau & Lifshitz, §24), as
-far as they are sent (`pack`).
+far as they are sent (`pack`). τ is the lag of the velocity estimator and P = max(-f·v̂, 0) the power that it takes: a
+filtered damper stores up to K τ P (`_filter_storage`). Without this term the lag of each quick reversal would count as
+a debt.
 
-A filter that lags, a loop that is late, a force held for too long all show as E < 0. E is kept twice, for a force that
-acts at once and for one that acts as late as the loop is believed to be; the lower counts. The liquid may owe 1 mJ;
-with D = -1 mJ - E, its debt beyond that:
+A loop that is late and a force held for too long show as E < 0. E is kept three times: for a force that acts at once,
+for one that acts as late as the loop is believed to be, and for one that acts a tick later still; the lowest counts. A
+force that is under way belongs to an earlier velocity: a late balance may hold what was stored then. The liquid may owe
+1 mJ; with D = -1 mJ - E, its debt beyond that:
 
 - `weaken`: a debt of 0.125 mJ halves the force, one of 0.375 mJ halves it again, and it comes back at 50 % a second: a
   loop that swings has its gain lowered until it does not, instead of being caught at every swing;
-- `settle`: what pushes the hand along its way may not spend in 10 ms more than is left; in debt it is let go, and
+- `settle`: what pushes the hand along its way may not spend in 20 ms more than is left; in debt it is let go, and
   damping added until the next step would pay the debt, up to half the damping that the loop bears, weakened likewise.
   The way is taken from the last 2 ms; what is slower than 40 mm/s may be a count of the encoder, and is no way yet;
 - the whole force is kept within F - D / R, F and R being the strongest force and the longest step so far. So E ≥ -1 mJ
@@ -34,6 +37,7 @@ import math
 from typing import Any
 
 from study_app.haptics.compiled import kernel, part
+from study_app.haptics.dynamics import MOST_DELAY
 from study_app.haptics.effects.drag import resistance
 from study_app.haptics.effects.records import LAW_CONSTANT
 from study_app.haptics.layout import (
@@ -42,13 +46,12 @@ from study_app.haptics.layout import (
     EFFECT_LOCAL_WAKE,
     EFFECT_WAKE,
     LIMITER_ENERGY,
-    MOST_DELAY,
     Record,
 )
-from study_app.haptics.vector import clear, copy, distance, norm, square
+from study_app.haptics.vector import clear, copy, distance, is_finite, norm, square
 
 ALLOWANCE_J = 1e-3
-SPENDING_S = 10e-3
+SPENDING_S = 20e-3
 HALVING_J = 0.125e-3
 FORGIVEN_W = 1e-3
 HISTORY_PERIOD_S = 1.0
@@ -56,6 +59,7 @@ SMOOTHING_S = 2e-3
 SURE_MPS = 0.04
 BRAKE = 0.5
 RECOVERY_PER_S = 0.5
+DELIVERY_STEPS_PER_N = 2.0**14
 
 
 @kernel
@@ -63,16 +67,21 @@ def open_account(account: Record) -> None:
     """Begin at 0, with nothing sent: what came before was another liquid's."""
     account.balance_j = 0.0
     account.late_balance_j = 0.0
+    account.later_balance_j = 0.0
+    account.reserve_j = 0.0
     account.turn = 0
-    for turn in range(MOST_DELAY + 1):
+    for turn in range(MOST_DELAY + 2):
         clear(account.sent_n[turn])
+        account.stored_j[turn] = 0.0
     clear(account.impulse_ns)
     clear(account.late_impulse_ns)
+    clear(account.later_impulse_ns)
     account.impulse_s = 0.0
     clear(account.velocity_mps)
     account.longest_m = 0.0
     account.strongest_n = 0.0
     account.gain = 1.0
+    account.norm_share = 1.0
     account.settling = 0
     clear(account.lift_n)
     clear(account.lift_before_n)
@@ -80,16 +89,18 @@ def open_account(account: Record) -> None:
 
 @part
 def observe(model: Any, safety: Record, interval_s: float) -> None:
-    """Enter the work of the last step into the account; ``interval_s`` is 0 where there is no new sample.
+    """Enter the work of the last step into the balances; ``interval_s`` is 0 where there is no new sample.
 
     Where several forces were sent between two samples, their mean over time counts.
     """
     parameters, state, account = model.parameters[0], model.state[0], safety.account
-    late = account.turn - parameters.delay_ticks
-    sent_n, late_n = account.sent_n[account.turn], account.sent_n[late if late >= 0 else late + MOST_DELAY + 1]
+    sent_n = account.sent_n[account.turn]
+    late_n = account.sent_n[_row_before(account, safety.delay_ticks)]
+    later_n = account.sent_n[_row_before(account, safety.delay_ticks + 1)]
     for axis in range(3):
         account.impulse_ns[axis] += sent_n[axis] * safety.turn_s
         account.late_impulse_ns[axis] += late_n[axis] * safety.turn_s
+        account.later_impulse_ns[axis] += later_n[axis] * safety.turn_s
     account.impulse_s += safety.turn_s
     if interval_s == 0.0:
         return
@@ -97,27 +108,52 @@ def observe(model: Any, safety: Record, interval_s: float) -> None:
         account.impulse_s = 1.0
         copy(sent_n, account.impulse_ns)
         copy(late_n, account.late_impulse_ns)
+        copy(later_n, account.later_impulse_ns)
     share = interval_s / SMOOTHING_S
     weight = share / (1.0 + share * (0.5 + share / 12.0))  # 1 - exp(-share), to 1 % over four milliseconds
     per_scale, per_s = 1.0 / parameters.scale, 1.0 / interval_s
-    work_j = late_work_j = square_m2 = 0.0
+    work_j = late_work_j = later_work_j = square_m2 = 0.0
     for axis in range(3):
         moved_m = state.position_m[axis] - state.previous_m[axis] - state.drift_mps[axis] * interval_s
         step_m = moved_m * per_scale
         square_m2 += step_m * step_m
         work_j -= account.impulse_ns[axis] * step_m
         late_work_j -= account.late_impulse_ns[axis] * step_m
+        later_work_j -= account.later_impulse_ns[axis] * step_m
         account.velocity_mps[axis] += weight * (step_m * per_s - account.velocity_mps[axis])
-    work_j /= account.impulse_s
-    late_work_j /= account.impulse_s
     if square_m2 > account.longest_m * account.longest_m:
         account.longest_m = math.sqrt(square_m2)
-    most_j, forgiven_j = reserve(model), FORGIVEN_W * interval_s
-    account.balance_j = min(_forgive(account.balance_j, forgiven_j) + work_j, most_j)
-    account.late_balance_j = min(_forgive(account.late_balance_j, forgiven_j) + late_work_j, most_j)
+    stored_j, forgiven_j = _filter_storage(model, account), FORGIVEN_W * interval_s
+    account.stored_j[account.turn] = stored_j
+    late_j = max(stored_j, account.stored_j[_row_before(account, safety.delay_ticks)])
+    later_j = max(late_j, account.stored_j[_row_before(account, safety.delay_ticks + 1)])
+    most_j = _liquid_storage(model, safety.delay_ticks)
+    account.reserve_j = most_j + late_j
+    per_time = 1.0 / account.impulse_s
+    account.balance_j = min(_forgive(account.balance_j, forgiven_j) + work_j * per_time, most_j + stored_j)
+    account.late_balance_j = min(
+        _forgive(account.late_balance_j, forgiven_j) + late_work_j * per_time, account.reserve_j
+    )
+    account.later_balance_j = min(
+        _forgive(account.later_balance_j, forgiven_j) + later_work_j * per_time, most_j + later_j
+    )
     clear(account.impulse_ns)
     clear(account.late_impulse_ns)
+    clear(account.later_impulse_ns)
     account.impulse_s = 0.0
+
+
+@part
+def _row_before(account: Record, ticks: int) -> int:
+    """Return the row of the force that was sent so many ticks before the last one."""
+    row: int = account.turn - ticks
+    return row if row >= 0 else row + MOST_DELAY + 2
+
+
+@part
+def _left_j(account: Record) -> float:
+    """Return how far the lowest balance is above what may be owed [J]; below 0 it is a debt."""
+    return float(ALLOWANCE_J + min(account.balance_j, account.late_balance_j, account.later_balance_j))
 
 
 @part
@@ -126,25 +162,50 @@ def _forgive(balance_j: float, forgiven_j: float) -> float:
 
 
 @part
-def reserve(model: Any) -> float:
+def _liquid_storage(model: Any, delay_ticks: int) -> float:
     """Return the most that the liquids can still give back [J at the hand]."""
     parameters = model.parameters[0]
     most_j = 0.0
     for i in range(parameters.liquids):
         liquid, local = model.liquids[i], model.liquid_states[i]
+        inertia_share = liquid.inertia_share[delay_ticks]
         if local.share > 0.0:
             if liquid.effects & EFFECT_WAKE:
                 most_j += _wake_power(liquid, local) * liquid.wake.length * parameters.period_s
             if liquid.effects & EFFECT_LOCAL_WAKE:
                 most_j += _wake_power(liquid, local) * liquid.local_wake.length * parameters.period_s
             if liquid.effects & EFFECT_ADDED_MASS:
-                most_j += (
-                    0.5 * liquid.inertia_share * liquid.added_mass.mass_kg * local.share * square(local.motion_mps)
-                )
+                most_j += 0.5 * inertia_share * liquid.added_mass.mass_kg * local.share * square(local.motion_mps)
             if liquid.effects & EFFECT_HISTORY:
                 inertia_kg = 0.5 * liquid.history.factor_kg_rs * local.share * math.sqrt(HISTORY_PERIOD_S)
-                most_j += 0.5 * liquid.inertia_share * inertia_kg * square(local.motion_mps)
+                most_j += 0.5 * inertia_share * inertia_kg * square(local.motion_mps)
     return float(most_j / parameters.scale)
+
+
+@part
+def _filter_storage(model: Any, account: Record) -> float:
+    """Return the energy [J at the hand] that the velocity estimator stores because it lags behind.
+
+    With v̂' = (v − v̂)/τ a damper F(v̂) takes ∫F v dt = ∫F v̂ dt + τ∫F dv̂ from the hand: the second term is a storage,
+    K τ F v̂ with K = 1/3 for a force that grows as v̂², 1/2 for one that grows as v̂. Where only the share s of F is left
+    at the force limit, K = 1 - 2/3 √s and 1 - s/2. A loop that has shown a debt is believed less of it, by the
+    controller's gain: a swinging loop would live on its storage.
+    """
+    parameters, state = model.parameters[0], model.state[0]
+    lag_s = parameters.fallback_lag_s if state.kalman.distrusted else parameters.filter_lag_s
+    if lag_s == 0.0:
+        return 0.0
+    sent_n = account.sent_n[account.turn]
+    power_w = 0.0
+    for axis in range(3):
+        power_w -= sent_n[axis] * (state.estimate_mps[axis] - state.drift_mps[axis])
+    if power_w <= 0.0:
+        return 0.0
+    share = 1.0 - 2.0 / 3.0 * math.sqrt(account.norm_share)
+    for i in range(parameters.liquids):
+        if model.liquids[i].drag.law != LAW_CONSTANT and model.liquid_states[i].share > 0.0:
+            share = max(share, 1.0 - 0.5 * account.norm_share)
+    return float(account.gain * share * lag_s * power_w / parameters.scale)
 
 
 @part
@@ -161,7 +222,7 @@ def _wake_power(liquid: Record, local: Record) -> float:
 @part
 def weaken(parameters: Record, account: Record, sample: Record) -> None:
     """Send a share of the force, halved by every halving debt, and all of it again only seconds after the last."""
-    left_j = ALLOWANCE_J + min(account.balance_j, account.late_balance_j)
+    left_j = _left_j(account)
     account.gain = min(account.gain * (1.0 + RECOVERY_PER_S * parameters.period_s), 1.0)
     if left_j < 0.0:
         account.gain = min(account.gain, HALVING_J / (HALVING_J - left_j))
@@ -173,10 +234,11 @@ def weaken(parameters: Record, account: Record, sample: Record) -> None:
 
 
 @part
-def settle(parameters: Record, account: Record, sample: Record) -> None:
+def settle(parameters: Record, safety: Record, sample: Record) -> None:
     """Change the force about to be sent so that a debt is paid back, and cannot grow beyond one step's work."""
-    left_j = ALLOWANCE_J + min(account.balance_j, account.late_balance_j)
-    given = _give_way(parameters, account, left_j, sample.device_force_n)
+    account = safety.account
+    left_j = _left_j(account)
+    given = _give_way(parameters, safety, left_j, sample.device_force_n)
     kept = left_j < 0.0 and _keep_within(
         max(account.strongest_n + left_j / account.longest_m, 0.0), account, sample.device_force_n
     )
@@ -199,11 +261,12 @@ def _keep_within(most_n: float, account: Record, force_n: Any) -> bool:
 
 
 @part
-def _give_way(parameters: Record, account: Record, left_j: float, force_n: Any) -> bool:
+def _give_way(parameters: Record, safety: Record, left_j: float, force_n: Any) -> bool:
     """Let go of what pushes the hand along its way faster than what is left may be spent; in debt, add damping.
 
     Return whether the force was changed.
     """
+    account = safety.account
     v_mps, lift_n = account.velocity_mps, account.lift_n
     square_mps2 = square(v_mps)
     if square_mps2 <= SURE_MPS * SURE_MPS:
@@ -218,7 +281,8 @@ def _give_way(parameters: Record, account: Record, left_j: float, force_n: Any) 
     if left_j >= 0.0:
         wanted_n = left_j / (SPENDING_S * speed_mps)
     else:
-        bearable_n = BRAKE * account.gain * parameters.slope_limit_nspm * parameters.scale * speed_mps
+        limit_nspm = parameters.slope_limit_nspm[safety.delay_ticks] * parameters.scale
+        bearable_n = BRAKE * account.gain * limit_nspm * speed_mps
         wanted_n = -min(-left_j / (parameters.period_s * speed_mps), bearable_n)
     if along_n <= wanted_n:
         return False
@@ -229,9 +293,38 @@ def _give_way(parameters: Record, account: Record, left_j: float, force_n: Any) 
 
 
 @part
-def remember(account: Record, force_n: Any) -> None:
-    """Keep the force that is sent, buoyancy aside."""
-    account.turn = account.turn + 1 if account.turn < MOST_DELAY else 0
+def log_command(account: Record, force_n: Any) -> None:
+    """Log the force that the device is asked for, as the one that it sends."""
+    stored_j = account.stored_j[account.turn]
+    account.turn = account.turn + 1 if account.turn <= MOST_DELAY else 0
+    account.stored_j[account.turn] = stored_j  # until the next sample
+    _log(account, force_n)
+
+
+@kernel
+def log_delivery(safety: Record, sample: Record, sent_n: Any) -> None:
+    """Log what the device sent in place of the last command: ``sent_n`` (3,) [N on the hand].
+
+    Both are rounded to what a recording keeps, so that the tick can be recomputed from the recording. Where they are
+    the same then, or the device reports a force that is not finite, the command counts.
+    """
+    if not is_finite(sent_n):
+        return
+    same = True
+    for axis in range(3):
+        if round(sent_n[axis] * DELIVERY_STEPS_PER_N) != round(sample.command_n[axis] * DELIVERY_STEPS_PER_N):
+            same = False
+    if same:
+        return
+    for axis in range(3):
+        sample.device_force_n[axis] = round(sent_n[axis] * DELIVERY_STEPS_PER_N) / DELIVERY_STEPS_PER_N
+    _log(safety.account, sample.device_force_n)
+    sample.withheld_n = distance(safety.permitted_n, sample.device_force_n)
+
+
+@part
+def _log(account: Record, force_n: Any) -> None:
+    """Keep the force of this tick, buoyancy aside."""
     sent_n = account.sent_n[account.turn]
     for axis in range(3):
         sent_n[axis] = force_n[axis] - account.lift_n[axis]

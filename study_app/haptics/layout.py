@@ -10,6 +10,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from study_app.haptics.dynamics import MOST_DELAY
 from study_app.haptics.effects.records import (
     ADDED_MASS,
     ADDED_MASS_STATE,
@@ -26,6 +27,7 @@ from study_app.haptics.effects.records import (
     WAKE,
     WAKE_STATE,
 )
+from study_app.haptics.kalman_records import KALMAN_STATE
 
 Record: TypeAlias = Any  # one row of a recarray: fields as attributes, compiled or not
 
@@ -39,8 +41,9 @@ LIMITER_FADE = 1 << 5
 LIMITER_STALE = 1 << 6
 LIMITER_GLITCH = 1 << 7  # the position was refused: nobody may believe it
 LIMITER_STOP = 1 << 8
+LIMITER_ESTIMATOR = 1 << 9  # the velocity is EWMA's: the Kalman filter was in trouble within the last second
 
-LIMITER_NAMES = ("slope", "non_finite", "energy", "norm", "slew", "fade", "stale", "glitch", "stop")
+LIMITER_NAMES = ("slope", "non_finite", "energy", "norm", "slew", "fade", "stale", "glitch", "stop", "estimator")
 
 # Status of the servo, in Sample.status; the owner turns a fault into ServoFault.
 STATUS_OK = 0
@@ -62,7 +65,11 @@ SAMPLE = np.dtype(
         ("velocity_mps", np.float64, (3,)),  # scene frame, after estimator and knee
         ("wake_mps", np.float64, (3,)),  # scene frame, as used by this tick's drag
         ("force_n", np.float64, (3,)),  # sum of the effects on the body, before slope limit and safety
-        ("device_force_n", np.float64, (3,)),  # as sent, on the hand
+        ("command_n", np.float64, (3,)),  # the force on the hand that the servo asked the device for
+        ("device_force_n", np.float64, (3,)),  # the force on the hand that the device sent
+        ("permitted_n", np.float64),  # size of the force after slope limits, norm and fades
+        ("withheld_n", np.float64),  # size of what passivity controller, slew limit and device changed of it
+        ("delay_ticks", np.int64),  # how many writes late a force is believed to act
         ("buttons", np.int64),  # bit set: button 1 is bit 0
         ("limiters", np.int64),  # LIMITER_* bits that acted
         ("fresh", np.int64),  # 1 where the device reported a new sample
@@ -71,10 +78,26 @@ SAMPLE = np.dtype(
     align=True,
 )
 
+CONTRACT_VERSION = 1
+"""Of `READING` and `COMMAND`. Later versions append fields: a driver uses those that fit into ``size_bytes``."""
+
 READING = np.dtype(
     [
+        ("version", np.int64),  # CONTRACT_VERSION, by the servo
+        ("size_bytes", np.int64),  # bytes of this record, by the servo: a driver writes nothing beyond
         ("position_m", np.float64, (3,)),  # hand frame, after the driver's mapping
         ("buttons", np.int64),
+        ("delay_ticks", np.int64),  # how many writes late a force acts, as measured while running; -1: not measured
+    ],
+    align=True,
+)
+
+COMMAND = np.dtype(
+    [
+        ("version", np.int64),  # CONTRACT_VERSION, by the servo
+        ("size_bytes", np.int64),  # bytes of this record, by the servo
+        ("force_n", np.float64, (3,)),  # to send: force on the hand, hand frame
+        ("sent_n", np.float64, (3,)),  # ``force_n``; a driver that sends another force puts that here
     ],
     align=True,
 )
@@ -103,6 +126,7 @@ ESTIMATOR_GIVEN = 1
 ESTIMATOR_LINE = 2
 ESTIMATOR_FOAW = 3
 ESTIMATOR_RAW = 4
+ESTIMATOR_KALMAN = 5
 
 KNEE_NONE = 0
 KNEE_SQRT = 1
@@ -126,9 +150,13 @@ PARAMETERS = np.dtype(
         ("tolerance_m", np.float64),  # of foaw, in the scene
         ("knee_law", np.int64),  # KNEE_*
         ("knee_threshold_mps", np.float64),
-        ("slope_limit_nspm", np.float64),  # greatest |drag| / |relative velocity| [N·s/m, scene]
+        ("slope_limit_nspm", np.float64, (MOST_DELAY + 1,)),  # greatest |drag| / |w| [N·s/m, scene], by the delay
         ("force_limit_n", np.float64),
-        ("delay_ticks", np.int64),  # how many turns late a force is believed to act
+        ("slew_n", np.float64),  # the most that the force changes within a tick, while the loop shows no energy debt
+        ("filter_lag_s", np.float64),  # mean delay of the velocity estimator, as far as it stores energy
+        ("fallback_lag_s", np.float64),  # the same of EWMA, which stands in for a Kalman filter in trouble
+        ("count_m", np.float64),  # one encoder count of the device, hand frame
+        ("mass_kg", np.float64),  # the least mass that the device presents
     ],
     align=True,
 )
@@ -145,7 +173,7 @@ REGION = np.dtype(
 LIQUID = np.dtype(
     [
         ("effects", np.int64),
-        ("inertia_share", np.float64),  # how much of added mass and history the loop bears
+        ("inertia_share", np.float64, (MOST_DELAY + 1,)),  # how much of added mass and history the loop bears
         ("region", REGION),
         ("drag", DRAG),
         ("wake", WAKE),
@@ -171,6 +199,7 @@ STATE = np.dtype(
         ("window_held", np.int64),  # how many samples are in it
         ("weight", np.float64),  # of the newest difference, for an interval of ``weighted_s``
         ("weighted_s", np.float64),
+        ("kalman", KALMAN_STATE),
         ("estimate_mps", np.float64, (3,)),  # the estimator's own velocity, before the knee
         ("velocity_mps", np.float64, (3,)),  # after the knee
         ("wake_mps", np.float64, (3,)),  # of the last listed liquid that acts, as used by drag
@@ -211,21 +240,24 @@ LIQUID_STATE = np.dtype(
 )
 
 # The energy that hand and liquid owe each other, at the hand (haptics.energy).
-MOST_DELAY = 4  # turns that a force may be late
-
 ACCOUNT = np.dtype(
     [
         ("balance_j", np.float64),  # E: what the hand put in and did not get back yet, were forces to act at once
         ("late_balance_j", np.float64),  # the same, if they act as late as the loop is believed to be
+        ("later_balance_j", np.float64),  # the same, if they act one tick later still
         ("turn", np.int64),  # the row of the newest force below
-        ("sent_n", np.float64, (MOST_DELAY + 1, 3)),  # forces of the last turns, without buoyancy and weight
+        ("sent_n", np.float64, (MOST_DELAY + 2, 3)),  # forces of the last turns, without buoyancy and weight
+        ("reserve_j", np.float64),  # the most that liquids and estimator could give back at the last sample
+        ("stored_j", np.float64, (MOST_DELAY + 2,)),  # what the velocity estimator stored then, at the hand
         ("impulse_ns", np.float64, (3,)),  # such a force times time, summed since the last sample [N·s]
         ("late_impulse_ns", np.float64, (3,)),  # the same of late forces
+        ("later_impulse_ns", np.float64, (3,)),  # the same of forces one tick later still
         ("impulse_s", np.float64),  # the time since then
         ("velocity_mps", np.float64, (3,)),  # the hand's in the frame of the current, smoothed over 2 ms
         ("longest_m", np.float64),  # the longest step so far
         ("strongest_n", np.float64),  # the strongest force so far
         ("gain", np.float64),  # share of the force that is sent
+        ("norm_share", np.float64),  # share of it that the force limit leaves
         ("settling", np.int64),  # 1 if the force of the last turn was changed to pay a debt
         ("lift_n", np.float64, (3,)),  # buoyancy and weight in the force that is sent
         ("lift_before_n", np.float64, (3,)),  # the same of the turn before
@@ -247,6 +279,10 @@ SAFETY = np.dtype(
         ("fade", np.float64),  # share of the force that is sent, 0 … 1
         ("fade_s", np.float64),  # how long a fade from 0 to 1 takes at present
         ("device_limit_n", np.float64),  # the device's own force limit
+        ("delay_ticks", np.int64),  # how many writes late a force is believed to act, 0 … MOST_DELAY
+        ("slower", np.int64),  # samples in a row that the device measured a longer delay at
+        ("faster", np.int64),  # samples in a row that it measured a shorter one at
+        ("permitted_n", np.float64, (3,)),  # the force after slope limits, norm and fades
         ("slewed_n", np.float64, (3,)),  # the force of the last turn, before the energy account changed it
         ("account", ACCOUNT),  # begins anew with each scene
     ],
@@ -257,3 +293,19 @@ SAFETY = np.dtype(
 def records(dtype: np.dtype[Any], count: int) -> Any:
     """Return ``count`` zeroed records of ``dtype`` as a contiguous ``np.recarray`` of shape (count,)."""
     return np.zeros(count, dtype).view(np.recarray)
+
+
+def new_reading() -> Any:
+    """Return one ``READING``, shape (1,), that says its version and size."""
+    return _versioned(READING)
+
+
+def new_command() -> Any:
+    """Return one ``COMMAND``, shape (1,), that says its version and size and commands zero force."""
+    return _versioned(COMMAND)
+
+
+def _versioned(dtype: np.dtype[Any]) -> Any:
+    record = records(dtype, 1)
+    record[0].version, record[0].size_bytes = CONTRACT_VERSION, dtype.itemsize
+    return record

@@ -12,7 +12,7 @@ from importlib import resources
 from typing import Final, NamedTuple
 
 from study_app.errors import StudyError
-from study_app.haptics.scene import Ewma, Velocity
+from study_app.haptics.scene import Ewma, Given, Velocity
 
 SLOWEST_HZ: Final = 500.0
 """Slower servos are for trying out: what participants would feel there is the limits rather than the liquids."""
@@ -20,6 +20,16 @@ SLOWEST_HZ: Final = 500.0
 
 INERTIA_SHARE: Final = 0.3
 """Of the limit on drag, for added mass and history, where they need not be felt as they are."""
+CUT_INERTIA_SHARE: Final = 0.15
+"""The same where added mass and history do not fit whole: with more of them, freed handles of 50 g swung for 0.6 s."""
+
+MEASURED_KG: Final = 0.1
+"""The free handle that the table was measured with."""
+LIGHTER: Final = 1.15
+"""Power of the ratio of masses in which a lighter handle bears less: at 1, a freed handle of 30 g swung in honey."""
+SLEW_N: Final = 1.5
+"""The most that the force on a handle of `MEASURED_KG` or more changes within a millisecond."""
+SLEW_S: Final = 1e-3
 
 _THESIS: Final = Ewma()
 _SAME: Final = 1e-9  # of two periods that differ by rounding alone
@@ -33,9 +43,13 @@ class Bearable(NamedTuple):
 
 
 class Entry(NamedTuple):
-    """One line of the table: a velocity estimator, a tick period and a delay, and what a loop of that kind bears."""
+    """One line of the table: a velocity estimator, a tick period and a delay, and what a loop of that kind bears.
+
+    ``alpha`` is that of "ewma"; None for the others.
+    """
 
     estimator: str
+    alpha: float | None
     period_s: float
     delay_ticks: int
     bearable: Bearable
@@ -49,16 +63,18 @@ def slope_limit(period_s: float, delay_ticks: int, velocity: Velocity = _THESIS)
 def bearable(period_s: float, delay_ticks: int, velocity: Velocity = _THESIS) -> Bearable:
     """Return what a loop bears that has a tick period [s], a delay [ticks] and a velocity estimator.
 
-    Between two entries of the table the worse one counts, and of delays the next longer; beyond the fastest, less in
-    the ratio of the periods. The table holds each estimator as it comes; one that is set to smooth less is also held to
-    what the raw difference bears. A given velocity comes from no estimator; it is taken as the thesis' own, "ewma".
+    Between two entries of the table, of periods as of alphas, the worse one counts, and of delays the next longer;
+    beyond the fastest, less in the ratio of the periods. Windows stand in the table as they come; one that is set to
+    smooth less is also held to what the raw difference bears. A given velocity comes from no estimator; it is taken as
+    the thesis' own, "ewma". The entries of "kalman" hold where the delay is one tick longer or shorter than believed,
+    and while EWMA stands in for the filter.
 
     Raises
     ------
     StudyError
         A loop slower or more delayed than any entry.
     """
-    found = [one for name in _names(velocity) for one in _neighbours(name, period_s, delay_ticks)]
+    found = [one for row in _rows(velocity) for one in _neighbours(row, period_s, delay_ticks)]
     if not found:
         raise StudyError(
             f"no stable force is known for {1 / period_s:g} ticks a second with {delay_ticks} ticks of delay: "
@@ -68,22 +84,31 @@ def bearable(period_s: float, delay_ticks: int, velocity: Velocity = _THESIS) ->
     return Bearable(*(beyond * min(limits) for limits in zip(*found, strict=True)))
 
 
-def _names(velocity: Velocity) -> tuple[str, ...]:
-    """Return the estimators of the table that bound this one."""
-    if velocity.kind == "given":
-        return ("ewma",)
+def slew_limit_n(period_s: float, mass_kg: float) -> float:
+    """Return the most that the force on a handle of this mass [kg] changes within a tick [N].
+
+    A loop slower than 1 kHz gets as much a millisecond.
+    """
+    return SLEW_N * min(mass_kg / MEASURED_KG, 1.0) * max(period_s / SLEW_S, 1.0)
+
+
+def _rows(velocity: Velocity) -> tuple[tuple[str, float | None], ...]:
+    """Return estimator and alpha of the entries that bound this estimator."""
+    if isinstance(velocity, Ewma | Given):
+        alpha = getattr(velocity, "alpha", _THESIS.alpha)
+        known = sorted({entry.alpha for entry in table() if entry.alpha is not None})
+        below = max((it for it in known if it <= alpha), default=known[0])
+        return ("ewma", below), ("ewma", min(it for it in known if it >= alpha))
     usual = type(velocity)()
-    noisier = (
-        getattr(velocity, "alpha", 0.0) > getattr(usual, "alpha", 0.0)
-        or getattr(velocity, "samples", 0) < getattr(usual, "samples", 0)
-        or getattr(velocity, "tolerance_m", 0.0) < getattr(usual, "tolerance_m", 0.0)
+    noisier = getattr(velocity, "samples", 0) < getattr(usual, "samples", 0) or (
+        getattr(velocity, "tolerance_m", 0.0) < getattr(usual, "tolerance_m", 0.0)
     )
-    return (velocity.kind, "raw") if noisier else (velocity.kind,)
+    return ((velocity.kind, None), ("raw", None)) if noisier else ((velocity.kind, None),)
 
 
-def _neighbours(name: str, period_s: float, delay_ticks: int) -> list[Bearable]:
+def _neighbours(row: tuple[str, float | None], period_s: float, delay_ticks: int) -> list[Bearable]:
     """Return what an estimator bears at the next longer delay, at the next slower and the next faster rate."""
-    known = [entry for entry in table() if entry.estimator == name and entry.delay_ticks >= delay_ticks]
+    known = [it for it in table() if (it.estimator, it.alpha) == row and it.delay_ticks >= delay_ticks]
     delay_ticks = min((entry.delay_ticks for entry in known), default=0)
     periods_s = {entry.period_s for entry in known}
     slower_s = [known_s for known_s in periods_s if known_s >= period_s * (1 - _SAME)]
@@ -101,6 +126,7 @@ def table() -> tuple[Entry, ...]:
         return tuple(
             Entry(
                 row["estimator"],
+                float(row["alpha"]) if row["alpha"] else None,
                 float(row["period_ms"]) * 1e-3,
                 int(row["delay_ticks"]),
                 Bearable(float(row["drag_nspm"]), float(row["inertia_nspm"])),

@@ -12,11 +12,18 @@ import numpy as np
 
 from study_app.haptics.cfunctions import NOW, READ, READ_LOST, READ_NEW, SLEEP, WRITE, call_at, fence
 from study_app.haptics.compiled import kernel
+from study_app.haptics.dynamics import MOST_DELAY
+from study_app.haptics.energy import log_delivery
 from study_app.haptics.layout import BUTTON_STOP, STATUS_DEVICE_LOST, STATUS_OK
 from study_app.haptics.safety import begin_scene
 from study_app.haptics.tick import tick
 
 _read, _write, _now, _sleep = call_at(READ), call_at(WRITE), call_at(NOW), call_at(SLEEP)
+
+SLOWER_SAMPLES = 3
+"""A longer delay is taken over after so many samples in a row that show it."""
+FASTER_SAMPLES = 1000
+"""A shorter one likewise: what was slow once may be so again."""
 
 CONTROL = np.dtype(
     [
@@ -55,6 +62,13 @@ class ClockCalls(NamedTuple):
     sleep: int
 
 
+class Records(NamedTuple):
+    """What loop and device exchange: (1,) arrays of ``layout.READING`` and ``layout.COMMAND``."""
+
+    reading: Any
+    command: Any
+
+
 class Output(NamedTuple):
     """Where samples go (``haptics.telemetry``)."""
 
@@ -63,13 +77,14 @@ class Output(NamedTuple):
 
 
 @kernel
-def run(control: Any, slots: Any, safety: Any, reading: Any, output: Any, device: Any, clock: Any, turns: int) -> int:
+def run(control: Any, slots: Any, safety: Any, exchanged: Any, output: Any, device: Any, clock: Any, turns: int) -> int:
     """Turn until the host or a fault ends it, or ``turns`` are done (below 0: without end); return how many were taken.
 
     Parameters
     ----------
-    control, safety, reading : (1,) arrays of ``CONTROL``, ``layout.SAFETY`` and ``layout.READING``
+    control, safety : (1,) arrays of ``CONTROL`` and ``layout.SAFETY``
     slots : the two models a scene may be in
+    exchanged : `Records`
     output, device, clock : what is written to and called
 
     Notes
@@ -88,7 +103,7 @@ def run(control: Any, slots: Any, safety: Any, reading: Any, output: Any, device
         sample.tick = host.turns
         sample.time_ns = began_ns
         sample.lateness_ns = began_ns - host.deadline_ns
-        _sense(sample, reading, device)
+        _sense(sample, safety[0], exchanged.reading, device)
         if sample.buttons & BUTTON_STOP:
             host.stop = 1
         _take_scene(host, slots, safety[0], sample)
@@ -98,8 +113,7 @@ def run(control: Any, slots: Any, safety: Any, reading: Any, output: Any, device
                 tick(first, safety[0], sample)
             else:
                 tick(second, safety[0], sample)
-        force = sample.device_force_n
-        if _write(device.write, device.context, force[0], force[1], force[2]) == READ_LOST:
+        if _send(sample, safety[0], exchanged.command, device) == READ_LOST:
             sample.status = STATUS_DEVICE_LOST
         ended_ns = _now(clock.now, clock.context)
         sample.busy_ns = ended_ns - began_ns
@@ -109,24 +123,63 @@ def run(control: Any, slots: Any, safety: Any, reading: Any, output: Any, device
         host.turns += 1
         done += 1
         _set_deadline(host, ended_ns)
-    _write(device.write, device.context, 0.0, 0.0, 0.0)
+    let_go(exchanged.command, device)
     return done
 
 
 @kernel
-def _sense(sample: Any, reading: Any, device: Any) -> None:
+def _sense(sample: Any, safety: Any, reading: Any, device: Any) -> None:
     """Read the device into ``sample``; a lost one leaves its status, no velocity and no force."""
+    reading[0].delay_ticks = -1
     answer = _read(device.read, device.context, sample.time_ns, np.intp(reading.ctypes.data))
     sample.fresh = 1 if answer == READ_NEW else 0
     sample.status = STATUS_DEVICE_LOST if answer == READ_LOST else STATUS_OK
+    follow_delay(safety, sample, reading[0].delay_ticks)
     sample.buttons = reading[0].buttons
     sample.limiters = 0
+    sample.permitted_n = sample.withheld_n = 0.0
+    sample.delay_ticks = safety.delay_ticks
     for axis in range(3):
         sample.position_m[axis] = reading[0].position_m[axis]
         sample.velocity_mps[axis] = 0.0
         sample.wake_mps[axis] = 0.0
         sample.force_n[axis] = 0.0
+        sample.command_n[axis] = 0.0
         sample.device_force_n[axis] = 0.0
+
+
+@kernel
+def follow_delay(safety: Any, sample: Any, measured: int) -> None:
+    """Take over a delay that the device measures while it runs: a longer one soon, a shorter one by and by.
+
+    A sample that is later than any loop is stable with does not count as new.
+    """
+    if measured < 0 or sample.fresh == 0:
+        return
+    if measured > MOST_DELAY:
+        sample.fresh = 0
+    safety.slower = safety.slower + 1 if measured > safety.delay_ticks else 0
+    safety.faster = safety.faster + 1 if measured < safety.delay_ticks else 0
+    if safety.slower >= SLOWER_SAMPLES:
+        safety.delay_ticks = min(measured, MOST_DELAY)
+        safety.slower = 0
+    elif safety.faster >= FASTER_SAMPLES:
+        safety.delay_ticks -= 1
+        safety.faster = 0
+
+
+@kernel
+def _send(sample: Any, safety: Any, command: Any, device: Any) -> int:
+    """Command the device to send the force, and log what it sent instead, if it did."""
+    row = command[0]
+    for axis in range(3):
+        row.force_n[axis] = row.sent_n[axis] = sample.device_force_n[axis]
+    answer = _write(device.write, device.context, np.intp(command.ctypes.data))
+    for axis in range(3):
+        if row.sent_n[axis] != row.force_n[axis]:
+            log_delivery(safety, sample, row.sent_n)
+            break
+    return int(answer)
 
 
 @kernel
@@ -185,6 +238,8 @@ def offer_numbers(control: Any, slot: int, serial: int) -> None:
 
 
 @kernel
-def let_go(device: Any) -> None:
-    """Write zero force to the device."""
-    _write(device.write, device.context, 0.0, 0.0, 0.0)
+def let_go(command: Any, device: Any) -> None:
+    """Command zero force."""
+    for axis in range(3):
+        command[0].force_n[axis] = command[0].sent_n[axis] = 0.0
+    _write(device.write, device.context, np.intp(command.ctypes.data))

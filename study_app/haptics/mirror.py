@@ -13,6 +13,7 @@ import numpy as np
 
 from study_app.haptics.compiled import kernel, part
 from study_app.haptics.effects.wake import REST_MPS
+from study_app.haptics.energy import log_delivery
 from study_app.haptics.layout import (
     EFFECT_LOCAL_WAKE,
     EFFECT_WAKE,
@@ -22,7 +23,7 @@ from study_app.haptics.layout import (
     records,
 )
 from study_app.haptics.tick import tick
-from study_app.haptics.vector import clear, copy, distance
+from study_app.haptics.vector import copy, distance, square
 
 PLACE = np.dtype(
     [
@@ -49,22 +50,44 @@ def new_trail(elements: int) -> tuple[Any, Any]:
     return records(TRAIL, 1), records(PLACE, elements)
 
 
+@part
+def was_lost_at_read(sample: Record) -> bool:
+    """Return whether the servo read a lost device: it took no tick then, and the device says what it holds."""
+    return bool(
+        sample.status == STATUS_DEVICE_LOST
+        and sample.fresh == 0
+        and sample.limiters == 0
+        and square(sample.force_n) == 0.0
+        and square(sample.velocity_mps) == 0.0
+    )
+
+
+@part
+def take_sample(model: Any, safety: Record, sample: Record, delivered: bool) -> None:
+    """Recompute the tick of a sample from what it says of the servo's input: stop, delay, and what the device sent."""
+    sent_x, sent_y, sent_z = sample.device_force_n[0], sample.device_force_n[1], sample.device_force_n[2]
+    as_asked = (
+        sent_x == sample.command_n[0] and sent_y == sample.command_n[1] and sent_z == sample.command_n[2]
+    ) or not delivered
+    safety.stop = 1 if sample.limiters & LIMITER_STOP else 0
+    safety.delay_ticks = sample.delay_ticks
+    tick(model, safety, sample)
+    if not as_asked:
+        log_delivery(safety, sample, (sent_x, sent_y, sent_z))
+
+
 @kernel
-def take_again(model: Any, safety: Record, samples: Any, trail: Record, places: Any) -> None:
+def take_again(model: Any, safety: Record, samples: Any, trail: Record, places: Any, delivered: bool) -> None:
     """Take each of ``samples`` as the servo took it, and write what comes out into them.
 
-    ``trail`` and ``places`` follow the wake of the model's first liquid.
+    ``trail`` and ``places`` follow the wake of the model's first liquid. ``delivered`` says that the forces in
+    ``samples`` answer this model's commands: where the device sent another one, it is logged.
     """
     for k in range(samples.shape[0]):
         sample = samples[k]
-        if sample.status == STATUS_DEVICE_LOST and sample.fresh == 0:
-            clear(sample.velocity_mps)
-            clear(sample.wake_mps)
-            clear(sample.force_n)
-            clear(sample.device_force_n)
+        if was_lost_at_read(sample):
             continue
-        safety.stop = 1 if sample.limiters & LIMITER_STOP else 0
-        tick(model, safety, sample)
+        take_sample(model, safety, sample, delivered)
         _note(model, trail, places)
 
 

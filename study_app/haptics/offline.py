@@ -11,6 +11,8 @@ import numpy as np
 from study_app.errors import StudyError
 from study_app.haptics.compiled import kernel
 from study_app.haptics.door import clamp, place
+from study_app.haptics.dynamics import MOST_DELAY, Dynamics
+from study_app.haptics.kalman import take_force
 from study_app.haptics.layout import ESTIMATOR_GIVEN, SAMPLE, Record, records
 from study_app.haptics.limits import bearable
 from study_app.haptics.motion import Motion, read
@@ -47,19 +49,37 @@ def simulate(scene: Scene, path: Motion | str | os.PathLike[str]) -> Table:
         The motion cannot be read, or the scene wants a given velocity and there is none.
     """
     motion = path if isinstance(path, Motion) else read(Path(path))
+    return _table(motion.t_s, samples_along(scene, motion))
+
+
+def samples_along(scene: Scene, motion: Motion, dynamics: Dynamics | None = None) -> Any:
+    """Return what `simulate` tabulates as the servo's own samples: (n,) recarray of ``layout.SAMPLE``.
+
+    ``dynamics`` are those of a device: limits, slew and delay are then those of its loop at the scene's rate. By
+    default the loop is that of `simulate`.
+
+    Raises
+    ------
+    StudyError
+        The scene wants a given velocity and there is none.
+    """
     estimator = scene.velocity
     if motion.velocity_mps is not None:
         scene = scene.model_copy(update={"velocity": Given()})
     elif isinstance(scene.velocity, Given):
         raise StudyError("the scene takes the velocity as given, but the motion has no vx_mps, vy_mps, vz_mps")
-    model = pack(scene, limits=bearable(1e-3, 1, estimator))
-    safety = new_safety()
+    if dynamics is None:
+        model = pack(scene, limits=bearable(1e-3, 1, estimator), dynamics=Dynamics(delay_s=1e-3))
+        safety = new_safety()
+    else:
+        model = pack(scene, dynamics=dynamics)
+        safety = new_safety(delay_ticks=min(dynamics.delay_ticks(scene.rate_hz), MOST_DELAY))
     safety[0].fade = 1.0
     samples = records(SAMPLE, len(motion.t_s))
     samples.position_m = motion.position_m
     samples.velocity_mps = 0.0 if motion.velocity_mps is None else motion.velocity_mps
     _run(model, safety[0], samples, motion.t_s)
-    return _table(motion.t_s, samples)
+    return samples
 
 
 @kernel
@@ -73,9 +93,10 @@ def _run(model: Any, safety: Record, samples: Any, t_s: Any) -> None:
         if parameters.estimator == ESTIMATOR_GIVEN:
             for axis in range(3):
                 state.estimate_mps[axis] = sample.velocity_mps[axis]
+        safety.turn_s = interval_s
+        take_force(state, safety)
         respond(model, interval_s)
         report(state, sample)
-        safety.turn_s = interval_s
         guard(model, safety, sample, interval_s)
 
 

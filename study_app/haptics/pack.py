@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import reduce
 from typing import Any, NamedTuple
 
@@ -10,11 +11,12 @@ import numpy as np
 
 from study_app.errors import StudyError
 from study_app.haptics import layout
+from study_app.haptics.dynamics import MOST_DELAY, UNKNOWN, Dynamics
 from study_app.haptics.effects import records
 from study_app.haptics.effects.fill import GRAVITY_MPS2, WAKE_RATE_HZ, Rows, fill, most_rows, rows_of, volume_m3
 from study_app.haptics.gate import resolve
-from study_app.haptics.limits import INERTIA_SHARE, Bearable, bearable
-from study_app.haptics.scene import MAX_LIQUIDS, MAX_WINDOW, Ewma, Foaw, Given, Line, Scene
+from study_app.haptics.limits import CUT_INERTIA_SHARE, LIGHTER, MEASURED_KG, Bearable, bearable, slew_limit_n
+from study_app.haptics.scene import MAX_LIQUIDS, MAX_WINDOW, Ewma, Foaw, Given, Kalman, Line, Scene
 
 _ESTIMATORS = {
     "ewma": layout.ESTIMATOR_EWMA,
@@ -22,8 +24,12 @@ _ESTIMATORS = {
     "line": layout.ESTIMATOR_LINE,
     "foaw": layout.ESTIMATOR_FOAW,
     "raw": layout.ESTIMATOR_RAW,
+    "kalman": layout.ESTIMATOR_KALMAN,
 }
 _KNEES = {"none": layout.KNEE_NONE, "sqrt": layout.KNEE_SQRT, "square": layout.KNEE_SQUARE}
+
+KALMAN_LAG_S = 2e-3
+"""What the Kalman filter lags by where a motion changes abruptly; in smooth ones less."""
 
 
 class Model(NamedTuple):
@@ -54,15 +60,17 @@ def window_needed(scene: Scene) -> int:
     return scene.velocity.samples if isinstance(scene.velocity, Line | Foaw) else 0
 
 
-def pack(scene: Scene, *, capacity: int | None = None, limits: Bearable | None = None, delay_ticks: int = 1) -> Model:
+def pack(
+    scene: Scene, *, capacity: int | None = None, limits: Bearable | None = None, dynamics: Dynamics = UNKNOWN
+) -> Model:
     """Return the memory of ``scene``; where it leaves the choice of effects, ``gate`` makes it.
 
     ``capacity`` is the least number of wake rows to own, with room for any number of liquids, so that other scenes fit
-    in later (`pack_into`); by default the model owns exactly what the scene calls for. ``delay_ticks`` is how late a
-    force is believed to act, ``limits`` the greatest damping at the hand; by default what a loop of the scene's rate,
-    estimator and this delay bears.
+    in later (`pack_into`); by default the model owns exactly what the scene calls for. ``limits`` is the greatest
+    damping at the hand; by default what a loop of the scene's rate and estimator bears at each delay. ``dynamics`` are
+    those of the device.
     """
-    scene = resolve(scene)
+    scene = _for_device(scene, dynamics)
     rows = _rows_needed(scene)
     if capacity is not None:
         rows = most_rows(MAX_LIQUIDS, max(rows.elements, capacity), scene.rate_hz)
@@ -79,12 +87,12 @@ def pack(scene: Scene, *, capacity: int | None = None, limits: Bearable | None =
         intervals=layout.records(records.INTERVAL, rows.intervals),
         exponentials=layout.records(records.EXPONENTIAL, rows.exponentials),
     )
-    _fill(model, scene, limits or bearable(1 / scene.rate_hz, delay_ticks, scene.velocity), delay_ticks)
+    _fill(model, scene, _by_delay(scene, dynamics) if limits is None else (limits,) * (MOST_DELAY + 1), dynamics)
     return model
 
 
-def pack_into(model: Model, scene: Scene, *, delay_ticks: int = 1) -> None:
-    """Fill memory made by `pack` with another scene, its state afresh, for a loop of ``delay_ticks`` of delay.
+def pack_into(model: Model, scene: Scene, *, dynamics: Dynamics = UNKNOWN) -> None:
+    """Fill memory made by `pack` with another scene, its state afresh, for a device of these ``dynamics``.
 
     Raises
     ------
@@ -93,7 +101,7 @@ def pack_into(model: Model, scene: Scene, *, delay_ticks: int = 1) -> None:
     """
     if isinstance(scene.velocity, Given):
         raise StudyError('velocity "given" is for motions from a file; a device needs an estimator such as "ewma"')
-    scene = resolve(scene)
+    scene = _for_device(scene, dynamics)
     rows = _rows_needed(scene)
     if rows.elements > len(model.elements) or len(scene.liquids) > len(model.liquids):
         raise StudyError(
@@ -110,13 +118,13 @@ def pack_into(model: Model, scene: Scene, *, delay_ticks: int = 1) -> None:
             f"the scene needs {rows.cells} cells of local wakes and {rows.intervals} intervals of histories; the model "
             f"was packed with room for {len(model.cells)} and {len(model.intervals)}: pack it with a capacity"
         )
-    _fill(model, scene, bearable(1 / scene.rate_hz, delay_ticks, scene.velocity), delay_ticks)
+    _fill(model, scene, _by_delay(scene, dynamics), dynamics)
 
 
-def adjust_into(model: Model, scene: Scene, *, delay_ticks: int = 1) -> None:
+def adjust_into(model: Model, scene: Scene, *, dynamics: Dynamics = UNKNOWN) -> None:
     """Give memory of `pack` the numbers of a scene built like the one in it (`built_alike`); its state goes on."""
-    scene = resolve(scene)
-    _fill_constants(model, scene, bearable(1 / scene.rate_hz, delay_ticks, scene.velocity), delay_ticks)
+    scene = _for_device(scene, dynamics)
+    _fill_constants(model, scene, _by_delay(scene, dynamics), dynamics)
 
 
 def built_alike(scene: Scene, other: Scene) -> bool:
@@ -140,7 +148,7 @@ def _constants(scene: Scene) -> Model:
     """Return a resolved scene's constants, in memory that holds nothing else."""
     nothing = [layout.records(layout.STATE, 0)] * (len(Model._fields) - 2)
     model = Model(layout.records(layout.PARAMETERS, 1), layout.records(layout.LIQUID, len(scene.liquids)), *nothing)
-    _fill_constants(model, scene, bearable(1 / scene.rate_hz, 1, scene.velocity), 1)
+    _fill_constants(model, scene, _by_delay(scene, UNKNOWN), UNKNOWN)
     return model
 
 
@@ -151,18 +159,32 @@ def _whole_numbers(rows: Any) -> list[int]:
     return [number for name in rows.dtype.names for number in _whole_numbers(rows[name])]
 
 
+def _for_device(scene: Scene, dynamics: Dynamics) -> Scene:
+    """Return the scene with its effects chosen; "kalman" is for devices that measure their delay, others get "ewma"."""
+    if isinstance(scene.velocity, Kalman) and dynamics.delay_s is None:
+        scene = scene.model_copy(update={"velocity": Ewma()})
+    return resolve(scene)
+
+
 def _rows_needed(scene: Scene) -> Rows:
     return reduce(Rows.plus, (rows_of(liquid, scene.rate_hz) for liquid in scene.liquids), Rows())
 
 
-def _fill(model: Model, scene: Scene, limits: Bearable, delay_ticks: int) -> None:
+def _by_delay(scene: Scene, dynamics: Dynamics) -> Sequence[Bearable]:
+    """Return what a loop of the scene's rate, estimator and device bears at each delay, 0 to `MOST_DELAY` ticks."""
+    lighter = min(dynamics.mass_kg / MEASURED_KG, 1.0) ** LIGHTER
+    found = (bearable(1 / scene.rate_hz, delay, scene.velocity) for delay in range(MOST_DELAY + 1))
+    return [Bearable(lighter * limit.drag_nspm, lighter * limit.inertia_nspm) for limit in found]
+
+
+def _fill(model: Model, scene: Scene, limits: Sequence[Bearable], dynamics: Dynamics) -> None:
     """Write constants and a fresh state."""
     for rows in (model.state, model.liquid_states):
         rows.view(np.uint8)[:] = 0
-    _fill_constants(model, scene, limits, delay_ticks)
+    _fill_constants(model, scene, limits, dynamics)
 
 
-def _fill_constants(model: Model, scene: Scene, limits: Bearable, delay_ticks: int) -> None:
+def _fill_constants(model: Model, scene: Scene, limits: Sequence[Bearable], dynamics: Dynamics) -> None:
     for rows in (model.parameters, model.liquids):
         rows.view(np.uint8)[:] = 0
     parameters = model.parameters[0]
@@ -174,20 +196,26 @@ def _fill_constants(model: Model, scene: Scene, limits: Bearable, delay_ticks: i
     parameters.weight_n = scene.body.density_kg_m3 * volume_m3(scene.body) * GRAVITY_MPS2
     parameters.estimator = _ESTIMATORS[scene.velocity.kind]
     parameters.window_samples = window_needed(scene)
-    if isinstance(scene.velocity, Ewma):
-        keep = 1 - scene.velocity.alpha
+    if isinstance(scene.velocity, Ewma | Kalman):
+        alpha = scene.velocity.alpha if isinstance(scene.velocity, Ewma) else Ewma().alpha
+        keep = 1 - alpha
         parameters.log_keep_per_s = WAKE_RATE_HZ * math.log(keep) if keep > 0 else -math.inf
+        parameters.fallback_lag_s = keep / (alpha * WAKE_RATE_HZ)
+        is_ewma = isinstance(scene.velocity, Ewma)
+        parameters.filter_lag_s = parameters.fallback_lag_s if is_ewma else KALMAN_LAG_S
     elif isinstance(scene.velocity, Foaw):
         parameters.tolerance_m = scene.velocity.tolerance_m * scene.scale
     parameters.knee_law = _KNEES[scene.knee.law]
     parameters.knee_threshold_mps = scene.knee.threshold_mps
-    parameters.slope_limit_nspm = limits.drag_nspm / scene.scale
+    parameters.slope_limit_nspm = [limit.drag_nspm / scene.scale for limit in limits]
     parameters.force_limit_n = scene.force_limit_n
-    parameters.delay_ticks = delay_ticks
+    parameters.slew_n = slew_limit_n(1 / scene.rate_hz, dynamics.mass_kg)
+    parameters.count_m = dynamics.count_m
+    parameters.mass_kg = dynamics.mass_kg
     first = Rows()
     for record, liquid in zip(model.liquids, scene.liquids, strict=False):
         fill(record, liquid, scene, first)
-        record.inertia_share = _inertia_share(record, limits, scene.scale)
+        record.inertia_share = [_inertia_share(record, limit, scene.scale) for limit in limits]
         first = first.plus(rows_of(liquid, scene.rate_hz))
         parameters.effects |= record.effects
 
@@ -205,4 +233,4 @@ def _inertia_share(record: layout.Record, limits: Bearable, scale: float) -> flo
         damping_nspm += 0.7 * record.history.factor_kg_rs * math.sqrt(record.history.filter_per_s)
     if damping_nspm * scale <= limits.inertia_nspm:
         return 1.0
-    return min(limits.inertia_nspm, INERTIA_SHARE * limits.drag_nspm) / (damping_nspm * scale)
+    return min(limits.inertia_nspm, CUT_INERTIA_SHARE * limits.drag_nspm) / (damping_nspm * scale)

@@ -24,7 +24,8 @@ import numpy as np
 
 from study_app.errors import StudyError
 from study_app.haptics.compiled import kernel
-from study_app.haptics.layout import MOST_DELAY, records
+from study_app.haptics.dynamics import MOST_DELAY
+from study_app.haptics.layout import records
 
 HANDLE = np.dtype(
     [

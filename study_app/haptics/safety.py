@@ -12,7 +12,8 @@ import math
 from typing import Any
 
 from study_app.haptics.compiled import kernel, part
-from study_app.haptics.energy import observe, open_account, remember, settle, weaken
+from study_app.haptics.dynamics import BELIEVED_TICKS
+from study_app.haptics.energy import log_command, observe, open_account, settle, weaken
 from study_app.haptics.layout import (
     EFFECT_ADDED_MASS,
     EFFECT_DRAG,
@@ -35,16 +36,20 @@ from study_app.haptics.vector import clear, copy, distance, dot, is_finite, norm
 START_FADE_S = 0.5
 SCENE_FADE_S = 0.05
 FADE_OUT_S = 0.045
-SLEW_N = 0.5
-SLEW_S = 1e-3
+LEAST_SLEW = 1.0 / 3.0
+"""Share of the slew limit that a fade gets, and a loop that has shown a great debt."""
 
 
-def new_safety(device_limit_n: float = math.inf) -> Any:
-    """Return one SAFETY record, shape (1,), for a servo that is about to start: no force yet, 500 ms to full force."""
+def new_safety(device_limit_n: float = math.inf, delay_ticks: int = BELIEVED_TICKS) -> Any:
+    """Return one SAFETY record, shape (1,), for a servo that is about to start: no force yet, 500 ms to full force.
+
+    ``delay_ticks`` is how many writes late a force is believed to act.
+    """
     safety = records(SAFETY, 1)
     safety[0].fade_s = START_FADE_S
     open_account(safety[0].account)
     safety[0].device_limit_n = device_limit_n
+    safety[0].delay_ticks = delay_ticks
     return safety
 
 
@@ -73,30 +78,37 @@ def guard(model: Any, safety: Record, sample: Record, interval_s: float) -> None
     copy(lift_n, account.lift_before_n)
     copy(state.force_n, force_n)
     copy(state.lift_n, lift_n)
-    _limit_slope(model, sample)
-    _limit_inertia(model, sample)
+    _limit_slope(model, safety, sample)
+    _limit_inertia(model, safety, sample)
     if not (is_finite(force_n) and is_finite(lift_n)):
         sample.limiters |= LIMITER_NON_FINITE
         sample.status = STATUS_NON_FINITE
         clear(force_n)
         clear(lift_n)
     limit_n = min(parameters.force_limit_n, safety.device_limit_n)
+    account.norm_share = min(limit_n / max(norm(force_n), limit_n), 1.0) if limit_n > 0.0 else 1.0
     _limit_norm(force_n, lift_n, limit_n, sample)
     _fade(force_n, lift_n, safety, sample)
+    copy(force_n, safety.permitted_n)
     weaken(parameters, account, sample)
     _limit_slew(force_n, parameters, state, safety, sample)
     copy(force_n, safety.slewed_n)
-    settle(parameters, account, sample)
+    settle(parameters, safety, sample)
     _limit_norm(force_n, lift_n, limit_n, sample)
     if safety.stop != 0 or safety.fault != 0:
         _let_go(force_n, safety, sample)
         clear(lift_n)
         clear(safety.slewed_n)
-    remember(account, force_n)
+        clear(safety.permitted_n)
+    log_command(account, force_n)
+    copy(force_n, sample.command_n)
+    sample.delay_ticks = safety.delay_ticks
+    sample.permitted_n = norm(safety.permitted_n)
+    sample.withheld_n = distance(safety.permitted_n, force_n)
 
 
 @part
-def _limit_slope(model: Any, sample: Record) -> None:
+def _limit_slope(model: Any, safety: Record, sample: Record) -> None:
     """Shorten each drag to F·min(1, B|w|/|F|): a secant a sampled damper of the hand's mass stays stable under.
 
     Where the body passes between liquids they share the limit B, so that their sum keeps it.
@@ -108,7 +120,7 @@ def _limit_slope(model: Any, sample: Record) -> None:
     for i in range(parameters.liquids):
         local = model.liquid_states[i]
         if model.liquids[i].effects & EFFECT_DRAG and local.share > 0.0:
-            most_nspm = parameters.slope_limit_nspm * local.share / shares
+            most_nspm = parameters.slope_limit_nspm[safety.delay_ticks] * local.share / shares
             if square(local.drag.force_n) > most_nspm * most_nspm * square(local.relative_mps):
                 sample.limiters |= LIMITER_SLOPE
                 excess = 1.0 - most_nspm * norm(local.relative_mps) / norm(local.drag.force_n)
@@ -117,11 +129,11 @@ def _limit_slope(model: Any, sample: Record) -> None:
 
 
 @part
-def _limit_inertia(model: Any, sample: Record) -> None:
+def _limit_inertia(model: Any, safety: Record, sample: Record) -> None:
     """Weaken added mass and history to what the loop bears (`pack`): fast motion meets them as dampers, too."""
     for i in range(model.parameters[0].liquids):
         liquid, local = model.liquids[i], model.liquid_states[i]
-        excess = 1.0 - liquid.inertia_share
+        excess = 1.0 - liquid.inertia_share[safety.delay_ticks]
         if excess > 0.0 and local.share > 0.0:
             sample.limiters |= LIMITER_SLOPE
             for axis in range(3):
@@ -166,12 +178,13 @@ def _fade(force_n: Any, lift_n: Any, safety: Record, sample: Record) -> None:
 
 @part
 def _limit_slew(force_n: Any, parameters: Record, state: Record, safety: Record, sample: Record) -> None:
-    """Let the force move by at most 0.5 N from the one sent before, but never push the hand on for that reason alone.
+    """Limit the change of the force from tick to tick (`limits.slew_limit_n`), without pushing the hand on thereby.
 
-    A loop slower than 1 kHz gets 0.5 N a millisecond. A force that is late to let go at a reversal would do work on the
-    hand: what of it lies along the motion, and is not wanted there, is dropped at once.
+    A loop that has shown an energy debt gets less, by the controller's gain; a fade the least. A force that is late to
+    let go at a reversal would do work on the hand: what of it lies along the motion, and is not wanted there, is
+    dropped at once.
     """
-    most_n = SLEW_N * max(parameters.period_s / SLEW_S, 1.0)
+    most_n = parameters.slew_n * (LEAST_SLEW if safety.fade < 1.0 else max(safety.account.gain, LEAST_SLEW))
     if square_distance(force_n, safety.slewed_n) <= most_n * most_n:
         return
     sample.limiters |= LIMITER_SLEW
@@ -183,9 +196,10 @@ def _limit_slew(force_n: Any, parameters: Record, state: Record, safety: Record,
         force_n[axis] = safety.slewed_n[axis] + (force_n[axis] - safety.slewed_n[axis]) * share
         lift_n[axis] = before_n[axis] + (lift_n[axis] - before_n[axis]) * share
     excess_nmps = dot(force_n, v_mps) - max(wanted_nmps, 0.0)
-    if excess_nmps > 0.0:
+    square_mps2 = square(v_mps)
+    if excess_nmps > 0.0 and square_mps2 > 0.0:  # the square of a speed below 1e-162 m/s is 0
         for axis in range(3):
-            force_n[axis] -= excess_nmps * v_mps[axis] / square(v_mps)
+            force_n[axis] -= excess_nmps * v_mps[axis] / square_mps2
         if square_distance(force_n, safety.slewed_n) > most_n * most_n:
             sample.limiters |= LIMITER_ENERGY
 

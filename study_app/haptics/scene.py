@@ -52,6 +52,7 @@ __all__ = [
     "Frozen",
     "Given",
     "History",
+    "Kalman",
     "Knee",
     "Line",
     "Liquid",
@@ -115,6 +116,16 @@ class Foaw(Frozen):
     tolerance_m: float = Field(default=38e-6, ge=0, le=0.01)
 
 
+class Kalman(Frozen):
+    """A Kalman filter that knows the force just sent and learns the mass it moves (`kalman`).
+
+    Encoder count, delay and least mass come from the device. Where it does not measure its delay, and while the filter
+    is in trouble, the velocity is that of `Ewma` as it comes.
+    """
+
+    kind: Literal["kalman"] = "kalman"
+
+
 class Raw(Frozen):
     """The newest difference of positions over its time, as it is."""
 
@@ -127,8 +138,8 @@ class Given(Frozen):
     kind: Literal["given"] = "given"
 
 
-Estimator: TypeAlias = Annotated[Ewma | Line | Foaw | Raw, Field(discriminator="kind")]
-Velocity: TypeAlias = Annotated[Ewma | Line | Foaw | Raw | Given, Field(discriminator="kind")]
+Estimator: TypeAlias = Annotated[Ewma | Line | Foaw | Kalman | Raw, Field(discriminator="kind")]
+Velocity: TypeAlias = Annotated[Ewma | Line | Foaw | Kalman | Raw | Given, Field(discriminator="kind")]
 
 
 class Knee(Frozen):

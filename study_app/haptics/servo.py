@@ -11,6 +11,7 @@ from study_app.errors import DeviceLost, ServoFault, StudyError
 from study_app.haptics.cfunctions import Driver
 from study_app.haptics.clock import Clock, SystemClock
 from study_app.haptics.clock_grants import Grant
+from study_app.haptics.dynamics import Dynamics
 from study_app.haptics.layout import STATUS_DEVICE_LOST, STATUS_NON_FINITE, STATUS_OK, STATUS_STALE_FAULT
 from study_app.haptics.pack import built_alike, elements_needed
 from study_app.haptics.scene import Scene
@@ -190,16 +191,26 @@ class Servo:
         return self._loop.clock.now_ns()
 
     @property
+    def dynamics(self) -> Dynamics:
+        """What the device measured of itself when it was opened."""
+        return self._device.dynamics
+
+    @property
+    def delay_ticks(self) -> int:
+        """How many ticks late a force is believed to act at present."""
+        return self._loop.delay_ticks
+
+    @property
     def grant(self) -> Grant:
         """What the system granted to the servo's thread."""
         return self._loop.grant
 
     def describe(self) -> dict[str, Any]:
-        """Return what a receipt should record: the rate, and the priority that the system granted to the thread.
+        """Return what a receipt should record: rate, the thread's priority, and how late a force is believed to act.
 
         Nothing that follows from the liquids: they are blinded.
         """
-        return {"rate_hz": self.rate_hz, "priority": self._loop.grant.priority}
+        return {"rate_hz": self.rate_hz, "priority": self._loop.grant.priority, "delay_ticks": self.delay_ticks}
 
     def __enter__(self) -> Self:
         if self._loop.clock.runs:

@@ -11,17 +11,20 @@ import threading
 import time
 import weakref
 from types import FrameType
+from typing import Any
 
-from study_app.errors import ServoFault
+from study_app.errors import DeviceError, ServoFault
 from study_app.haptics.cfunctions import Driver
 from study_app.haptics.clock import Clock, raise_priority
 from study_app.haptics.clock_grants import NO_THREAD, Blocks, Grant
-from study_app.haptics.layout import READING, STATUS_OK, records
+from study_app.haptics.dynamics import MOST_DELAY
+from study_app.haptics.layout import STATUS_OK, new_command, new_reading, records
 from study_app.haptics.loop import (
     CONTROL,
     ClockCalls,
     DeviceCalls,
     Output,
+    Records,
     let_go,
     offer_numbers,
     offer_scene,
@@ -68,15 +71,17 @@ class LoopThread:
         self.control[0].period_ns = round(1e9 / rest.rate_hz)
         self._rest = rest
         self._real_time = real_time
-        self._safety = new_safety(driver.force_limit_n)
+        self._rate_hz = rest.rate_hz
+        self._safety = self._new_safety()
         self._slots = (pack(rest, capacity=elements), pack(rest, capacity=elements))
         self._output = Output(telemetry.ring, telemetry.written)
+        self._exchanged = Records(new_reading(), new_command())
         self._device = DeviceCalls(driver.context, driver.read.address, driver.write.address)
         self._arguments = (
             self.control,
             self._slots,
             self._safety,
-            records(READING, 1),
+            self._exchanged,
             self._output,
             self._device,
             ClockCalls(clock.context, clock.now.address, clock.sleep.address),
@@ -84,7 +89,7 @@ class LoopThread:
 
     def compile(self) -> None:
         """Compile the loop for its arguments, or load it from the cache: zero force is written, no turn taken."""
-        let_go(self._device)
+        let_go(self._exchanged.command, self._device)
         run(*self._arguments, 0)
 
     @property
@@ -120,8 +125,13 @@ class LoopThread:
                 raise self._silence()
             time.sleep(host.period_ns * 1e-9)
         spare = (int(host.request) + 1) % 2
-        pack_into(self._slots[spare], scene)
+        pack_into(self._slots[spare], scene, dynamics=self._driver.dynamics)
         (offer_numbers if goes_on else offer_scene)(self.control, spare, serial)
+
+    @property
+    def delay_ticks(self) -> int:
+        """How many ticks late a force is believed to act at present."""
+        return int(self._safety[0].delay_ticks)
 
     @property
     def _all_taken(self) -> bool:
@@ -145,13 +155,13 @@ class LoopThread:
                 raise self._silence()
         self.thread = None
         self.live = False
-        let_go(self._device)
+        let_go(self._exchanged.command, self._device)
         allow_suspension(self)
         self.hand_over(self._rest, 0)
 
     def _blocks(self) -> Blocks:
         """Return the memory that the loop works in."""
-        arrays = (self.control, *self._slots[0], *self._slots[1], self._safety, *self._arguments[3:4], *self._output)
+        arrays = (self.control, *self._slots[0], *self._slots[1], self._safety, *self._exchanged, *self._output)
         return [(array.ctypes.data, array.nbytes) for array in arrays if array.nbytes]
 
     def _silence(self) -> ServoFault:
@@ -159,10 +169,27 @@ class LoopThread:
             f"the servo is stuck: its device '{self._driver.name}' gave no answer for {_PATIENCE_S:g} s; switch it off"
         )
 
+    def _new_safety(self) -> Any:
+        """Return the safety record of a loop that begins, for the delay that the device measured.
+
+        Raises
+        ------
+        DeviceError
+            The device is so slow that no force is stable.
+        """
+        driver = self._driver
+        delay_ticks = driver.dynamics.delay_ticks(self._rate_hz)
+        if delay_ticks > MOST_DELAY:
+            raise DeviceError(
+                f"the device '{driver.name}' answers {delay_ticks} ticks late at {self._rate_hz:g} Hz, and no force is "
+                f"stable beyond {MOST_DELAY}: connect it without a hub, close what else uses the bus, start anew"
+            )
+        return new_safety(driver.force_limit_n, delay_ticks)
+
     def _begin(self) -> None:
         _leave_by_the_exit()
         _live.add(self)
-        self._safety[0] = new_safety(self._driver.force_limit_n)[0]
+        self._safety[0] = self._new_safety()[0]
         host = self.control[0]
         host.status = STATUS_OK
         host.deadline_ns = self.clock.now_ns() + host.period_ns
@@ -178,7 +205,7 @@ class LoopThread:
         try:
             run(*self._arguments, _FOREVER)
         finally:
-            let_go(self._device)
+            let_go(self._exchanged.command, self._device)
 
 
 _live: weakref.WeakSet[LoopThread] = weakref.WeakSet()

@@ -19,6 +19,7 @@ from study_app.haptics.effects.local_wake import forget_places, leave_behind, li
 from study_app.haptics.effects.segments import empty
 from study_app.haptics.effects.surface import expose
 from study_app.haptics.effects.wake import flow, follow
+from study_app.haptics.kalman import take_force
 from study_app.haptics.layout import (
     EFFECT_ADDED_MASS,
     EFFECT_BUOYANCY,
@@ -28,6 +29,7 @@ from study_app.haptics.layout import (
     EFFECT_LOCAL_WAKE,
     EFFECT_SURFACE,
     EFFECT_WAKE,
+    LIMITER_ESTIMATOR,
     STATUS_OK,
     Record,
 )
@@ -49,6 +51,7 @@ def tick(model: Any, safety: Record, sample: Record) -> None:
     interval_s = admit(model.parameters[0], model.state[0], safety, sample)
     watch(model.parameters[0], safety, sample)
     if interval_s > 0.0:
+        take_force(model.state[0], safety)
         respond(model, interval_s)
     report(model.state[0], sample)
     guard(model, safety, sample, interval_s)
@@ -137,3 +140,5 @@ def report(state: Record, sample: Record) -> None:
     copy(state.velocity_mps, sample.velocity_mps)
     copy(state.wake_mps, sample.wake_mps)
     copy(state.force_n, sample.force_n)
+    if state.kalman.distrusted:
+        sample.limiters |= LIMITER_ESTIMATOR

@@ -6,10 +6,12 @@ import math
 from typing import Any
 
 from study_app.haptics.compiled import part
+from study_app.haptics.kalman import begin_filter, filter_velocity
 from study_app.haptics.layout import (
     ESTIMATOR_EWMA,
     ESTIMATOR_FOAW,
     ESTIMATOR_GIVEN,
+    ESTIMATOR_KALMAN,
     ESTIMATOR_LINE,
     ESTIMATOR_RAW,
     KNEE_SQRT,
@@ -28,13 +30,18 @@ def forget(parameters: Record, state: Record) -> None:
     if parameters.estimator != ESTIMATOR_GIVEN:
         clear(state.estimate_mps)
         state.window_held = 0
+    if parameters.estimator == ESTIMATOR_KALMAN:
+        begin_filter(parameters, state.kalman)
 
 
 @part
 def estimate(parameters: Record, state: Record, window: Any, interval_s: float) -> None:
     """Bring ``state.estimate_mps`` and ``state.velocity_mps`` to the newest position, Δt after the one before."""
     if parameters.estimator == ESTIMATOR_EWMA:
-        _ewma(parameters, state, interval_s)
+        _ewma(parameters, state, state.estimate_mps, interval_s)
+    elif parameters.estimator == ESTIMATOR_KALMAN:
+        _ewma(parameters, state, state.kalman.smoothed_mps, interval_s)
+        filter_velocity(parameters, state, interval_s)
     elif parameters.estimator == ESTIMATOR_LINE:
         _remember(parameters, state, window, interval_s)
         _line(parameters, state, window)
@@ -47,8 +54,8 @@ def estimate(parameters: Record, state: Record, window: Any, interval_s: float) 
 
 
 @part
-def _ewma(parameters: Record, state: Record, interval_s: float) -> None:
-    """Move the estimate to the newest difference u = Δp/Δt: v ← v + α(Δt)(u − v) (Rek 2024, §4.2).
+def _ewma(parameters: Record, state: Record, velocity_mps: Any, interval_s: float) -> None:
+    """Move ``velocity_mps`` (3,) to the newest difference u = Δp/Δt: v ← v + α(Δt)(u − v) (Rek 2024, §4.2).
 
     α(Δt) = 1 − (1 − α)^(Δt/1 ms) makes it the same filter at any rate; while Δt stays as it is, so does α. What is left
     at rest ends as 0: in denormal numbers, where it would stay, arithmetic is slow.
@@ -59,8 +66,8 @@ def _ewma(parameters: Record, state: Record, interval_s: float) -> None:
     weight, per_s = state.weight, 1.0 / interval_s
     for axis in range(3):
         difference_mps = (state.position_m[axis] - state.previous_m[axis]) * per_s
-        estimate_mps = state.estimate_mps[axis] + weight * (difference_mps - state.estimate_mps[axis])
-        state.estimate_mps[axis] = estimate_mps if abs(estimate_mps) > NOTHING_MPS else 0.0
+        estimate_mps = velocity_mps[axis] + weight * (difference_mps - velocity_mps[axis])
+        velocity_mps[axis] = estimate_mps if abs(estimate_mps) > NOTHING_MPS else 0.0
 
 
 @part

@@ -10,6 +10,7 @@ import numpy as np
 
 from study_app.haptics.layout import (
     LIMITER_ENERGY,
+    LIMITER_ESTIMATOR,
     LIMITER_FADE,
     LIMITER_GLITCH,
     LIMITER_NON_FINITE,
@@ -33,6 +34,7 @@ WORDS: Final = {
     LIMITER_GLITCH: "Refused position",
     LIMITER_NON_FINITE: "Not a number",
     LIMITER_STOP: "Force stopped",
+    LIMITER_ESTIMATOR: "Velocity filter",
 }
 """What people call each limiter, in every window; the order is that of the lab's card."""
 
@@ -61,13 +63,13 @@ class LimiterCounts:
         while self._batches[0][0] <= newest_ns - SPAN_NS:
             self._batches.popleft()
 
-    def told(self, force_limit_n: float) -> tuple[Limiter, ...]:
-        """Return every limiter."""
+    def told(self, force_limit_n: float, slew_n: float) -> tuple[Limiter, ...]:
+        """Return every limiter, for these limits of the force and of its change per tick."""
         newest_ns = self._batches[-1][0] if self._batches else 0
         nothing = np.zeros(len(WORDS), np.int64)
         counts = sum((batch for _, batch in self._batches), nothing)
         acting = sum((batch for when, batch in self._batches if when > newest_ns - NOW_NS), nothing)
-        limits = {LIMITER_SLEW: ", 0.5 N a tick", LIMITER_NORM: f", {force_limit_n:g} N"}
+        limits = {LIMITER_SLEW: f", {slew_n:g} N per tick", LIMITER_NORM: f", {force_limit_n:g} N"}
         return tuple(
             Limiter(words + limits.get(bit, ""), int(ticks), bool(now))
             for (bit, words), ticks, now in zip(WORDS.items(), counts, acting, strict=True)

@@ -17,6 +17,7 @@ import numpy as np
 from study_app.devices import is_falcon, moves_by_itself, open_device
 from study_app.devices.hand_orders import hand_of
 from study_app.haptics.layout import SAMPLE, records
+from study_app.haptics.limits import slew_limit_n
 from study_app.haptics.scene import Scene
 from study_app.haptics.servo import Servo
 from study_app.lab.limiters import Limiter, LimiterCounts
@@ -67,7 +68,7 @@ class Live:
         self.servo = servo
         self.path: str | None = None
         rest = Scene(rate_hz=servo.rate_hz)
-        self.shadow = Shadow(rest, servo.elements, device.force_limit_n)
+        self.shadow = Shadow(rest, servo.elements, device.force_limit_n, device.dynamics)
         self._ghost: _Ghost | None = None
         self._reader = servo.telemetry.reader()
         self._dropped = 0
@@ -185,7 +186,8 @@ class Live:
         limit_n = self.device.force_limit_n
         if self._felt is not None:
             limit_n = min(limit_n, self._felt.in_hand.scene.force_limit_n)
-        return self._counts.told(limit_n)
+        slew_n = slew_limit_n(1 / self.servo.rate_hz, self.device.dynamics.mass_kg)
+        return self._counts.told(limit_n, slew_n)
 
     def trace(self) -> Trace | None:
         """Return the last 2.5 s as A and as B have it."""

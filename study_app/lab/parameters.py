@@ -142,6 +142,7 @@ _CHOICES: Final = {
             "velocity.kind",
             "Estimator",
             choices=(
+                ("kalman", "Kalman"),
                 ("ewma", "EWMA (thesis)"),
                 ("line", "Line"),
                 ("foaw", "Adaptive window"),

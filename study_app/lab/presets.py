@@ -9,7 +9,7 @@ from study_app.errors import ProtocolError
 from study_app.haptics.scene import Scene
 from study_app.lab.workbench import Setting
 from study_app.protocol.load import load_scene, load_scenes, shipped
-from study_app.protocol.scene_text import scene_text
+from study_app.protocol.scene_text import for_new_file, scene_text
 from study_app.store.atomic import write_file
 
 
@@ -33,8 +33,11 @@ class Choice:
         return load_scene(self.source, self.liquid)
 
     def setting(self) -> Setting:
-        """Return it as a side of the workbench begins with it."""
-        scene = self.scene
+        """Return it as a side of the workbench begins with it.
+
+        Where its file has the usual "ewma", the lab has "kalman", and so do presets saved there.
+        """
+        scene = for_new_file(self.scene)
         return Setting(spoken(self.liquid), scene, scene)
 
 

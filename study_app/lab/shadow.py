@@ -13,6 +13,7 @@ from typing import Any, Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from study_app.haptics.dynamics import UNKNOWN, Dynamics
 from study_app.haptics.effects.fill import scaled_length
 from study_app.haptics.gate import resolve
 from study_app.haptics.layout import SAMPLE, records
@@ -76,12 +77,15 @@ class Shadow:
     rest : the scene without liquids that the servo begins with
     elements : wake elements there is room for
     limit_n : the device's own force limit [N]
+    dynamics : of the device
     alone : there is no servo behind the samples: what comes of them here is shown for both sides
     """
 
-    def __init__(self, rest: Scene, elements: int, limit_n: float, *, alone: bool = False) -> None:
+    def __init__(
+        self, rest: Scene, elements: int, limit_n: float, dynamics: Dynamics = UNKNOWN, *, alone: bool = False
+    ) -> None:
         self._alone = alone
-        self._sides = {side: _Half(rest, elements, limit_n) for side in _SIDES}
+        self._sides = {side: _Half(rest, elements, limit_n, dynamics) for side in _SIDES}
         self._felt: Side = "A"
         self._serial = 0
         self._expected: dict[int, _Presented] = {}
@@ -93,7 +97,7 @@ class Shadow:
         """Compile all that runs later, or load it from the cache."""
         for half in self._sides.values():
             half.begin(half.scene)
-            half.answer(records(SAMPLE, 0))
+            half.answer(records(SAMPLE, 0), felt=True)
             half.restart()
 
     def expect(self, serial: int, felt: Side, a: Scene, b: Scene, *, goes_on: bool = False) -> None:
@@ -148,7 +152,7 @@ class Shadow:
 
     def _follow(self, samples: Any) -> None:
         """Let both sides answer to samples of one scene; of the felt one, what the servo sent is shown."""
-        out = {side: half.answer(samples) for side, half in self._sides.items()}
+        out = {side: half.answer(samples, felt=side == self._felt) for side, half in self._sides.items()}
         if not self._alone:
             again, out[self._felt] = out[self._felt], samples
             self.followed += len(samples)
@@ -159,10 +163,11 @@ class Shadow:
 class _Half:
     """One side: its scene, the memory it lives in, and the safety layer behind it."""
 
-    def __init__(self, rest: Scene, elements: int, limit_n: float) -> None:
+    def __init__(self, rest: Scene, elements: int, limit_n: float, dynamics: Dynamics) -> None:
         self.scene = rest
+        self._dynamics = dynamics
         self.safety = new_safety(limit_n)
-        self._model = pack(rest, capacity=elements)
+        self._model = pack(rest, capacity=elements, dynamics=dynamics)
         self._trail, self._places = new_trail(elements)
 
     def restart(self) -> None:
@@ -172,19 +177,19 @@ class _Half:
     def begin(self, scene: Scene) -> None:
         """Present a scene from now on, as the servo does: its state afresh, its force faded in."""
         self.scene = scene
-        pack_into(self._model, scene)
+        pack_into(self._model, scene, dynamics=self._dynamics)
         begin_scene(self.safety[0])
         self._trail.view(np.uint8)[:] = 0
 
     def go_on(self, scene: Scene) -> None:
         """Take a scene's numbers, as the servo does that adjusts: state and force go on."""
         self.scene = scene
-        adjust_into(self._model, scene)
+        adjust_into(self._model, scene, dynamics=self._dynamics)
 
-    def answer(self, samples: Any) -> Any:
-        """Return the samples with what comes of them here."""
+    def answer(self, samples: Any, *, felt: bool) -> Any:
+        """Return the samples with what comes of them here; ``felt`` where the device was sent this side's force."""
         out = samples.copy()
-        take_again(self._model, self.safety[0], out, self._trail[0], self._places)
+        take_again(self._model, self.safety[0], out, self._trail[0], self._places, felt)
         return out
 
     def tail(self) -> Tail | None:

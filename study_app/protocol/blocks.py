@@ -13,6 +13,7 @@ from study_app.protocol.texts import Id, Localised
 
 Phase: TypeAlias = Literal["main", "practice", "baseline"]
 Order: TypeAlias = Literal["fixed", "shuffled", "constrained", "williams", "latin"]
+Compared: TypeAlias = Literal["liquids", "delays"]
 
 
 class Block(Table):
@@ -29,6 +30,11 @@ class Block(Table):
     setting_label: Localised = Field(description="Neutral name of its trials; a number follows: Liquid setting 1.")
     code_prefix: str | None = Field(default=None, pattern=r"^[A-Z]$", description="Letter of the block's codes.")
     conditions: tuple[Id, ...] = Field(min_length=1, description="What is presented.")
+    compares: Compared | None = Field(
+        default=None,
+        description="What the conditions of a main block differ in; left out: delays if all have one liquid and their "
+        "delays differ, otherwise liquids.",
+    )
     order: Order = Field(
         default="fixed",
         description="fixed: as written; shuffled: anew in each repetition; constrained: all trials together, within "
@@ -69,6 +75,12 @@ class Block(Table):
                 )
             if self.part is None:
                 raise PydanticCustomError("part", "a main block needs a part: 1, 2, …", {"place": "part"})
+        elif self.compares is not None:
+            raise PydanticCustomError(
+                "compares",
+                "a {phase} block compares nothing: leave it out",
+                {"phase": self.phase, "place": "compares"},
+            )
         elif self.code_prefix is not None:
             raise PydanticCustomError(
                 "codes",

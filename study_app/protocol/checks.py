@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict
 from study_app.haptics.scene import MAX_LIQUIDS
 from study_app.protocol.analysis import decisions
 from study_app.protocol.document import Path, names
-from study_app.protocol.model import Block, Condition, DeviceNeeds, Named, PageText, Reach
+from study_app.protocol.model import Block, Condition, DeviceNeeds, Named, PageText, Reach, compared
 from study_app.protocol.problems import Fault
 from study_app.protocol.references import items, languages, references, repeats, sequence
 from study_app.protocol.tasks import Task
@@ -63,7 +63,7 @@ def check(document: Mapping[str, Any], broken: Iterable[Path]) -> Iterator[Fault
     for of_names in (references, sequence, repeats, items, languages, decisions):
         yield from of_names(document)
     parts = draft(document, broken)
-    for of_tables in (targets, crowded, practice, codes, breaks, counted_parts):
+    for of_tables in (targets, crowded, practice, codes, compares, breaks, counted_parts):
         yield from of_tables(parts)
 
 
@@ -116,6 +116,21 @@ def codes(parts: Draft) -> Iterator[Fault]:
         if block.code_prefix is not None and owners.setdefault(block.code_prefix, name) != name:
             message = f'block "{owners[block.code_prefix]}" has the prefix "{block.code_prefix}" too'
             yield Fault(("blocks", name, "code_prefix"), message, "choose another letter")
+
+
+def compares(parts: Draft) -> Iterator[Fault]:
+    """Check that the conditions of a main block differ in one thing, which is what the block says that it compares."""
+    for name, block in parts.blocks.items():
+        presented = [parts.conditions[one] for one in block.conditions if one in parts.conditions]
+        if block.phase != "main" or len(presented) < len(block.conditions):
+            continue
+        liquids, delays = len({one.liquid_ids for one in presented}), len({one.delay_ms for one in presented})
+        if liquids > 1 and delays > 1:
+            message = "its conditions differ in liquid and in delay, whose effects the analysis cannot tell apart"
+            yield Fault(("blocks", name, "conditions"), message, "vary one of them, or use a block for each")
+        elif block.compares is not None and {"liquids": delays, "delays": liquids}[block.compares] > 1:
+            message = f'is "{block.compares}", and its conditions differ in {compared(presented)}'
+            yield Fault(("blocks", name, "compares"), message, "correct it, or leave it out")
 
 
 def breaks(parts: Draft) -> Iterator[Fault]:

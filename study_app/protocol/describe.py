@@ -145,6 +145,7 @@ def _block(protocol: Protocol, block: Block, language: str) -> Iterable[str]:
         ("Shown as", f"{protocol.text(block.setting_label, language)}{' 1, 2, …' if block.trials > 1 else ''}"),
         ("Recorded as", ", ".join(block_codes(block))),
         ("Conditions", ", ".join(block.conditions)),
+        *([] if (compared := protocol.compared_in(block.id)) is None else [("Compared", compared)]),
         ("Task", _task(protocol.tasks[block.task])),
         ("Asked", "nothing" if questionnaire is None else _asked(questionnaire, str(block.questionnaire))),
     ]
@@ -275,5 +276,6 @@ def _limits(protocol: Protocol) -> list[tuple[str, str]]:
         (f"{limits.lateness_ms:g} ms", "lateness of ticks (99th percentile)"),
         (f"{limits.worst_gap_ms:g} ms", "between two ticks"),
         (f"{limits.delay_error_ms:g} ms", "error of the delay (95th percentile)"),
-        (f"{limits.frame_gap_ms:g} ms", "between two frames"),
+        (f"{limits.frame_gap_ms:g} ms", "before the first frame, and between two"),
+        (f"{limits.withheld_percent:g} %", "of the force withheld by the passivity controller and the slew limit"),
     ]

@@ -26,6 +26,7 @@ def differences(old: Protocol | Mapping[str, Any], new: Protocol | Mapping[str, 
     hashes.
     """
     before, after = _tables(old), _tables(new)
+    _drop_unknown_comparisons(before, after)
     hidden = [_take_hidden(tables) for tables in (before, after)]
     found = list(_differences("", before, after))
     if any(hidden[0][place] != hidden[1][place] for place in hidden[0].keys() & hidden[1].keys()):
@@ -39,9 +40,19 @@ def _tables(protocol: Protocol | Mapping[str, Any]) -> dict[str, Any]:
         tables = protocol.model_dump(mode="json")
         for name, block in protocol.blocks.items():
             tables["blocks"][name]["codes"] = list(block_codes(block))
+            tables["blocks"][name]["compares"] = protocol.compared_in(name)
         return tables
     blocks = {name: dict(block) for name, block in protocol.get("blocks", {}).items()}
     return {**protocol, "blocks": blocks}
+
+
+def _drop_unknown_comparisons(before: dict[str, Any], after: dict[str, Any]) -> None:
+    """Take out what a block compares where one side, a receipt of an earlier version, does not say it."""
+    for name in before["blocks"].keys() & after["blocks"].keys():
+        sides = before["blocks"][name], after["blocks"][name]
+        if not all("compares" in block for block in sides):
+            for block in sides:
+                block.pop("compares", None)
 
 
 def _take_hidden(tables: dict[str, Any]) -> dict[str, Any]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
@@ -22,6 +23,9 @@ from study_app.protocol.table import Table
 __all__ = ["is_scene_file", "load", "load_scene", "load_scenes", "parse", "protocol_hash", "shipped", "source_bytes"]
 
 M = TypeVar("M", bound=BaseModel)
+
+SHOWN = 200  # characters of a bad value that a message repeats
+_LONG = re.compile(rf'(?<=")[^"]{{{SHOWN + 1},}}(?=")|\S{{{SHOWN + 1},}}')
 
 
 class SceneTable(SceneDefaults):
@@ -125,10 +129,14 @@ def _document(source: bytes, name: str) -> tuple[dict[str, Any], Places]:
         line = source.count(b"\n", 0, error.start) + 1
         raise ProtocolError(name, (Problem("file", "is not UTF-8 text", line, "save it as UTF-8"),)) from error
     try:
-        document = tomllib.loads(text)
+        document = {key: _frozen(value) for key, value in tomllib.loads(text).items()}
     except tomllib.TOMLDecodeError as error:
         raise ProtocolError(name, (_broken(str(error), text),)) from error
-    return {key: _frozen(value) for key, value in document.items()}, Places(text)
+    except RecursionError as error:
+        raise ProtocolError(name, (Problem("file", "is nested too deeply"),)) from error
+    except ValueError as error:  # Python's own limit of digits names no place either
+        raise ProtocolError(name, (Problem("file", "holds a whole number beyond 64 bits"),)) from error
+    return document, Places(text)
 
 
 def _broken(message: str, text: str) -> Problem:
@@ -143,7 +151,14 @@ def _frozen(value: Any) -> Any:
         return tuple(_frozen(entry) for entry in value)
     if isinstance(value, dict):
         return {key: _frozen(entry) for key, entry in value.items()}
+    if isinstance(value, int) and not -(2**63) <= value < 2**63:
+        raise ValueError("TOML has whole numbers of 64 bits")
     return value
+
+
+def _shortened(words: str) -> str:
+    """Return words that repeat at most `SHOWN` characters of a bad value, in quotes or not."""
+    return _LONG.sub(lambda found: f"{found[0][:SHOWN]}…", words)
 
 
 def _faults(model: type[M], document: Mapping[str, Any]) -> list[Fault]:
@@ -164,5 +179,13 @@ def _future_format(document: Mapping[str, Any]) -> bool:
 
 def _raise(name: str, faults: list[Fault], places: Places) -> None:
     if faults:
-        problems = [fault.located(places) for fault in faults]
+        problems = [
+            replace(
+                problem,
+                place=_shortened(problem.place),
+                message=_shortened(problem.message),
+                hint=_shortened(problem.hint),
+            )
+            for problem in (fault.located(places) for fault in faults)
+        ]
         raise ProtocolError(name, tuple(sorted(problems, key=lambda problem: problem.line or 0)))

@@ -6,7 +6,7 @@ can decide by itself is checked by its class; what needs two tables is in ``refe
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Annotated, Any, Literal, Self, TypeAlias, TypeVar
 
@@ -15,7 +15,7 @@ from pydantic_core import PydanticCustomError
 
 from study_app.haptics.scene import Accuracy, Body, Estimator, Ewma, Knee, Liquid, MotionBox, Scene
 from study_app.protocol.analysis import Analysis
-from study_app.protocol.blocks import Block
+from study_app.protocol.blocks import Block, Compared
 from study_app.protocol.questionnaires import Item, Questionnaire, Scale
 from study_app.protocol.table import Table
 from study_app.protocol.tasks import Explore, Reach, Task
@@ -124,6 +124,12 @@ class Condition(Table):
         return self
 
 
+def compared(conditions: Sequence[Condition]) -> Compared:
+    """Return what these conditions differ in: delays where they have one liquid and several delays."""
+    liquids, delays = ({getattr(one, name) for one in conditions} for name in ("liquid_ids", "delay_ms"))
+    return "delays" if len(liquids) == 1 and len(delays) > 1 else "liquids"
+
+
 class PageText(Table):
     """A page to read."""
 
@@ -153,7 +159,12 @@ class Limits(Table):
     lateness_ms: float = Field(default=2, gt=0, description="99th percentile of the lateness of ticks [ms].")
     worst_gap_ms: float = Field(default=20, gt=0, description="Longest time between two ticks [ms].")
     delay_error_ms: float = Field(default=25, gt=0, description="95th percentile of achieved − requested delay [ms].")
-    frame_gap_ms: float = Field(default=250, gt=0, description="Longest time that one frame stands in the tank [ms].")
+    frame_gap_ms: float = Field(
+        default=250, gt=0, description="Longest time before the first frame or between two [ms]."
+    )
+    withheld_percent: float = Field(
+        default=5, gt=0, le=100, description="Share of the force that passivity controller and slew limit withhold [%]."
+    )
 
 
 T = TypeVar("T")
@@ -218,6 +229,13 @@ class Protocol(Table):
         """Return what is answered after each trial of a block."""
         name = self.blocks[block_id].questionnaire
         return None if name is None else self.questionnaires[name]
+
+    def compared_in(self, block_id: str) -> Compared | None:
+        """Return what a main block compares, as it says or as follows from its conditions; of other blocks None."""
+        block = self.blocks[block_id]
+        if block.phase != "main":
+            return None
+        return block.compares or compared([self.conditions[name] for name in block.conditions])
 
     def scene_for(self, condition_id: str) -> Scene:
         """Return what is felt in a condition."""

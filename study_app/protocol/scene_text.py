@@ -7,7 +7,7 @@ import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final, TypeAlias
 
-from study_app.haptics.scene import Given, Liquid, Scene
+from study_app.haptics.scene import Ewma, Given, Kalman, Liquid, Scene
 
 Place: TypeAlias = tuple[str, ...]
 
@@ -28,6 +28,11 @@ def scene_text(scene: Scene, *, said: Sequence[str] = (), notes: Mapping[Place, 
     for liquid in scene.liquids:
         lines += _tables(("liquids", liquid.id), _liquid(liquid), notes or {})
     return "\n".join(lines) + "\n"
+
+
+def for_new_file(scene: Scene) -> Scene:
+    """Return a scene as the program presents and writes it where no file decides: "kalman" for the usual "ewma"."""
+    return scene.model_copy(update={"velocity": Kalman()}) if scene.velocity == Ewma() else scene
 
 
 def _scene(scene: Scene) -> Mapping[str, Any]:

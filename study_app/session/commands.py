@@ -25,7 +25,7 @@ class ShowPage:
 
 @dataclass(frozen=True, slots=True)
 class StartTrial:
-    """Load the scene of ``condition`` and follow the task.
+    """Prepare a trial: the scene of ``condition`` is loaded, and the task begins, with its tank's first painted frame.
 
     The tank stays for ``linger_s`` after the task, so that its end is seen. That goes by the longest delay of the
     block, the same for all its trials: neither the participant nor any time on the disk can tell the delay from it.
@@ -62,14 +62,21 @@ class FadeIn:
 
 @dataclass(frozen=True, slots=True)
 class Write:
-    """Put one line into the journal, on the disk before the next command.
+    """Put one line into the journal; with ``waits``, as for answers and notes, on the disk before the next command.
 
-    With ``measured`` the runner adds what it measured of the trial that was stopped (``fields`` win).
+    Other lines are flushed in the background, so that nothing drawn waits for the disk. With ``measured`` the runner
+    adds what it measured of the trial that was stopped (``fields`` win).
     """
 
     event: str
     fields: Mapping[str, Any]
     measured: bool = False
+    waits: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class CheckFlushed:
+    """Go no further while lines of the journal that nobody waited for could not be flushed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,4 +92,6 @@ class Finish:
     reason: str = ""
 
 
-Command: TypeAlias = ShowPage | StartTrial | StopTrial | Rest | StopForce | FadeIn | Write | WriteTables | Finish
+Command: TypeAlias = (
+    ShowPage | StartTrial | StopTrial | Rest | StopForce | FadeIn | Write | CheckFlushed | WriteTables | Finish
+)

@@ -66,10 +66,10 @@ class Submitted:
 
 @dataclass(frozen=True, slots=True)
 class PauseAsked:
-    """Esc, or the operator's pause."""
+    """Esc, the operator's pause, or the program's when it is ended from outside."""
 
     at_s: float
-    by: Literal["participant", "operator"]
+    by: Literal["participant", "operator", "program"]
 
 
 @dataclass(frozen=True, slots=True)

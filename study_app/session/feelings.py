@@ -68,6 +68,9 @@ class _Unkept:
     def append(self, event: str, *, t_s: float | None = None, **fields: Any) -> None:
         """Keep nothing."""
 
+    def check_flushed(self) -> None:
+        """Do nothing: nothing is kept."""
+
     def write_tables(self) -> None:
         """Keep nothing."""
 

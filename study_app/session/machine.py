@@ -5,7 +5,9 @@ Rules of this file:
 1. ``advance(state, event)`` is pure. It gives the next state and the commands that the runner carries out in order.
 2. Every legal pair of phase and event is a row of ``TRANSITIONS``. Any other pair raises ``SessionError`` and nothing
    has changed. Nothing but an event moves the machine.
-3. A ``Write`` comes before the ``ShowPage`` it leads to: an answer is on the disk before its consequence is visible.
+3. A ``Write`` comes before the ``ShowPage`` it leads to, and one of an answer, a consent, a note or the reason for a
+   repetition ``waits``: what a person gave is on the disk before its consequence is visible. Nothing else waits for the
+   disk.
 4. The safety of the hand comes before everything: ``StopForce``, ``StopTrial`` and ``Rest`` lead every list.
 
 A session is the steps of its schedule: pages to read, and trials. A trial is a task, then a questionnaire if its block

@@ -11,6 +11,7 @@ import numpy as np
 
 from study_app.errors import StoreError
 from study_app.haptics.clock_grants import Grant
+from study_app.haptics.dynamics import Dynamics
 from study_app.haptics.telemetry import timing
 from study_app.session.ports import ServoPort
 from study_app.session.preflight import Facts, Screen
@@ -25,6 +26,10 @@ class MeasuredServo(ServoPort, Protocol):
 
     @property
     def grant(self) -> Grant: ...  # noqa: D102
+    @property
+    def dynamics(self) -> Dynamics: ...  # noqa: D102
+    @property
+    def delay_ticks(self) -> int: ...  # noqa: D102
 
 
 def measure(
@@ -60,6 +65,8 @@ def measure(
         participant=participant,
         recordings=recordings,
         grant=servo.grant,
+        dynamics=servo.dynamics,
+        delay_ticks=servo.delay_ticks,
         key_hash=sealed_hash(results),
         lateness_ns=np.asarray(samples["lateness_ns"], np.int64),
     )

@@ -58,7 +58,9 @@ def read_on(state: SessionState, event: Continue) -> Result:
     """Leave a page that was read; one that lasts some time stays until then, whoever presses what."""
     if state.stays_until_s is not None and event.at_s < state.stays_until_s:
         return state, ()
-    return _enter(state, state.index + 1, (Write("page_left", {"page": state.page_id}),), at_s=event.at_s)
+    consents = state.plan.protocol.pages[state.page_id].kind == "consent"
+    left = Write("page_left", {"page": state.page_id}, waits=consents)
+    return _enter(state, state.index + 1, (left,), at_s=event.at_s)
 
 
 def choose_language(state: SessionState, event: LanguageChosen) -> Result:
@@ -101,7 +103,7 @@ def choose(state: SessionState, event: Chosen) -> Result:
         answer = replace(answer, first_s=event.at_s, last_s=event.at_s, value=event.value)
     elif answer.value != event.value:
         answer = replace(answer, last_s=event.at_s, value=event.value, changes=answer.changes + 1)
-    written = Write("choice", {"trial": state.trial.number, "item": event.item, "value": event.value})
+    written = Write("choice", {"trial": state.trial.number, "item": event.item, "value": event.value}, waits=True)
     return _with_answer(state, event.item, answer), (written,)
 
 
@@ -110,7 +112,7 @@ def submit(state: SessionState, event: Submitted) -> Result:
     if missing := _missing(state):
         listed = ", ".join(map(str, missing))
         raise SessionError(f"not every required statement is answered: answer {listed} first")
-    written = Write("responses", {**_which(state), "items": _responses(state)})
+    written = Write("responses", {**_which(state), "items": _responses(state)}, waits=True)
     return _enter(state, state.index + 1, (written,), at_s=event.at_s)
 
 
@@ -169,13 +171,14 @@ def repeat(state: SessionState, event: RepeatAsked) -> Result:
     """Present the trial again, keeping the attempt that was."""
     if not event.reason.strip():
         raise SessionError("a trial is repeated for a reason: write one")
-    asked = Write("repeat", {"trial": state.trial.number, "reason": event.reason})
+    asked = Write("repeat", {"trial": state.trial.number, "reason": event.reason}, waits=True)
     return _start_trial(replace(state, attempt=state.attempt + 1), (*_break_off(state), asked))
 
 
 def note(state: SessionState, event: Note) -> Result:
-    """Keep what the operator noted."""
-    return state, (Write("note", {"kind": event.kind, "text": event.text}), WriteTables())
+    """Keep what the operator noted; what was typed is on the disk first."""
+    written = Write("note", {"kind": event.kind, "text": event.text}, waits=event.kind == "note")
+    return state, (written, WriteTables())
 
 
 def end(state: SessionState, event: EndAsked) -> Result:

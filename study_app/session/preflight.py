@@ -5,7 +5,7 @@ A failure refuses the session; a warning is something that would make trials inv
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study_app.haptics.clock_grants import NO_THREAD, Grant
+from study_app.haptics.dynamics import BELIEVED_TICKS, UNKNOWN, Dynamics
 from study_app.haptics.limits import refuses
 from study_app.protocol.describe import expected_duration_s
 from study_app.protocol.model import Protocol
@@ -50,7 +51,10 @@ class Facts:
     the results, None where it could not be written for the reason ``probe_fault``; ``free_bytes`` None where unknown.
     ``tick_s`` is what the dearest scene of the study takes of a turn, None where nobody measured it; ``key_hash`` that
     of the study's sealed key, None before its first session. ``lateness_ns`` (n,) is that of every turn [ns],
-    ``grant`` what the system lets the servo's thread do.
+    ``grant`` what the system lets the servo's thread do. ``dynamics`` are the device's, with its measured
+    delay, ``delay_ticks`` is the delay that the servo uses now. ``withheld`` is the share of
+    the force that passivity controller and slew limit are expected to withhold in the fastest stroke of a task, by
+    liquid; None where nobody computed it.
     """
 
     device: str
@@ -66,6 +70,9 @@ class Facts:
     tick_s: float | None = None
     key_hash: str | None = None
     grant: Grant = NO_THREAD
+    dynamics: Dynamics = UNKNOWN
+    delay_ticks: int = BELIEVED_TICKS
+    withheld: Mapping[str, float] | None = None
     lateness_ns: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64), compare=False, repr=False)
 
 
@@ -100,7 +107,7 @@ class Check:
 
 def checks(facts: Facts, protocol: Protocol) -> tuple[Check, ...]:
     """Return what is to be said of ``facts``, for a session of ``protocol``."""
-    found = [_device(facts), _rate(facts, protocol), _lateness(facts, protocol), _priority(facts)]
+    found = [_device(facts), _loop_delay(facts), _rate(facts, protocol), _lateness(facts, protocol), _priority(facts)]
     found += [
         _delay(facts, protocol),
         _screen(facts),
@@ -108,7 +115,7 @@ def checks(facts: Facts, protocol: Protocol) -> tuple[Check, ...]:
         _space(facts, protocol),
         _blinding(facts, protocol),
     ]
-    return (*found, *_cost(facts, protocol), *_balance(facts, protocol))
+    return (*found, *_cost(facts, protocol), *_withheld(facts, protocol), *_balance(facts, protocol))
 
 
 def refused(found: Iterable[Check]) -> str:
@@ -123,6 +130,19 @@ def _device(facts: Facts) -> Check:
         advice = f"{facts.device} has a new sample in {share} of the turns: check its cable and power"
         return Check("Device", "failure", "silent", about, advice)
     return Check("Device", "ok", "answers", about)
+
+
+def _loop_delay(facts: Facts) -> Check:
+    """Say how late a force acts, which the force's limits follow."""
+    value = f"{facts.delay_ticks} tick{'' if facts.delay_ticks == 1 else 's'}"
+    if facts.dynamics.delay_s is None:
+        return Check("Loop delay", "ok", value, "assumed: the device does not measure how late a force acts")
+    about = f"until a force acts: {1e3 * facts.dynamics.delay_s:.2f} ms, measured by the device"
+    if facts.delay_ticks > BELIEVED_TICKS:
+        return Check(
+            "Loop delay", "warning", value, about, "Forces are limited more: connect the device without a hub."
+        )
+    return Check("Loop delay", "ok", value, about)
 
 
 def _rate(facts: Facts, protocol: Protocol) -> Check:
@@ -217,6 +237,21 @@ def _cost(facts: Facts, protocol: Protocol) -> tuple[Check, ...]:
     if share > DEAR:
         return (Check("Cost of the scenes", "warning", value, about, "Leave out an effect.", share),)
     return (Check("Cost of the scenes", "ok", value, about, share=share),)
+
+
+def _withheld(facts: Facts, protocol: Protocol) -> tuple[Check, ...]:
+    """Say what share of the force will be withheld, by liquid only where the operator may know liquids."""
+    if not facts.withheld:
+        return ()
+    limit_percent, most_percent = protocol.limits.withheld_percent, 100 * max(facts.withheld.values())
+    about = f"in the fastest stroke of a task, limit {limit_percent:g} %"
+    if protocol.study.blinding == "single":
+        about += ": " + ", ".join(f"{name} {100 * of:.1f} %" for name, of in sorted(facts.withheld.items()))
+    within = most_percent <= limit_percent
+    share = most_percent / limit_percent
+    advice = "" if within else "Trials with such strokes would not count."
+    verdict: Verdict = "ok" if within else "warning"
+    return (Check("Force withheld", verdict, f"at most {most_percent:.1f} %", about, advice, share),)
 
 
 def _balance(facts: Facts, protocol: Protocol) -> tuple[Check, ...]:

@@ -1,6 +1,6 @@
-"""What goes into a trial's recording: every turn of the servo from shortly before it until its tank is left.
+"""What goes into a trial's recording: every tick from shortly before its first frame until its tank is left.
 
-The turns before it make the recording complete in itself: they hold whatever the force was still fading from, so that
+The ticks before it make the recording complete in itself: they hold whatever the force was still fading from, so that
 every force of the trial can be computed again from the recording alone.
 """
 

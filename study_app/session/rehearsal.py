@@ -35,6 +35,7 @@ from study_app.session.ports import KeptSession, Ports
 from study_app.session.resume import FIRST, REHEARSED_SCREENS, Start, find_protocol, resume_at
 from study_app.session.runner import Runner
 from study_app.session.simulated import Draw, Explorer, Reacher, Senses, filled_in, reading_s
+from study_app.session.trial import TankView
 from study_app.store import journal
 from study_app.store.description import check_study
 from study_app.store.journal import SessionClock
@@ -289,9 +290,11 @@ class Rehearsal:
         self._next_frame_ns = self._machine.servo.now_ns()
         task = page.task
         hand = Reacher(task, arm, draw) if isinstance(task, Reach) else Explorer(task, arm, draw, self._now_s())
+        self._see(senses)  # the first frame, with which the trial begins, is painted at once
         while page is self._page:
             self._advance(LOOK_S)
-            wants_to_go_on = self._see(senses, hand)
+            view = self._see(senses)
+            wants_to_go_on = view is not None and hand.act(self._now_s(), view)
             senses.feel(np.asarray(self._touch.read()))
             self._poll()
             if wants_to_go_on and page is self._page:
@@ -301,8 +304,8 @@ class Rehearsal:
         if self._tell_felt is not None:
             self._tell_felt(page.trial, self._felt)
 
-    def _see(self, senses: Senses, hand: Explorer | Reacher) -> bool:
-        """Show the frames since the last look, and let the hand act on the newest; return whether it is done."""
+    def _see(self, senses: Senses) -> TankView | None:
+        """Show the frames that are due since the last look; return what the newest showed, None where none was due."""
         view = None
         while self._next_frame_ns <= self._machine.servo.now_ns():
             view = self._runner.view(self._next_frame_ns)
@@ -312,7 +315,7 @@ class Rehearsal:
                 self._runner.frame_shown(painted_ns, view.sample_time_ns)
                 senses.see(painted_ns, view)
             self._next_frame_ns += round(1e9 * FRAME_S)
-        return view is not None and hand.act(self._now_s(), view)
+        return view
 
     def _fill_in(self, page: QuestionnairePage) -> None:
         """Answer every statement by what was felt, and confirm."""

@@ -4,6 +4,9 @@ Everything that touches something goes through ``Ports``. Events come from windo
 (``poll``, once a frame); what the participant sees comes from ``view``, what was seen goes into ``frame_shown``. All of
 it in one thread; a window that answers a page while it is being presented is heard after the commands under way.
 
+A trial begins with the first ``frame_shown`` after its page was presented: then its force fades in, its task's clock
+starts and its recording begins (see ``trial``).
+
 Where the disk takes nothing, the session stalls: zero force, a calm page, and what was to be done is kept and tried
 again until it is done, in order and once. Then the session is paused, and goes on when somebody asks for it.
 """
@@ -16,14 +19,14 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from study_app.errors import SessionError, StoreError, StudyError
-from study_app.haptics.layout import BUTTON_STOP, LIMITER_GLITCH
+from study_app.haptics.layout import BUTTON_STOP
 from study_app.protocol.model import Protocol as Study
 from study_app.protocol.schedule import Schedule
 from study_app.session import compose
 from study_app.session.commands import (
+    CheckFlushed,
     Command,
     FadeIn,
     Finish,
@@ -41,38 +44,11 @@ from study_app.session.ports import Ports
 from study_app.session.recording import Recording
 from study_app.session.resume import FIRST, Start
 from study_app.session.state import FINAL, Phase, SessionState
-from study_app.session.statistics import TrialStatistics
-from study_app.session.tasks import TaskView, Tracker, track
+from study_app.session.tasks import TaskView
+from study_app.session.trial import RunningTrial, TankView
 
 BUTTON_CONTINUE = 1 << 0
 RETRY_S = 1.0  # a disk that took nothing is tried again so often
-
-# Everything is drawn this much later than the trial asks. Then the moment to draw lies between two samples at every
-# delay, none included, and is met exactly; else the newest sample, up to a tick old, would stand in where there is no
-# delay, and the error of the delay would tell such trials from all others. Two ticks at 1 kHz.
-SETTLED_S = 0.002
-
-
-@dataclass(frozen=True, slots=True)
-class TankView:
-    """What is drawn in the tank: the proxy's place [m, hand frame] (3,), the task, and the time all this is of [ns]."""
-
-    position_m: NDArray[np.float64]
-    task: TaskView
-    sample_time_ns: int
-
-
-@dataclass(slots=True)
-class _Running:
-    """The trial under way: which scene's samples belong to it, and what is made of them."""
-
-    trial: int
-    serial: int
-    drawn_after_ns: int
-    linger_ns: int
-    tracker: Tracker
-    statistics: TrialStatistics
-    dropped_before: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +86,7 @@ class Runner:
         self._state = open_session(protocol, schedule, key, language, start)
         self._reader = ports.servo.telemetry.reader()
         self._recording = Recording(ports.recorder, ports.servo.rate_hz)
-        self._running: _Running | None = None
+        self._running: RunningTrial | None = None
         self._measured: dict[str, Any] = {}
         self._buttons = 0
         self._page_since_ns = 0
@@ -138,7 +114,7 @@ class Runner:
     @property
     def task(self) -> TaskView | None:
         """The task on the device's clock, for the operator; None while no trial runs."""
-        return None if self._running is None else self._running.tracker.now()
+        return None if self._running is None else self._running.task
 
     def on_change(self, listener: Callable[[SessionState], None]) -> None:
         """Call ``listener`` with the new state after every event that was taken."""
@@ -180,6 +156,9 @@ class Runner:
             if self._ports.clock() >= self._stall.retry_s:
                 self._try_again(self._stall)
             return
+        self._carry_out_all((CheckFlushed(),), self._ports.clock())
+        if self._stalls:
+            return
         fault = self._ports.servo.fault
         if fault is not None and self._state.phase not in {Phase.TROUBLE, *FINAL}:
             self.post(Broke(self._ports.clock(), fault))
@@ -187,31 +166,28 @@ class Runner:
             self._hear_buttons(samples)
             self._follow(samples)
         running = self._running
-        if running is not None and running.tracker.end_ns is not None:
-            self._end_when_seen(running, running.tracker.end_ns)
+        if running is not None and (outcome := running.outcome()) is not None:
+            self.post(TaskDone(self._ports.clock(), outcome, running.summary()))
 
     def view(self, now_ns: int) -> TankView | None:
-        """Return what is to be drawn at ``now_ns`` (servo's clock), as late as the trial asks and ``SETTLED_S`` more.
-
-        None without a trial.
-        """
-        running = self._running
-        if running is None:
-            return None
-        position_m, shown_ns = self._ports.servo.telemetry.position_at(now_ns - running.drawn_after_ns)
-        return TankView(position_m, running.tracker.at(shown_ns), shown_ns)
+        """Return what is to be drawn at ``now_ns`` (servo's clock), as late as the trial asks; None without a trial."""
+        return None if self._running is None else self._running.view(now_ns)
 
     def frame_shown(self, painted_ns: int, sample_ns: int) -> None:
-        """Keep the age of what a frame showed: painted at one time, true of another [ns, servo's clock]."""
-        if self._running is not None:
-            self._running.statistics.frame(painted_ns, sample_ns)
-            self._recording.frame(painted_ns, sample_ns)
+        """Take a frame of the trial's tank: painted at one time, true of another [ns, servo's clock]."""
+        if self._running is None:
+            return
+        try:
+            self._running.frame(painted_ns, sample_ns)
+        except StudyError as error:
+            self._fail(error)
 
     def _take(self, event: Event) -> None:
         if self._stall is not None and not self._take_while_stalled(event, self._stall):
             return
         if isinstance(event, Continue) and self._state.phase is Phase.TASK:
-            self._leave_task()
+            if self._running is not None:
+                self._running.leave()
             return
         self._state, commands = advance(self._state, event)
         self._carry_out_all(commands, event.at_s)
@@ -234,9 +210,13 @@ class Runner:
                 self._hold(commands[index:], at_s, error)
                 return
             except StudyError as error:
-                self._ports.servo.stop_force()
-                self._waiting.append(Broke(self._ports.clock(), str(error)))
+                self._fail(error)
                 return
+
+    def _fail(self, error: StudyError) -> None:
+        """Stop the force, and call the operator."""
+        self._ports.servo.stop_force()
+        self.post(Broke(self._ports.clock(), str(error)))
 
     def _carry_out(self, command: Command, at_s: float) -> None:
         servo, journal = self._ports.servo, self._ports.journal
@@ -249,12 +229,14 @@ class Runner:
                 servo.rest()
             case FadeIn():
                 servo.fade_in()
-            case Write(event, fields, measured):
-                journal.append(event, t_s=at_s, **({**self._measured, **fields} if measured else fields))
+            case Write(event, fields, measured, waits):
+                journal.append(event, t_s=at_s, waits=waits, **({**self._measured, **fields} if measured else fields))
+            case CheckFlushed():
+                journal.check_flushed()
             case WriteTables():
                 journal.write_tables()
             case StartTrial():
-                self._start_trial(command)
+                self._running = self._prepared(command)
             case ShowPage(page):
                 self._page_since_ns = servo.now_ns()
                 self._ports.present(page)
@@ -310,58 +292,32 @@ class Runner:
             return False
         return True
 
-    def _start_trial(self, command: StartTrial) -> None:
-        servo = self._ports.servo
-        serial = servo.load(self._protocol.scene_for(command.condition))
-        statistics = TrialStatistics(
-            rate_hz=servo.rate_hz, delay_s=command.delay_s, late_s=self._protocol.limits.delay_error_ms / 1000
+    def _prepared(self, command: StartTrial) -> RunningTrial:
+        return RunningTrial(
+            command,
+            self._protocol.scene_for(command.condition),
+            late_s=self._protocol.limits.delay_error_ms / 1000,
+            servo=self._ports.servo,
+            reader=self._reader,
+            recording=self._recording,
         )
-        self._running = _Running(
-            trial=command.trial,
-            serial=serial,
-            drawn_after_ns=round((command.delay_s + SETTLED_S) * 1e9),
-            linger_ns=round((command.linger_s + SETTLED_S) * 1e9),
-            tracker=track(command.task),
-            statistics=statistics,
-            dropped_before=self._reader.dropped,
-        )
-        self._recording.start(command.trial, command.attempt)
 
     def _stop_trial(self) -> None:
         self._recording.stop()
         if self._running is not None:
-            self._measured = self._summary(self._running)
+            self._measured = self._running.summary()
             self._running = None
 
-    def _summary(self, running: _Running) -> dict[str, Any]:
-        dropped = self._reader.dropped - running.dropped_before
-        return running.tracker.summary() | running.statistics.summary(dropped)
-
     def _follow(self, samples: Any) -> None:
-        running = self._running
-        if running is None or running.tracker.done:
+        if (running := self._running) is None:
             return
-        mine = samples[samples["scene"] == running.serial]
-        reached = running.tracker.feed(mine[mine["limiters"] & LIMITER_GLITCH == 0])
-        end_ns = running.tracker.end_ns
-        running.statistics.feed(mine if end_ns is None else mine[mine["time_ns"] <= end_ns])
         self._carry_out_all(
             [
                 Write("target_reached", {"trial": running.trial, "target": one.target, "t_task_s": one.t_task_s})
-                for one in reached
+                for one in running.follow(samples)
             ],
             self._ports.clock(),
         )
-
-    def _end_when_seen(self, running: _Running, end_ns: int) -> None:
-        """Leave the tank when what ended the task has been drawn, as late as it may be in this block."""
-        outcome = running.tracker.outcome
-        if outcome is not None and self._ports.servo.now_ns() - end_ns >= running.linger_ns:
-            self.post(TaskDone(self._ports.clock(), outcome, self._summary(running)))
-
-    def _leave_task(self) -> None:
-        if self._running is not None:
-            self._running.tracker.leave()
 
     def _hear_buttons(self, samples: Any) -> None:
         """Post what a button going down means; a press from before the present page is no answer to it."""

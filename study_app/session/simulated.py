@@ -17,8 +17,8 @@ from study_app.devices.hand_orders import HandOrders
 from study_app.protocol.answers import Felt, Rater, rate
 from study_app.protocol.model import Explore, Reach
 from study_app.session.pages import QuestionnairePage, TextPage
-from study_app.session.runner import TankView
 from study_app.session.strokes import exploration
+from study_app.session.trial import TankView
 
 Draw = Callable[[], float]
 

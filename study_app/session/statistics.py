@@ -24,21 +24,28 @@ class TrialStatistics:
     rate_hz : the servo's nominal rate
     delay_s : the visual delay asked for
     late_s : a frame counts as late if its delay is more than this over the one asked for
+    due_ns : when the trial's first frame was due: when its page was asked for [ns]
     """
 
-    def __init__(self, *, rate_hz: float, delay_s: float, late_s: float) -> None:
+    def __init__(self, *, rate_hz: float, delay_s: float, late_s: float, due_ns: int) -> None:
         self._rate_hz = rate_hz
         self._delay_s = delay_s
         self._late_s = late_s
         self._times: list[Any] = []
         self._ages_ns: list[int] = []
-        self._painted_ns = 0
+        self._painted_ns = due_ns
+        self._first_gap_ns = 0
         self._frame_gap_ns = 0
         self._last_m: NDArray[np.float64] | None = None
         self._path_m = 0.0
         self._force_sum_n = 0.0
         self._force_peak_n = 0.0
         self._limited = np.zeros(len(LIMITER_NAMES), np.int64)
+        self._permitted_sum_n = 0.0
+        self._withheld_sum_n = 0.0
+        self._delay_ticks: int | None = None
+        self._most_delay_ticks = 0
+        self._delay_changes = 0
 
     def feed(self, samples: Any) -> None:
         """Take the next samples, in order (recarray of ``layout.SAMPLE``)."""
@@ -52,6 +59,9 @@ class TrialStatistics:
         force_n = np.sqrt(np.einsum("ij,ij->i", samples["device_force_n"], samples["device_force_n"]))
         self._force_sum_n += float(force_n.sum())
         self._force_peak_n = max(self._force_peak_n, float(force_n.max()))
+        self._permitted_sum_n += float(samples["permitted_n"].sum())
+        self._withheld_sum_n += float(samples["withheld_n"].sum())
+        self._follow_delay(samples["delay_ticks"])
         limiters = samples["limiters"]
         if limiters.any():
             bits = np.arange(len(LIMITER_NAMES))
@@ -59,8 +69,11 @@ class TrialStatistics:
 
     def frame(self, painted_ns: int, shown_ns: int) -> None:
         """Take a frame that was painted at one moment and showed another [ns]."""
+        gap_ns = painted_ns - self._painted_ns
         if self._ages_ns:
-            self._frame_gap_ns = max(self._frame_gap_ns, painted_ns - self._painted_ns)
+            self._frame_gap_ns = max(self._frame_gap_ns, gap_ns)
+        else:
+            self._first_gap_ns = gap_ns
         self._painted_ns = painted_ns
         self._ages_ns.append(painted_ns - shown_ns)
 
@@ -87,6 +100,9 @@ class TrialStatistics:
             "mean_speed_mps": self._path_m / elapsed_s if elapsed_s > 0 else None,
             "force_mean_n": self._force_sum_n / ticks if ticks else None,
             "force_peak_n": self._force_peak_n if ticks else None,
+            "withheld_share": self._withheld_sum_n / self._permitted_sum_n if self._permitted_sum_n > 0 else None,
+            "loop_delay_ticks": self._most_delay_ticks if ticks else None,
+            "loop_delay_changes": self._delay_changes if ticks else None,
             **{f"limiter_{name}": int(count) for name, count in zip(LIMITER_NAMES, self._limited, strict=True)},
             **self._frames(),
         }
@@ -103,6 +119,13 @@ class TrialStatistics:
         self._path_m += float(np.sqrt(np.einsum("ij,ij->i", steps, steps)).sum())
         self._last_m = places[-1:].copy()
 
+    def _follow_delay(self, delay_ticks: NDArray[np.int64]) -> None:
+        """Count how often the loop's delay (n,) [ticks] changed, and keep the longest."""
+        before = int(delay_ticks[0]) if self._delay_ticks is None else self._delay_ticks
+        self._delay_changes += int(np.count_nonzero(np.diff(delay_ticks, prepend=before)))
+        self._most_delay_ticks = max(self._most_delay_ticks, int(delay_ticks.max()))
+        self._delay_ticks = int(delay_ticks[-1])
+
     def _frames(self) -> dict[str, Any]:
         errors_s = np.asarray(self._ages_ns, np.float64) * 1e-9 - self._delay_s
         seen = errors_s.size > 0
@@ -112,5 +135,6 @@ class TrialStatistics:
             "delay_error_mean_ms": float(errors_s.mean()) * 1e3 if seen else None,
             "delay_error_p95_ms": float(np.percentile(errors_s, 95)) * 1e3 if seen else None,
             "delay_error_max_ms": float(errors_s.max()) * 1e3 if seen else None,
+            "first_frame_gap_ms": self._first_gap_ns * 1e-6 if seen else None,
             "worst_frame_gap_ms": self._frame_gap_ns * 1e-6 if errors_s.size > 1 else None,
         }

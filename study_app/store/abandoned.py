@@ -12,7 +12,7 @@ import time
 from pathlib import Path
 
 from study_app.errors import StoreError
-from study_app.store import journal
+from study_app.store import journal, receipt
 from study_app.store.atomic import cannot_read, cannot_write, is_there, sweep, temporaries
 from study_app.store.opening import Opening, is_open, markers, open_alone
 
@@ -22,6 +22,8 @@ _NO_PROGRAM_TAKES_S = 3600.0  # to put its marker into a folder that it has crea
 
 def never_begun(path: Path) -> bool:
     """Return whether the session's folder ``path`` is there without a line of a journal, or anything later than that.
+
+    A receipt that tells of the session's end, or that it was resumed, is later than that.
 
     Raises
     ------
@@ -36,6 +38,10 @@ def never_begun(path: Path) -> bool:
             return False
     except OSError as error:
         raise cannot_read(path, error) from error
+    with contextlib.suppress(StoreError):
+        held = receipt.read(path / "receipt.json")
+        if held.get("status") != receipt.UNFINISHED or held.get("resumed"):
+            return False
     first = path / "journal.jsonl"
     if not is_there(first):
         return True

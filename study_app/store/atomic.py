@@ -7,6 +7,7 @@ import os
 import re
 import secrets
 import shutil
+import stat
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -197,6 +198,33 @@ def is_there(path: Path) -> bool:
 def cannot_read(path: Path, error: OSError) -> StoreError:
     """Return the one-line error for ``path``: what, why, and what to do."""
     return StoreError(f"{path} cannot be read ({cause(error)}): mend permissions, or restore it from a copy")
+
+
+def read_own(path: Path, root: Path) -> bytes:
+    """Return the content of a file that must lie under ``root``, wherever links lead.
+
+    Raises
+    ------
+    StoreError
+        It lies elsewhere, is no file (a device has no end), or cannot be read.
+    """
+    try:
+        real = path.resolve(strict=True)
+        if not real.is_relative_to(root.resolve()):
+            raise StoreError(f"{path} leads out of {root}, to {real}: put the file itself there")
+        if not stat.S_ISREG(real.stat().st_mode):
+            raise StoreError(f"{path} is no file: restore it from a copy")
+        return real.read_bytes()
+    except OSError as error:
+        raise cannot_read(path, error) from error
+    except RuntimeError as error:  # a loop of links
+        raise StoreError(f"{path} cannot be read ({error}): put the file itself there") from error
+
+
+def study_root(path: Path) -> Path:
+    """Return the study's folder in which ``path``, a file of a session's folder, lies; else the file's own folder."""
+    parents = path.absolute().parents
+    return parents[3] if len(parents) > 3 and parents[2].name == "data" else parents[0]
 
 
 def cause(error: OSError) -> str:

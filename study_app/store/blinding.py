@@ -23,8 +23,9 @@ from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
 from study_app.protocol.schedule import block_codes, draw_key
 from study_app.store import journal, receipt
-from study_app.store.atomic import append_line, cannot_read, create_folder, is_there
+from study_app.store.atomic import append_line, cannot_read, create_folder, is_there, read_own
 from study_app.store.layout import SessionFolder, StudyFolder
+from study_app.store.parsing import parse_json
 
 Codes: TypeAlias = dict[str, dict[str, str]]
 
@@ -68,8 +69,8 @@ class Key:
 def sealed_hash(folder: Path) -> str | None:
     """Return the SHA-256 of a study's sealed key, as in its receipts; None where there is none, or none readable."""
     try:
-        return hashlib.sha256(StudyFolder(folder).key.read_bytes()).hexdigest()
-    except OSError:
+        return hashlib.sha256(read_own(StudyFolder(folder).key, folder)).hexdigest()
+    except StoreError:
         return None
 
 
@@ -189,11 +190,11 @@ def _reveal_lines(folder: Path) -> Iterator[tuple[int, dict[str, str] | None]]:
         raise cannot_read(path, error) from error
     for number, line in enumerate(content.split(b"\n"), start=1):
         try:
-            record = json.loads(line)
+            record = parse_json(line)
         except ValueError:
             record = None
         if line:
-            yield number, record if isinstance(record, dict) else None
+            yield number, record if _is_texts(record) else None
 
 
 def _seal(protocol: Protocol, drawn: str, random: Callable[[], float]) -> bytes:
@@ -252,16 +253,14 @@ def read_key(folder: Path) -> Key:
         It is missing or no key.
     """
     path = StudyFolder(folder).key
+    sealed = read_own(path, folder)
     try:
-        sealed = path.read_bytes()
-    except OSError as error:
-        raise cannot_read(path, error) from error
-    try:
-        content = json.loads(base64.b64decode(sealed, validate=False))
+        content = parse_json(base64.b64decode(sealed, validate=False))
         if content["format"] != _FORMAT:
             raise StoreError(
                 f"{path} has format {content['format']!r}, this version reads {_FORMAT}: use a newer version"
             )
+        _check_content(content)
         return Key(
             hash=hashlib.sha256(sealed).hexdigest(),
             drawn=content["drawn"],
@@ -269,8 +268,24 @@ def read_key(folder: Path) -> Key:
             tables=content["tables"],
             tables_hash=content["tables_hash"],
         )
-    except (ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise StoreError(f"{path} is no sealed key any more: restore it from a copy") from error
+
+
+def _check_content(content: dict[str, Any]) -> None:
+    """Refuse a key whose codes or conditions are of other types (ValueError, KeyError, TypeError, AttributeError)."""
+    conditions = content["tables"]["conditions"].values()
+    if (
+        content["drawn"] not in ("system", "seed")
+        or not all(map(_is_texts, content["codes"].values()))
+        or not isinstance(content["tables"]["liquids"], dict)
+        or not all(isinstance(condition["delay_ms"], int | float) for condition in conditions)
+    ):
+        raise ValueError("its codes or conditions are none")
+
+
+def _is_texts(value: object) -> bool:
+    return isinstance(value, dict) and all(isinstance(text, str) for text in value.values())
 
 
 def _refuse_if_lost(study: StudyFolder) -> None:

@@ -6,6 +6,7 @@ name mean the same in every table.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal, TypeAlias
 
@@ -114,14 +115,15 @@ def _count(name: str, description: str) -> Column:
 
 _LIMITERS = {
     "slope": "the slope limit bounded the change of force with speed",
-    "non_finite": "a force that is no number was replaced by zero",
-    "energy": "the energy account damped the force",
+    "non_finite": "a force that was not finite was replaced by zero",
+    "energy": "the passivity controller changed the force",
     "norm": "the force was cut to the force limit",
     "slew": "the change of force was slowed",
     "fade": "the force was fading in or out",
     "stale": "the device had no new sample in time",
     "glitch": "a sample was refused as impossible",
     "stop": "the force was stopped",
+    "estimator": "EWMA gave the velocity, because the Kalman filter's innovations were too large or the delay changed",
 }
 
 TRIALS: tuple[Column, ...] = (
@@ -151,20 +153,26 @@ TRIALS: tuple[Column, ...] = (
         ),
         may_miss=True,
     ),
-    _measure("duration_s", "From the trial's beginning to its end, on the device's clock.", "s"),
+    _measure("duration_s", "From the trial's first painted frame to the task's end, on the device's clock.", "s"),
     _count("targets_reached", "Targets reached."),
     _count("targets", "Targets to be reached; n/a where the task has none or no fixed number."),
-    _count("ticks", "Turns of the servo during the trial."),
+    _count("ticks", "Ticks of the servo during the trial."),
     _measure("tick_rate_hz", "Rate of the servo, achieved.", "Hz"),
-    _measure("lateness_p99_ms", "Lateness of the servo's turns, 99th percentile.", "ms"),
-    _measure("worst_gap_ms", "Longest time between two turns of the servo.", "ms"),
-    _count("overruns", "Turns of the servo that did not fit their time."),
+    _measure("lateness_p99_ms", "Lateness of the servo's ticks, 99th percentile.", "ms"),
+    _measure("worst_gap_ms", "Longest time between two ticks of the servo.", "ms"),
+    _count("overruns", "Deadlines of the servo that were skipped because a tick took too long."),
     _count("samples_dropped", "Samples of the telemetry that were overwritten before they were read."),
     _measure("path_length_m", "Length of the hand's path.", "m"),
     _measure("mean_speed_mps", "Mean speed of the hand.", "m/s"),
     _measure("force_mean_n", "Mean magnitude of the force sent to the device.", "N"),
     _measure("force_peak_n", "Largest magnitude of the force sent to the device.", "N"),
-    *(_count(f"limiter_{name}", f"Turns of the servo in which {_LIMITERS[name]}.") for name in LIMITER_NAMES),
+    _measure(
+        "withheld_share",
+        "Share of the force that passivity controller, slew limit and device withheld in the task: 0.05 is 5 %.",
+    ),
+    _count("loop_delay_ticks", "Ticks from a command of the servo until its force acts, the most in the task."),
+    _count("loop_delay_changes", "How often that number of ticks changed in the task."),
+    *(_count(f"limiter_{name}", f"Ticks of the servo in which {_LIMITERS[name]}.") for name in LIMITER_NAMES),
     _count("frames", "Frames shown to the participant."),
     _count("frames_late", "Frames whose delay was more than the limit over the one asked for."),
     Column("delay_error_mean_ms", "number", "Visual delay, achieved less requested: mean.", "ms", may_miss=True),
@@ -172,11 +180,16 @@ TRIALS: tuple[Column, ...] = (
         "delay_error_p95_ms", "number", "Visual delay, achieved less requested: 95th percentile.", "ms", may_miss=True
     ),
     Column("delay_error_max_ms", "number", "Visual delay, achieved less requested: largest.", "ms", may_miss=True),
+    _measure(
+        "first_frame_gap_ms",
+        "From the trial's beginning to its first painted frame, with which force and task begin.",
+        "ms",
+    ),
     _measure("worst_frame_gap_ms", "Longest time that one frame stood before the next was shown.", "ms"),
     Column(
         "valid",
         "flag",
-        "true where the trial kept the protocol's limits of lateness, gaps and delay error.",
+        "true where the trial kept the protocol's limits of lateness, gaps, delay error and force withheld.",
         may_miss=True,
     ),
     Column(
@@ -251,6 +264,17 @@ TABLES: dict[str, tuple[Column, ...]] = {
     "trials": TRIALS,
     "participants": PARTICIPANTS,
 }
+
+
+LATER = frozenset(
+    {"first_frame_gap_ms", "withheld_share", "loop_delay_ticks", "loop_delay_changes", "limiter_estimator"}
+)
+"""Columns that earlier versions did not write: a table without them is read as if they held n/a."""
+
+
+def columns_held(names: Sequence[str], columns: Sequence[Column]) -> tuple[Column, ...]:
+    """Return the columns that a table with these names must hold: all but those of `LATER` that it lacks."""
+    return tuple(column for column in columns if column.name in names or column.name not in LATER)
 
 
 def header(columns: tuple[Column, ...]) -> tuple[str, ...]:

@@ -13,8 +13,9 @@ from study_app.errors import StoreError
 from study_app.protocol.model import StudyHead
 from study_app.protocol.texts import text_in
 from study_app.store.atomic import cannot_read, is_there, write_file
-from study_app.store.columns import every_column, variable
+from study_app.store.columns import LATER, every_column, variable
 from study_app.store.layout import StudyFolder
+from study_app.store.parsing import check_study_name, parse_json
 
 # What a study folder holds beside tables; patterns as in .gitignore.
 IGNORED = b"""\
@@ -45,6 +46,19 @@ def description_bytes(study: StudyHead) -> bytes:
     return (json.dumps(content, indent=2, ensure_ascii=False) + "\n").encode()
 
 
+def describes_alike(content: bytes, expected: bytes) -> bool:
+    """Return whether a description says the same of the study, and names the same columns but for `LATER`.
+
+    Earlier versions of the program lack columns, and describe others in other words.
+    """
+    try:
+        found, wanted = json.loads(content), json.loads(expected)
+        names, wanted_names = ([variable["name"] for variable in it.pop("variableMeasured")] for it in (found, wanted))
+    except (AttributeError, KeyError, TypeError, ValueError):
+        return False
+    return bool(found == wanted and names == [name for name in wanted_names if name in names or name not in LATER])
+
+
 def write_description(folder: StudyFolder, study: StudyHead) -> None:
     """Write the description where it is missing or of an older version of the study."""
     content = description_bytes(study)
@@ -65,7 +79,7 @@ def described_study(folder: StudyFolder) -> str | None:
     if not is_there(folder.description):
         return None
     try:
-        return str(json.loads(_read(folder.description))["name"])
+        return check_study_name(parse_json(_read(folder.description))["name"])
     except (ValueError, KeyError, TypeError) as error:
         raise StoreError(f"{folder.description} describes no study: is {folder.path} a results folder?") from error
 

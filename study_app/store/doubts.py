@@ -14,9 +14,11 @@ from study_app.errors import StoreError
 from study_app.store import journal
 from study_app.store.atomic import is_there
 from study_app.store.checksums import hashed, read_checksums
+from study_app.store.columns import TABLES
 from study_app.store.journal import Contents
 from study_app.store.open_session import Place, table_files
 from study_app.store.opening import is_open
+from study_app.store.tables import in_columns_of
 
 CHANGED = "has changed since the session ended (its checksum differs)"
 
@@ -106,8 +108,9 @@ def _tables(place: Place, contents: Contents, restore: str) -> Iterator[Doubt]:
     except (StoreError, KeyError) as error:
         yield Doubt(place.folder.journal, f"gives no tables ({error})", restore)
         return
-    for path, content in expected:
+    for (path, whole), name in zip(expected, ("responses", "trials"), strict=True):
         there = path.read_bytes() if is_there(path) else b""
+        content, _ = in_columns_of(there, whole, TABLES[name])
         if there != content:
             pairs = zip_longest(there.split(b"\n"), content.split(b"\n"))
             line = next(number for number, (ours, theirs) in enumerate(pairs, start=1) if ours != theirs)

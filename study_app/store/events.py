@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from datetime import datetime
+from typing import Any
 
-from study_app.errors import StoreError
-from study_app.store.journal import Line
+from study_app.store.columns import TRIALS
+from study_app.store.parsing import PARTICIPANT_ID, RECORDING_NAME, STUDY_NAME
+
+SHOWN = 200  # characters of a bad value that a message repeats
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,27 +72,134 @@ EVENTS: tuple[Event, ...] = (
 _OF_ALL = ("n", "event", "t_s", "at")
 _BY_NAME = {event.name: event for event in EVENTS}
 
+_MOST_SECONDS = 1e9  # of a session's clock
+_MOST = 10**30  # no whole number that the program writes is greater
 
-def check_fields(path: Path, lines: Sequence[Line]) -> None:
-    """Refuse a journal with a line that lacks a field of its event.
 
-    Raises
-    ------
-    StoreError
-        Names the line and what it lacks.
+def _is_text(value: object) -> bool:
+    return isinstance(value, str)
+
+
+def _is_study(value: object) -> bool:
+    return isinstance(value, str) and STUDY_NAME.fullmatch(value) is not None
+
+
+def _is_participant(value: object) -> bool:
+    return isinstance(value, str) and PARTICIPANT_ID.fullmatch(value) is not None
+
+
+def _is_recording(value: object) -> bool:
+    return isinstance(value, str) and RECORDING_NAME.fullmatch(value) is not None
+
+
+def _is_flag(value: object) -> bool:
+    return isinstance(value, bool)
+
+
+def _is_integer(value: object) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool) and abs(value) <= _MOST
+
+
+def _is_number(value: object) -> bool:
+    return _is_integer(value) or (isinstance(value, float) and math.isfinite(value))
+
+
+def _is_time(value: object) -> bool:
+    try:
+        return isinstance(value, str) and datetime.fromisoformat(value).tzinfo is not None
+    except ValueError:
+        return False
+
+
+def _is_object(value: object) -> bool:
+    return isinstance(value, dict)
+
+
+def _are_objects(value: object) -> bool:
+    return isinstance(value, list) and all(map(_is_object, value))
+
+
+def _are_limits(value: object) -> bool:
+    return isinstance(value, dict) and all(map(_is_number, value.values()))
+
+
+def _are_answers(value: object) -> bool:
+    return isinstance(value, list) and all(
+        isinstance(answer, dict) and all(name in answer and holds(name, answer[name]) for name in _ANSWER)
+        for answer in value
+    )
+
+
+_ANSWER = ("item", "number", "value", "onset_s", "first_s", "last_s", "changes")
+_KINDS: Mapping[str, Callable[[object], bool]] = {
+    "text": _is_text,
+    "study's name": _is_study,
+    "participant's id": _is_participant,
+    "recording's name": _is_recording,
+    "flag": _is_flag,
+    "integer": _is_integer,
+    "number": _is_number,
+    "time": _is_time,
+    "object": _is_object,
+    "list of objects": _are_objects,
+    "table of numbers": _are_limits,
+    "list of answers": _are_answers,
+}
+_MAY_BE_NULL = ("part", "value", "onset_s", "first_s", "last_s", "gap_s", "device", "t_task_s")
+_KIND_OF: dict[str, tuple[str, bool]] = {column.name: (column.kind, True) for column in TRIALS} | {
+    name: (kind, name in _MAY_BE_NULL)
+    for kind, names in {
+        "text": "language operator key_hash protocol_hash version device page block phase code item "
+        "outcome sha256 frames_sha256 reason by kind text what status",
+        "study's name": "study",
+        "participant's id": "participant",
+        "recording's name": "recording recording_frames",
+        "flag": "simulated pilot recordings",
+        "integer": "n session seed torn_bytes trial attempt part index of target samples_recorded "
+        "samples_unrecorded frames_recorded number value changes",
+        "number": "t_s gap_s t_task_s onset_s first_s last_s",
+        "time": "at",
+        "list of objects": "checks",
+        "table of numbers": "limits",
+        "list of answers": "items",
+    }.items()
+    for name in names.split()
+}
+"""What a field of that name holds, in any event that this version knows, and whether it may be null."""
+
+
+def problem(line: Mapping[str, Any]) -> str | None:
+    """Return what is wrong with a line of a journal, or None.
+
+    A line lacks no field of its event, and every field that the dictionary knows is of its kind. Of an event of another
+    version only the fields that all lines have are known.
     """
-    for lacking in lacking_fields(lines):
-        raise StoreError(f"{path}, {lacking}: it was changed; restore it from a copy")
+    event = line.get("event")
+    if not isinstance(event, str):
+        return "it names no event"
+    known = _BY_NAME.get(event)
+    if lacking := [name for name in (*_OF_ALL, *(known.fields if known else ())) if name not in line]:
+        return f"({event}) lacks {', '.join(lacking)}"
+    for name in line if known else _OF_ALL:
+        if not holds(name, line[name]):
+            return f"({event}) holds {name} {shortened(line[name])}, expected: {_KIND_OF[name][0]}"
+    return None if 0 <= line["t_s"] <= _MOST_SECONDS else f"({event}) has t_s {line['t_s']:g}"
 
 
-def unknown_events(lines: Sequence[Line]) -> Iterator[str]:
+def shortened(value: object) -> str:
+    """Return ``value`` as a message repeats it."""
+    shown = repr(value)
+    return shown if len(shown) <= SHOWN else f"{shown[:SHOWN]}…"
+
+
+def unknown_events(lines: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     """Yield the names of events that the dictionary does not know, each once."""
-    yield from {str(line.get("event")): None for line in lines if line.get("event") not in _BY_NAME}
+    yield from {line["event"]: None for line in lines if line["event"] not in _BY_NAME}
 
 
-def lacking_fields(lines: Sequence[Line]) -> Iterator[str]:
-    """Yield a sentence about every line that lacks a field of its event."""
-    for line in lines:
-        event = _BY_NAME.get(line.get("event", ""))
-        if lacking := [name for name in (*_OF_ALL, *(event.fields if event else ())) if name not in line]:
-            yield f"line {line.get('n')} ({line.get('event')}) lacks {', '.join(lacking)}"
+def holds(name: str, value: object) -> bool:
+    """Return whether ``value`` is what a field called ``name`` holds; an unknown field may hold anything."""
+    if name not in _KIND_OF:
+        return True
+    kind, may_be_null = _KIND_OF[name]
+    return may_be_null if value is None else _KINDS[kind](value)

@@ -1,9 +1,11 @@
-"""The truth about a session: one event a line, on the disk before anything follows from it.
+"""The truth about a session: one event per line, and every answer on the disk before anything follows from it.
 
 Every line is a JSON object that explains itself: ``n`` counts from 1 without a gap, ``event`` is its name, ``t_s`` the
 seconds since the session's clock origin, ``at`` the same moment for people. All tables are derived from these lines
-alone. A line is whole when its newline is on the disk; a program killed while writing leaves at most one torn tail,
-which readers leave out and count.
+alone. A line is whole when its newline is on the disk; a program killed while writing leaves at most one torn tail
+without a newline, which readers leave out and count; anything else that is no line is damage. Lines that nobody waits
+for are flushed in the background, in order: a power cut may take the last of them, but none that was waited for and
+none before it.
 """
 
 from __future__ import annotations
@@ -12,18 +14,25 @@ import contextlib
 import json
 import math
 import os
+import threading
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import datetime, timedelta
+from itertools import count
 from pathlib import Path
 from types import TracebackType
 from typing import Any, BinaryIO, TypeAlias
 
 from study_app.errors import StoreError
-from study_app.store.atomic import cannot_read, cannot_write, sync_folder, write_file, write_whole
+from study_app.store.atomic import cannot_write, read_own, study_root, sync_folder, write_file, write_whole
+from study_app.store.events import problem, shortened
+from study_app.store.parsing import parse_json
 
 Line: TypeAlias = dict[str, Any]
+
+RETRY_S = 1.0
+"""The background thread repeats a failed flush after this time."""
 
 _OWN = ("n", "at")
 
@@ -64,7 +73,12 @@ class SessionClock:
 
 
 class Journal:
-    """An open journal: ``append`` returns when the line is on the disk. One writer, one thread."""
+    """An open journal: one thread appends, and another flushes the lines that nobody waits for.
+
+    After a failed write or flush the lines that are not known to be on the disk are written again before the next line,
+    which waits for the disk: the system may have dropped what it could not flush. The background thread repeats a
+    failed flush every `RETRY_S`; until it succeeds, `check_flushed` raises.
+    """
 
     def __init__(self, path: Path, file: BinaryIO, clock: SessionClock) -> None:
         self.path = path
@@ -72,7 +86,14 @@ class Journal:
         self._file = file
         self._lines = 0
         self._size = 0
+        self._unflushed = bytearray()  # the last bytes of the file, not known to be on the disk
         self._torn = False
+        self._flushing = threading.RLock()  # one flush at a time: the system reports a failure to one of two alone
+        self._changed = threading.Condition()
+        self._thread: threading.Thread | None = None
+        self._due = False
+        self._failed: OSError | None = None  # why the newest flush in the background failed
+        self._closing = False
 
     @classmethod
     def create(cls, path: Path, clock: SessionClock | None = None) -> Journal:
@@ -96,7 +117,7 @@ class Journal:
     def reopen(cls, path: Path, contents: Contents, clock: SessionClock) -> Journal:
         """Open the file to go on after the last whole line of ``contents``, which `scan` has just read.
 
-        A torn tail is cut off by writing the whole lines anew, in one step.
+        A torn tail is cut off by writing the whole lines anew, in one step, and kept beside the journal.
 
         Raises
         ------
@@ -105,7 +126,9 @@ class Journal:
         """
         try:
             if contents.torn_bytes:
-                write_file(path, path.read_bytes()[: contents.whole_bytes])
+                content = path.read_bytes()
+                write_file(_unused_beside(path), content[contents.whole_bytes :])
+                write_file(path, content[: contents.whole_bytes])
             file = path.open("r+b", buffering=0)
             if file.seek(0, os.SEEK_END) != contents.whole_bytes:
                 file.close()
@@ -116,35 +139,45 @@ class Journal:
         journal._lines, journal._size = len(contents.lines), contents.whole_bytes
         return journal
 
-    def append(self, event: str, *, t_s: float | None = None, **fields: Any) -> Line:
+    def append(self, event: str, *, t_s: float | None = None, waits: bool = True, **fields: Any) -> Line:
         """Write one line and wait for the disk; return the line as a reader will see it.
 
+        Without ``waits`` it returns when the system has the line, and the line is flushed in the background.
         ``t_s`` is when it happened, by default now. Infinite and undefined numbers become null, numpy numbers plain.
         Fields cannot be called ``n`` or ``at``, which are the journal's own.
 
         Raises
         ------
         StoreError
-            The line is not on the disk; the journal ends with its last whole line and can be appended to again.
+            The line was not written, or is not on the disk though it was waited for, or a line before it could not be
+            flushed; the journal ends with the line before it and can be appended to again.
         """
         if self._file.closed:
             raise StoreError(f"{self.path} is closed: {event!r} came after the session's end and was not recorded")
         line = line_of(self._lines + 1, event, self.clock, t_s, fields)
         content = line_bytes(line)
+        self._refuse_if_replaced()
         try:
-            if self._torn:
-                self._take_back()
-            self._torn = True
-            write_whole(self._file, content)
-            os.fsync(self._file.fileno())
+            waits = self._write(content) or waits
+            if waits:
+                self._flush_or_take_back(content)
         except OSError as error:
-            with contextlib.suppress(OSError):  # tried again before the next line
-                self._take_back()
             raise cannot_write(self.path, error) from error
-        self._torn = False
-        self._size += len(content)
         self._lines += 1
+        if not waits:
+            self._flush_later()
         return line
+
+    def check_flushed(self) -> None:
+        """Raise if lines that nobody waited for could not be flushed, and still are not on the disk.
+
+        Raises
+        ------
+        StoreError
+            Says why the newest flush in the background failed.
+        """
+        if (failed := self._failed) is not None:
+            raise cannot_write(self.path, failed)
 
     @property
     def closed(self) -> bool:
@@ -152,8 +185,26 @@ class Journal:
         return self._file.closed
 
     def close(self) -> None:
-        """Close the file; every line is on the disk already."""
-        self._file.close()
+        """Flush what is not on the disk yet, and close the file.
+
+        Raises
+        ------
+        StoreError
+            The last lines could not be flushed; the file is closed nevertheless.
+        """
+        with self._changed:
+            self._closing = True
+            self._changed.notify_all()
+        if self._thread is not None:
+            self._thread.join()
+        if self._file.closed:
+            return
+        try:
+            self._flush()
+        except OSError as error:
+            raise cannot_write(self.path, error) from error
+        finally:
+            self._file.close()
 
     def __enter__(self) -> Journal:
         return self
@@ -163,10 +214,93 @@ class Journal:
     ) -> None:
         self.close()
 
+    def _refuse_if_replaced(self) -> None:
+        """Refuse to write into a file that is no longer found under the journal's name."""
+        try:
+            there = os.path.samestat(self.path.stat(), os.fstat(self._file.fileno()))
+        except FileNotFoundError:
+            there = False
+        except OSError as error:
+            raise cannot_write(self.path, error) from error
+        if not there:
+            raise StoreError(f"{self.path} was moved, deleted or replaced while the session ran: put it back")
+
+    def _write(self, content: bytes) -> bool:
+        """Write a line after the last whole one; return whether it must be waited for because something failed."""
+        with self._changed:
+            failed = self._torn
+            try:
+                if self._torn:
+                    self._take_back()
+                self._torn = True
+                write_whole(self._file, content)
+            except OSError:
+                with contextlib.suppress(OSError):  # tried again before the next line
+                    self._take_back()
+                raise
+            self._torn = False
+            self._unflushed += content
+            self._size += len(content)
+        return failed
+
+    def _flush_or_take_back(self, content: bytes) -> None:
+        """Wait until the line just written is on the disk; where it cannot be, take it back."""
+        with self._flushing:
+            try:
+                self._flush()
+            except OSError:
+                with self._changed:
+                    del self._unflushed[-len(content) :]
+                    self._size -= len(content)
+                    with contextlib.suppress(OSError):
+                        self._take_back()
+                    self._torn = True
+                raise
+
+    def _flush(self) -> None:
+        """Wait until every line written so far is on the disk; called from both threads."""
+        with self._flushing:
+            with self._changed:
+                if self._torn:
+                    self._take_back()
+                waiting = len(self._unflushed)
+            if waiting:
+                try:
+                    os.fsync(self._file.fileno())
+                except OSError:
+                    with self._changed:
+                        self._torn = True
+                    raise
+            with self._changed:
+                del self._unflushed[:waiting]
+                self._failed = None
+
+    def _flush_later(self) -> None:
+        with self._changed:
+            self._due = True
+            if self._thread is None:
+                self._thread = threading.Thread(target=self._flush_behind, name="journal", daemon=True)
+                self._thread.start()
+            self._changed.notify_all()
+
+    def _flush_behind(self) -> None:
+        """Flush whenever a line was written that nobody waits for, and after a failure: the journal's own thread."""
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._due or self._closing, RETRY_S if self._failed else None)
+                if self._closing:
+                    return
+                self._due = False
+            try:
+                self._flush()
+            except OSError as error:
+                self._failed = error
+
     def _take_back(self) -> None:
-        """Cut off what an interrupted write may have left after the last whole line."""
+        """Cut off what an interrupted write may have left, and write again what may not be on the disk."""
         self._file.truncate(self._size)
-        self._file.seek(self._size)
+        self._file.seek(self._size - len(self._unflushed))
+        write_whole(self._file, bytes(self._unflushed))
         self._torn = False
 
 
@@ -174,8 +308,9 @@ class Journal:
 class Contents:
     """What a journal holds: its whole lines, where they end, and what is wrong after them.
 
-    ``torn_bytes`` counts the torn tail of a program that was killed while writing; ``damage`` is the sentence about
-    anything worse (a broken line with whole ones after it, a number missing or doubled), else None.
+    ``torn_bytes`` counts what follows the last newline: the torn tail of a program that was killed while writing.
+    ``damage`` is the sentence about anything worse (a broken line, a number missing or doubled, a field of another type
+    than its event has), else None. Every line of ``lines`` has the fields of its event, each of its kind.
     """
 
     lines: list[Line]
@@ -210,33 +345,37 @@ def whole(path: Path) -> Contents:
 
 
 def scan(path: Path) -> Contents:
-    """Read the journal to its last whole line and report what follows it.
+    """Read the journal to its last whole line, check each against its event, and report what follows it.
 
     Raises
     ------
     StoreError
-        It cannot be read.
+        It cannot be read, or leads out of the study's folder.
     """
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise cannot_read(path, error) from error
+    content = read_own(path, study_root(path))
     *pieces, tail = content.split(b"\n")
     lines: list[Line] = []
     whole_bytes = 0
     for number, piece in enumerate(pieces, start=1):
         line = _parse(piece)
         if line is None:
-            if any(_parse(later) is not None for later in pieces[number:]):
-                damage = f"{path}, line {number}: damaged, though whole lines follow; restore it from a copy"
-                return Contents(lines, whole_bytes, damage=damage)
-            return Contents(lines, whole_bytes, torn_bytes=len(content) - whole_bytes)
+            return Contents(lines, whole_bytes, damage=f"{path}, line {number}: damaged; restore it from a copy")
         if line.get("n") != number:
-            damage = f"{path}, line {number}: its n is {line.get('n')!r}: lines are missing or doubled; restore a copy"
+            shown = shortened(line.get("n"))
+            damage = f"{path}, line {number}: its n is {shown}: lines are missing or doubled; restore a copy"
+            return Contents(lines, whole_bytes, damage=damage)
+        if (wrong := problem(line)) is not None:
+            damage = f"{path}, line {number} {wrong}: it was changed; restore it from a copy"
             return Contents(lines, whole_bytes, damage=damage)
         lines.append(line)
         whole_bytes += len(piece) + 1
     return Contents(lines, whole_bytes, torn_bytes=len(tail))
+
+
+def _unused_beside(path: Path) -> Path:
+    """Return the name of the next file that keeps what is cut off the journal at ``path``."""
+    names = (path.with_name(f"{path.stem}-torn-{number}.txt") for number in count(1))
+    return next(name for name in names if not name.exists())
 
 
 def line_of(number: int, event: str, clock: SessionClock, t_s: float | None, fields: Mapping[str, Any]) -> Line:
@@ -274,7 +413,7 @@ def plain(value: Any) -> Any:
 
 def _parse(piece: bytes) -> Line | None:
     try:
-        line = json.loads(piece)
+        line = parse_json(piece)
     except ValueError:
         return None
     return line if isinstance(line, dict) else None

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -19,6 +18,7 @@ from typing import Any, TypeAlias
 from study_app.protocol.model import Protocol
 from study_app.store.atomic import cannot_read
 from study_app.store.layout import StudyFolder
+from study_app.store.parsing import parse_json
 
 Tables: TypeAlias = Mapping[str, Any]
 
@@ -132,7 +132,7 @@ def _cells(content: str) -> Iterator[tuple[str, str]]:
 def _parsed(text: str, place: str) -> Iterator[tuple[str, str]]:
     """Yield what a JSON text holds, or the text itself where it is none."""
     try:
-        value = json.loads(text)
+        value = parse_json(text)
     except ValueError:
         yield place, text
         return

@@ -35,7 +35,7 @@ class Place:
 
 
 class SessionStore:
-    """The open session: ``append`` is durable when it returns, tables follow the journal, ``finish`` says how it ended.
+    """The open session: ``append`` adds to its journal, tables follow the journal, ``finish`` says how it ended.
 
     ``key`` translates codes while the session runs; ``clock`` is the one the journal is stamped from; ``recorder``
     takes the trials' samples and frames, or is None in a session without recordings; ``behind`` is why the tables on
@@ -76,17 +76,27 @@ class SessionStore:
         """The journal so far."""
         return tuple(self._lines)
 
-    def append(self, event: str, *, t_s: float | None = None, **fields: Any) -> None:
-        """Put an event into the journal; it is on the disk when this returns.
+    def append(self, event: str, *, t_s: float | None = None, waits: bool = True, **fields: Any) -> None:
+        """Put an event into the journal; with ``waits`` it is on the disk when this returns, else soon after.
 
         ``t_s`` is when it happened [s since the clock's origin], by default now.
 
         Raises
         ------
         StoreError
-            It is not on the disk; the journal is as before and can be tried again.
+            It was not written, or is not on the disk; the journal is as before and can be tried again.
         """
-        self._lines.append(self._journal.append(event, t_s=t_s, **fields))
+        self._lines.append(self._journal.append(event, t_s=t_s, waits=waits, **fields))
+
+    def check_flushed(self) -> None:
+        """Raise if lines that nobody waited for could not be flushed, and still are not on the disk.
+
+        Raises
+        ------
+        StoreError
+            Says why.
+        """
+        self._journal.check_flushed()
 
     def write_tables(self) -> None:
         """Bring the session's tables up to date with its journal.
@@ -136,15 +146,23 @@ class SessionStore:
         self._over = True
 
     def close(self) -> None:
-        """Let go of the session without an end; it stays unfinished."""
+        """Let go of the session without an end; it stays unfinished.
+
+        Raises
+        ------
+        StoreError
+            The last lines could not be flushed.
+        """
         self._over = True
         if self.recorder is not None:
             self.recorder.close()
         if not self._journal.closed:
             with contextlib.suppress(StoreError):  # `reopen` finds the files that no line tells of
                 self._keep_recordings()
-        self._journal.close()
-        self._opening.release()
+        try:
+            self._journal.close()
+        finally:
+            self._opening.release()
 
     def note_resumed(self, what: Mapping[str, Any]) -> None:
         """Add to the receipt what the session goes on with.
@@ -172,7 +190,7 @@ class SessionStore:
             self._kept += self.recorder.kept()
         while self._kept:
             event, fields = event_of(self._kept[0])
-            self.append(event, **fields)
+            self.append(event, waits=False, **fields)
             del self._kept[0]
 
     def __enter__(self) -> SessionStore:
@@ -181,7 +199,12 @@ class SessionStore:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        self.close()
+        try:
+            self.close()
+        except StoreError as failed:
+            if error is None:
+                raise
+            error.add_note(str(failed))
 
 
 def table_files(place: Place, lines: Sequence[Line]) -> tuple[tuple[Path, bytes], ...]:

@@ -22,6 +22,7 @@ from typing import Any
 
 from study_app.errors import StoreError
 from study_app.store.atomic import cannot_write, create_folder, is_there, sync_folder, write_file
+from study_app.store.parsing import parse_json
 
 _MARKER = re.compile(r"\.open-[0-9a-f]{8}\.json")
 _BOOT = Path("/proc/sys/kernel/random/boot_id")
@@ -123,7 +124,7 @@ def _is_open(marker: Path, holder: dict[str, Any]) -> StoreError:
 def _holder(marker: Path) -> dict[str, Any]:
     """Return what the marker says; nothing where it is gone meanwhile."""
     try:
-        holder = json.loads(marker.read_bytes())
+        holder = parse_json(marker.read_bytes())
     except FileNotFoundError:
         return {"gone": True}
     except (OSError, ValueError):

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
 from typing import Final
 
 from study_app.errors import StoreError
-from study_app.store import journal, tables
+from study_app.store import journal, receipt, tables
+from study_app.store.abandoned import never_begun
 from study_app.store.atomic import is_there, write_file
 from study_app.store.columns import PARTICIPANTS, header
-from study_app.store.events import check_fields
 from study_app.store.layout import SessionFolder, StudyFolder
 
 NONE: Final[Mapping[Path, tables.Row]] = MappingProxyType({})
@@ -30,14 +31,11 @@ def participants(folder: StudyFolder, known: Mapping[Path, tables.Row] = NONE) -
 
 
 def row_of(session: SessionFolder) -> list[tables.Row]:
-    """Return the row of one session; none if it has not begun its journal."""
-    if not is_there(session.journal):
-        return []
-    contents = journal.scan(session.journal)
+    """Return the row of one session; none if it has not begun."""
+    contents = journal.scan(session.journal) if is_there(session.journal) else journal.Contents([], 0)
     if not contents.lines:
-        return []
+        return [] if never_begun(session.path) else [_damaged(session, {})]
     try:
-        check_fields(session.journal, contents.lines)
         row = tables.participant(contents.lines)
     except StoreError:  # one session that cannot be read must not stop the others
         return [_damaged(session, contents.lines[0])]
@@ -45,7 +43,13 @@ def row_of(session: SessionFolder) -> list[tables.Row]:
 
 
 def _damaged(session: SessionFolder, start: journal.Line) -> tables.Row:
-    """Return the row of a session whose journal gives none: what its folder and its first line tell."""
+    """Return the row of a session whose journal gives none: what its folder, its first line and its receipt tell."""
+    if not start:
+        with contextlib.suppress(StoreError):
+            held = receipt.read(session.receipt)
+            device = held.get("device")
+            name = device.get("name") if isinstance(device, dict) else None
+            start = held | {"at": held.get("started_at"), "device": name}
     known = {name: start.get(name) for name in ("study", "simulated", "pilot", "device", "language")}
     which = {"participant": session.participant, "session": session.number, "session_started_at": start.get("at")}
     return {**dict.fromkeys(header(PARTICIPANTS)), **known, **which, "status": "damaged"}

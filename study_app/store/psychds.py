@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping
@@ -18,6 +17,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from study_app.store.atomic import cannot_read
+from study_app.store.parsing import parse_json
 
 Metadata: TypeAlias = Mapping[str, Any]
 
@@ -244,7 +244,7 @@ def _name(folder: Path, path: Path) -> str:
 def _json(path: Path) -> Any:
     """Return the file's value, None where it is no JSON in UTF-8."""
     try:
-        return json.loads(_content(path).decode("utf-8"))
+        return parse_json(_content(path).decode("utf-8"))
     except ValueError:
         return None
 

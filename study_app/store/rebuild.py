@@ -8,7 +8,6 @@ from pathlib import Path
 from study_app.store import journal, receipt
 from study_app.store.atomic import is_there, sweep, write_file
 from study_app.store.checksums import renew_checksums
-from study_app.store.events import check_fields
 from study_app.store.journal import Line
 from study_app.store.layout import SessionFolder, locate
 from study_app.store.open_session import Place, table_files
@@ -47,7 +46,6 @@ def rebuild(session_folder: Path) -> Rebuilt:
     opening = open_alone(folder.path)
     try:
         contents = journal.whole(folder.journal)
-        check_fields(folder.journal, contents.lines)
         place = Place(study_folder, folder, progress_of(contents.lines).start["study"])
         swept = sweep(folder.path) + (sweep(folder.recordings) if is_there(folder.recordings) else ())
         table = study_folder.participants(place.study)

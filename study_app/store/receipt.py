@@ -19,8 +19,10 @@ import study_app
 from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
 from study_app.protocol.schedule import block_codes
-from study_app.store.atomic import cannot_read, write_file
+from study_app.store.atomic import read_own, study_root, write_file
+from study_app.store.events import holds, shortened
 from study_app.store.journal import plain
+from study_app.store.parsing import parse_json
 
 GENERATOR = (
     "random.Random (Mersenne Twister), one per named stream, seeded by SHA-256 of (seed, name); only .random() is "
@@ -63,11 +65,12 @@ FIELDS = (
 
 
 def without_conditions(protocol: Protocol) -> dict[str, Any]:
-    """Return the protocol as a JSON value without what blinding hides; blocks keep their codes, in code order."""
+    """Return the protocol as a JSON value without what blinding hides; blocks say their codes and what they compare."""
     shown = protocol.model_dump(mode="json", exclude={"liquids": True, "conditions": True})
     for name, block in protocol.blocks.items():
         del shown["blocks"][name]["conditions"]
         shown["blocks"][name]["codes"] = list(block_codes(block))
+        shown["blocks"][name]["compares"] = protocol.compared_in(name)
     return shown
 
 
@@ -107,11 +110,23 @@ def read(path: Path) -> dict[str, Any]:
         It is missing or no receipt.
     """
     try:
-        receipt = json.loads(path.read_bytes())
-    except OSError as error:
-        raise cannot_read(path, error) from error
+        receipt = parse_json(read_own(path, study_root(path)))
     except ValueError as error:
         raise StoreError(f"{path} is no receipt ({error}): restore it from a copy") from error
     if not isinstance(receipt, dict) or "key_hash" not in receipt:
         raise StoreError(f"{path} is no receipt (no key_hash): restore it from a copy")
+    for name, value in receipt.items():
+        if not _holds(name, value):
+            raise StoreError(f"{path} is no receipt ({name} is {shortened(value)}): restore it from a copy")
     return receipt
+
+
+def _holds(name: str, value: object) -> bool:
+    """Return whether ``value`` is what a receipt's field called ``name`` holds."""
+    if name in ("versions", "device", "screens", "clock", "protocol"):
+        return isinstance(value, dict)
+    if name == "resumed":
+        return isinstance(value, list)
+    if name in ("started_at", "ended_at"):
+        return value is None or holds("at", value)
+    return holds(name, value)

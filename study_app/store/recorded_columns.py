@@ -21,10 +21,12 @@ SAMPLES: tuple[Column, ...] = (
     *_vector("position", "m", "m", "Place of the hand, exact"),
     *_vector("velocity", "m/s", "mps", "Velocity in the scene, as the force was computed from; to 1/4096 m/s"),
     *_vector("wake", "m/s", "mps", "Velocity of the liquid's wake in the scene; to 1/4096 m/s"),
-    *_vector("device_force", "N", "n", "Force sent to the hand; to 1/16384 N"),
+    *_vector("device_force", "N", "n", "Force that the device sent to the hand; to 1/16384 N"),
+    *_vector("undelivered", "N", "n", "Force that the servo commanded and the device did not send"),
     *_vector("withheld", "N", "n", "Force of the liquid that was not sent: device_force + withheld is what it exerted"),
     Column("buttons", "integer", "Buttons of the device that were down, as bits."),
     Column("limiters", "integer", "Limiters that acted, as bits in the order of the trial's limiter columns."),
+    Column("delay_ticks", "integer", "Ticks by which a force is believed to act late.", minimum=0, maximum=4),
     Column("scene", "integer", "Number of the scene that was felt; 0 is none.", minimum=0),
     Column(
         "status",

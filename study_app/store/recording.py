@@ -25,15 +25,25 @@ from numpy.typing import NDArray
 from pyarrow import parquet
 
 from study_app.errors import StoreError
+from study_app.haptics.dynamics import BELIEVED_TICKS
 from study_app.haptics.layout import SAMPLE, records
 from study_app.store.atomic import beside, cannot_read, sync_folder
 from study_app.store.columns import Column
 from study_app.store.journal import plain
+from study_app.store.parsing import parse_json
 from study_app.store.recorded_columns import FRAMES, SAMPLES
 
-FORMAT = 1
+FORMAT = 2
 SPEED_STEP_MPS = 2.0**-12
 FORCE_STEP_N = 2.0**-14
+ROUNDED_TO = {
+    "velocity_mps": SPEED_STEP_MPS,
+    "wake_mps": SPEED_STEP_MPS,
+    "device_force_n": FORCE_STEP_N,
+    "command_n": FORCE_STEP_N,
+    "force_n": FORCE_STEP_N,
+}
+"""Fields of ``layout.SAMPLE`` that are recorded rounded, and the step."""
 GROUP_SECONDS = 30  # rows of so many seconds are compressed together
 
 FRAME = np.dtype([("painted_ns", np.int64), ("sample_ns", np.int64), ("age_ns", np.int64)])
@@ -41,7 +51,7 @@ FRAME = np.dtype([("painted_ns", np.int64), ("sample_ns", np.int64), ("age_ns", 
 _FACTS = b"liquid_study"
 _COMPRESSION = ("zstd", 9)
 _AXES = ("x", "y", "z")
-_SHORT = frozenset({"buttons", "limiters", "scene", "status"})
+_SHORT = frozenset({"buttons", "delay_ticks", "limiters", "scene", "status"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +104,7 @@ class SamplesFile:
         """Add a group of samples (array of ``SAMPLE``): ``group_rows`` of them, except the last time."""
         if self.rows == 0:
             self._facts["first_device_force_n"] = plain(samples["device_force_n"][:1].ravel())
+            self._facts["first_command_n"] = plain(samples["command_n"][:1].ravel())
         self._device += crcs(samples["device_force_n"], self.check_rows)
         self._effect += crcs(samples["force_n"], self.check_rows)
         self._half.write(sample_columns(samples))
@@ -131,7 +142,8 @@ def write_frames(path: Path, frames: NDArray[np.int64], facts: Mapping[str, Any]
 def read_samples(path: Path) -> Any:
     """Return the samples (n,) as a recarray of ``SAMPLE``; ``busy_ns``, which is not recorded, is 0.
 
-    The first sample's force on the hand, from which the next one moves, is exact.
+    The first sample's force on the hand, from which the next one moves, is exact. Recordings of format 1 were made
+    where every device was taken to send what it was asked for, one tick late.
 
     Raises
     ------
@@ -142,6 +154,7 @@ def read_samples(path: Path) -> Any:
     samples = records(SAMPLE, len(columns["tick"]))
     for name in ("tick", "time_ns", "fresh", "buttons", "limiters", "scene", "status"):
         samples[name] = columns[name]
+    samples["delay_ticks"] = columns.get("delay_ticks", BELIEVED_TICKS)
     samples["lateness_ns"] = columns["time_ns"] - columns["due_ns"]
     for i, axis in enumerate(_AXES):
         samples["position_m"][:, i] = columns[f"position_{axis}_m"]
@@ -149,9 +162,11 @@ def read_samples(path: Path) -> Any:
         samples["wake_mps"][:, i] = columns[f"wake_{axis}_mps"]
         device = columns[f"device_force_{axis}_n"].astype(np.float64)
         samples["device_force_n"][:, i] = device
+        samples["command_n"][:, i] = device + columns.get(f"undelivered_{axis}_n", 0.0)
         samples["force_n"][:, i] = device + columns[f"withheld_{axis}_n"]
     if len(samples) and None not in facts["first_device_force_n"]:
         samples["device_force_n"][0] = facts["first_device_force_n"]
+        samples["command_n"][0] = facts.get("first_command_n", facts["first_device_force_n"])
     return samples
 
 
@@ -214,16 +229,18 @@ def sample_columns(samples: Any) -> dict[str, NDArray[Any]]:
         "tick": samples["tick"],
         "time_ns": samples["time_ns"],
         "due_ns": samples["time_ns"] - samples["lateness_ns"],
-        **{name: samples[name] for name in ("fresh", "buttons", "limiters", "scene", "status")},
+        **{name: samples[name] for name in ("fresh", "buttons", "delay_ticks", "limiters", "scene", "status")},
     }
     with np.errstate(invalid="ignore", over="ignore"):  # a fault's numbers are kept as they are
         device = _rounded(samples["device_force_n"], FORCE_STEP_N)
+        undelivered = _rounded(samples["command_n"], FORCE_STEP_N) - device
         withheld = _rounded(samples["force_n"], FORCE_STEP_N) - device
         for i, axis in enumerate(_AXES):
             columns[f"position_{axis}_m"] = samples["position_m"][:, i]
             columns[f"velocity_{axis}_mps"] = _rounded(samples["velocity_mps"][:, i], SPEED_STEP_MPS)
             columns[f"wake_{axis}_mps"] = _rounded(samples["wake_mps"][:, i], SPEED_STEP_MPS)
             columns[f"device_force_{axis}_n"] = device[:, i]
+            columns[f"undelivered_{axis}_n"] = undelivered[:, i]
             columns[f"withheld_{axis}_n"] = withheld[:, i]
         return {name: np.ascontiguousarray(column, _NUMPY_TYPES[name]) for name, column in columns.items()}
 
@@ -333,9 +350,10 @@ def _numbers(column: pa.ChunkedArray, rows: int) -> NDArray[Any]:
 
 def _facts(path: Path, metadata: Any) -> dict[str, Any]:
     try:
-        facts = json.loads(metadata.metadata[_FACTS])
-        if facts["format"] != FORMAT:
-            raise StoreError(f"{path} has format {facts['format']!r}, this version reads {FORMAT}: use a newer version")
+        facts = parse_json(metadata.metadata[_FACTS])
+        if facts["format"] not in range(1, FORMAT + 1):
+            found, readable = facts["format"], f"1 to {FORMAT}"
+            raise StoreError(f"{path} has format {found!r}, this version reads {readable}: use a newer version")
         return {**facts, "kind": facts["kind"], "rows": metadata.num_rows}
     except (KeyError, TypeError, ValueError) as error:
         raise StoreError(f"{path} is no recording of ours: restore it from a copy") from error

@@ -24,5 +24,5 @@ def reproduced(session_folder: Path) -> tuple[str, ...]:
         recorded = recorded_trials(journal.read(folder.journal))
         complete = ran["status"] == "completed"
         return reproduce(ran["protocol"], ran["seed"], ran["participant"], recorded, complete=complete)
-    except KeyError as missing:
-        raise StoreError(f"{folder.path}: receipt or journal lack {missing}: verify the study's folder") from missing
+    except (KeyError, TypeError) as error:
+        raise StoreError(f"{folder.path}: receipt or journal lack {error}: verify the study's folder") from error

@@ -22,7 +22,6 @@ from study_app.store.atomic import is_there, sweep
 from study_app.store.blinding import Key, open_or_draw_key, same_conditions
 from study_app.store.checksums import sha256
 from study_app.store.description import write_description
-from study_app.store.events import check_fields
 from study_app.store.journal import Contents, Journal, Line, SessionClock
 from study_app.store.layout import SessionFolder, StudyFolder, locate, refuse_never_begun
 from study_app.store.open_session import Place, SessionStore
@@ -48,9 +47,9 @@ def reopen(
 ) -> SessionStore:
     """Open an unfinished session to go on with it; ``progress.progress_of(store.lines)`` says where.
 
-    A torn tail of the journal is cut off, half-written files are taken away, and ``session_resumed`` is journalled with
-    the gap since the last line (null where the wall clock was set back, so that nobody knows). The session's clock goes
-    on from there, so that its times never go back.
+    A torn tail of the journal is moved to a file of its own, half-written files are taken away, and
+    ``session_resumed`` is journalled with the gap since the last line (null where the wall clock was set back, so that
+    nobody knows). The session's clock goes on from there, so that its times never go back.
 
     Parameters
     ----------
@@ -81,11 +80,15 @@ def reopen(
         opening.release()
         raise
     store = SessionStore(left.place, opened, left.key, left.receipt, opening, lines=contents.lines, recorder=recorder)
-    told = {"gap_s": gap_s, "operator": operator}
+    told: dict[str, Any] = {"gap_s": gap_s, "operator": operator}
     with contextlib.ExitStack() as failing:
         failing.callback(store.close)
         at_s = round(clock.seconds(), 6)
-        facts = {"torn_bytes": contents.torn_bytes, "device": device.get("name"), "version": study_app.__version__}
+        facts: dict[str, Any] = {
+            "torn_bytes": contents.torn_bytes,
+            "device": device.get("name"),
+            "version": study_app.__version__,
+        }
         store.append("session_resumed", t_s=at_s, **told, **facts)
         _sweep(folder)
         for event, fields in _recordings_found(folder, contents.lines) if left.start.get("recordings") else ():
@@ -126,7 +129,6 @@ class _Left:
 def _left(study_folder: StudyFolder, folder: SessionFolder, protocol: Protocol, source: bytes) -> _Left:
     """Read what an interrupted session left; refuse what cannot go on with this protocol."""
     contents = journal.whole(folder.journal)
-    check_fields(folder.journal, contents.lines)
     start = _unfinished(folder, contents.lines)
     place = Place(study_folder, folder, start["study"])
     first = receipt.read(folder.receipt)

@@ -6,12 +6,14 @@ order, the same bytes for the same rows on every machine.
 
 from __future__ import annotations
 
+import csv
+import io
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, TypeAlias
 
 from study_app.errors import StoreError
-from study_app.store.columns import MISSING, RESPONSES, TRIALS, Column, header
+from study_app.store.columns import MISSING, RESPONSES, TRIALS, Column, columns_held, header
 from study_app.store.journal import Line
 
 Row: TypeAlias = dict[str, Any]
@@ -27,7 +29,9 @@ _JUDGED = (
     ("lateness_p99_ms", "lateness_ms"),
     ("worst_gap_ms", "worst_gap_ms"),
     ("delay_error_p95_ms", "delay_error_ms"),
+    ("first_frame_gap_ms", "frame_gap_ms"),
     ("worst_frame_gap_ms", "frame_gap_ms"),
+    ("withheld_share", "withheld_percent"),
 )
 
 
@@ -40,7 +44,8 @@ def responses(lines: Sequence[Line]) -> list[Row]:
         if line["event"] == "trial_started":
             started[line["trial"], line["attempt"]] = line
         elif line["event"] == "responses":
-            trial = started[line["trial"], line["attempt"]]
+            if (trial := started.get((line["trial"], line["attempt"]))) is None:
+                raise _never_started(line)
             rows += [_response(session, trial, answer, line["at"]) for answer in line["items"]]
     return rows
 
@@ -110,13 +115,16 @@ def within_limits(measured: Mapping[str, Any], limits: Mapping[str, float]) -> b
 
 
 def beyond_limits(measured: Mapping[str, Any], limits: Mapping[str, float]) -> tuple[tuple[str, float, float], ...]:
-    """Return which of a trial's measured columns break a limit: the column's name, its value and the limit."""
+    """Return which of a trial's measured columns break a limit: the column's name, its value and the limit.
+
+    Value and limit are in the limit's unit, ms or percent.
+    """
     return tuple(one for one in _judged(measured, limits) if not abs(one[1]) <= one[2])
 
 
 def _judged(measured: Mapping[str, Any], limits: Mapping[str, float]) -> list[tuple[str, float, float]]:
     return [
-        (measure, measured[measure], limits[limit])
+        (measure, measured[measure] * (100 if limit.endswith("_percent") else 1), limits[limit])
         for measure, limit in _JUDGED
         if measured.get(measure) is not None and limit in limits
     ]
@@ -140,6 +148,22 @@ def csv_bytes(columns: Sequence[Column], rows: Iterable[Mapping[str, Any]]) -> b
     names = header(tuple(columns))
     records = [",".join(names), *(",".join([cell_text(row[name]) for name in names]) for row in rows)]
     return "".join(f"{record}\n" for record in records).encode("utf-8", "replace")
+
+
+def only(table: bytes, columns: Sequence[Column]) -> bytes:
+    """Return a table that `csv_bytes` wrote with these of its columns alone."""
+    rows = csv.DictReader(io.StringIO(table.decode("utf-8"), newline=""))
+    return csv_bytes(columns, rows)
+
+
+def in_columns_of(held: bytes, table: bytes, columns: Sequence[Column]) -> tuple[bytes, tuple[Column, ...]]:
+    """Return ``table``, whose columns are ``columns``, with those that the table ``held`` must have; and these columns.
+
+    ``held`` may lack columns that its version did not write.
+    """
+    names = held.partition(b"\n")[0].decode("utf-8", "replace").split(",")
+    kept = columns_held(names, columns)
+    return (table if kept == tuple(columns) else only(table, kept)), kept
 
 
 def cell_text(value: Any) -> str:
@@ -192,7 +216,11 @@ def _row_of(rows: list[Row], line: Line) -> Row:
     for row in reversed(rows):
         if (row["trial"], row["attempt"]) == (line["trial"], line["attempt"]):
             return row
-    raise StoreError(f"the journal's line {line['n']} is about trial {line['trial']}, which never started")
+    raise _never_started(line)
+
+
+def _never_started(line: Line) -> StoreError:
+    return StoreError(f"the journal's line {line['n']} is about trial {line['trial']}, which never started")
 
 
 def _interrupt(rows: list[Row]) -> None:

@@ -11,15 +11,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from pydantic import ValidationError
-
 from study_app.errors import StoreError
 from study_app.protocol.model import StudyHead
 from study_app.store import blinding, cells, exclusions, psychds, receipt, tables
+from study_app.store.abandoned import never_begun
 from study_app.store.atomic import is_there, temporaries
 from study_app.store.blinding import Key
 from study_app.store.columns import EXCLUSIONS, PARTICIPANTS
-from study_app.store.description import described_study, description_bytes
+from study_app.store.description import described_study, describes_alike, description_bytes
 from study_app.store.findings import Finding, Gathered
 from study_app.store.journal import Line
 from study_app.store.layout import StudyFolder
@@ -86,7 +85,7 @@ def _key(study: StudyFolder, found: Gathered) -> Key | None:
 
 def _participants(study: StudyFolder, name: str, journals: Journals, found: Gathered) -> None:
     """Check the table of all sessions, where each session's journal could be read."""
-    if any(not lines and is_there(place.folder.journal) for place, lines in journals):
+    if any(not lines and not never_begun(place.folder.path) for place, lines in journals):
         return
     begun = [(place, lines) for place, lines in journals if lines]
     content = tables.csv_bytes(PARTICIPANTS, [row for place, _ in begun for row in row_of(place.folder)])
@@ -98,9 +97,13 @@ def _description(study: StudyFolder, found: Gathered) -> None:
     """Compare the description with what this version writes for the study as one of the receipts has it."""
     heads: set[bytes] = set()
     for protocol in _published(study):
-        with contextlib.suppress(KeyError, TypeError, ValidationError):  # said of the receipt already
+        with contextlib.suppress(KeyError, TypeError, ValueError):  # said of the receipt already
             heads.add(description_bytes(StudyHead.model_validate(protocol["study"])))
-    if heads and study.description.read_bytes() not in heads:
+    if not heads or study.description.read_bytes() in heads:
+        return
+    if any(describes_alike(study.description.read_bytes(), head) for head in heads):
+        found.warning(study.description, "describes the columns as an earlier version of the program did")
+    else:
         found.error(study.description, "is not what this version writes for the study in the receipts")
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from itertools import zip_longest
@@ -9,18 +11,22 @@ from pathlib import Path
 from typing import Any
 
 from study_app.errors import StoreError
-from study_app.store import cells, journal, receipt
+from study_app.store import cells, journal, receipt, tables
+from study_app.store.abandoned import never_begun
 from study_app.store.atomic import is_there, temporaries
 from study_app.store.checksums import files, read_checksums, sha256
-from study_app.store.columns import TABLES
-from study_app.store.events import lacking_fields, unknown_events
+from study_app.store.columns import MISSING, TABLES
+from study_app.store.events import unknown_events
 from study_app.store.findings import Gathered
 from study_app.store.journal import Line
 from study_app.store.layout import SessionFolder
 from study_app.store.open_session import Place, table_files
 from study_app.store.opening import is_open
 from study_app.store.progress import attempts, progress_of
+from study_app.store.recorder import recording_files
 
+_BEGUN = "though receipt, tables, recordings or checksums show that the session was begun: restore it from a copy"
+_NOT_YET = frozenset({MISSING, "false"})  # cells of a trial that later events fill
 READERS = 4  # files whose checksums are computed at the same time
 
 
@@ -44,10 +50,13 @@ def check_session(place: Place, key_hash: str | None, found: Gathered) -> list[L
 
 def _journal(folder: SessionFolder, found: Gathered) -> list[Line]:
     if not is_there(folder.journal):
-        found.warning(
-            folder.path,
-            "was claimed, and its program was ended before it wrote a journal: begin it again, or delete it",
-        )
+        if never_begun(folder.path):
+            found.warning(
+                folder.path,
+                "was claimed, and its program was ended before it wrote a journal: begin it again, or delete it",
+            )
+        else:
+            found.error(folder.journal, f"is missing, {_BEGUN}")
         return []
     try:
         contents = journal.scan(folder.journal)
@@ -59,11 +68,10 @@ def _journal(folder: SessionFolder, found: Gathered) -> list[Line]:
     if contents.torn_bytes:
         found.warning(folder.journal, f"its last {contents.torn_bytes} bytes are a line that was never finished")
     if not contents.lines:
-        found.warning(folder.journal, "holds no whole line: nothing was recorded")
-        return []
-    if lacking := list(lacking_fields(contents.lines)):
-        more = f"; and {len(lacking) - 1} more lines" if len(lacking) > 1 else ""
-        found.error(folder.journal, f"{lacking[0]}{more}")
+        if never_begun(folder.path):
+            found.warning(folder.journal, "holds no whole line: nothing was recorded")
+        elif contents.damage is None:
+            found.error(folder.journal, f"holds no whole line, {_BEGUN}")
         return []
     for name in unknown_events(contents.lines):
         found.warning(folder.journal, f"has events {name!r}, which this version does not know")
@@ -99,6 +107,9 @@ def _receipt(folder: SessionFolder, lines: list[Line], key_hash: str | None, fou
         found.error(path, f"{', '.join(differing)}: not as in the journal")
     last = lines[-1]
     status = last["status"] if last["event"] == "session_ended" else receipt.UNFINISHED
+    resumed = held.get("resumed")
+    if isinstance(resumed, list) and len(resumed) > sum(line["event"] == "session_resumed" for line in lines):
+        found.error(path, "tells that the session was resumed more often than the journal does")
     if held.get("status") != status:
         found.error(path, f"its status is {held.get('status')!r}, the journal's {status!r}; rebuild renews it")
 
@@ -134,11 +145,25 @@ def check_table(
     except OSError:
         found.error(path, "is missing or cannot be read; rebuild makes it again")
         return
+    expected, columns = tables.in_columns_of(content, expected, TABLES[name])
     if differing := _differing_lines(content, expected):
-        tell = found.warning if all(map(may_be_behind, differing)) else found.error
+        behind = all(map(may_be_behind, differing)) and (name == "participants" or _is_behind(content, expected))
+        tell = found.warning if behind else found.error
         tell(path, f"is not what the journal gives, from line {differing[0]} on; rebuild renews it")
-    for problem in cells.problems(content, TABLES[name]):
+    for problem in cells.problems(content, columns):
         found.error(path, problem)
+
+
+def _is_behind(held: bytes, expected: bytes) -> bool:
+    """Return whether a table ``held`` may be an earlier state of ``expected``: it tells nothing that this does not."""
+    theirs, ours = (list(csv.reader(io.StringIO(table.decode("utf-8", "replace")))) for table in (held, expected))
+    if len(theirs) > len(ours) or theirs[:1] != ours[:1]:
+        return False
+    return all(
+        here == there or here in _NOT_YET or (name == "notes" and there.startswith(here))
+        for early, late in zip(theirs, ours, strict=False)
+        for name, here, there in zip_longest(ours[0], early, late, fillvalue="")
+    )
 
 
 def _differing_lines(content: bytes, expected: bytes) -> list[int]:
@@ -162,6 +187,11 @@ def _hashes(folder: SessionFolder) -> dict[str, str]:
 
 def _checksums(folder: SessionFolder, lines: list[Line], hashes: Mapping[str, str], found: Gathered) -> None:
     if lines[-1]["event"] != "session_ended":
+        if is_there(folder.checksums):
+            found.error(folder.checksums, "was made when the session had ended, though the journal has no end")
+        return
+    if not is_there(folder.checksums):
+        found.error(folder.checksums, "is missing: was the program killed at the session's end? rebuild makes it")
         return
     with found.reading(folder.checksums):
         listed = read_checksums(folder)
@@ -209,8 +239,15 @@ def _recordings(folder: SessionFolder, lines: list[Line], hashes: Mapping[str, s
         for trial, attempt in attempts(lines)[: None if ends else -1]:
             if (trial, attempt) not in known:
                 found.warning(folder.recordings, f"trial {trial}, attempt {attempt} has none, and no line says why")
+    of_trials = {
+        path.relative_to(folder.path).as_posix()
+        for which in attempts(lines)
+        for path in recording_files(folder.recordings, *which)
+    }
     for name in sorted(hashes.keys() - told):
-        if name.endswith(".parquet"):
+        if name.endswith(".parquet") and name not in of_trials:
+            found.error(folder.path / name, "is of a trial that the journal never started")
+        elif name.endswith(".parquet"):
             then = "" if ends else "; resuming the session takes it up"
             found.warning(folder.path / name, f"is in no line of the journal{then}")
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from study_app.analysis.answered import MANY, Asked, asked_again, compared, over_all
+from study_app.analysis.answered import MANY, Asked, asked_again, compared, of_tables, over_all
 from study_app.analysis.decided import NOTHING
 from study_app.analysis.questions import Block, Item, Setting
 from study_app.analysis.statistics.outcome import DRAWS
@@ -30,7 +30,8 @@ def answers(of: Block, people: int, alpha: float = 0.05, *, gaps: bool = False) 
         for rows in values.values():
             rows[rng.random(rows.shape) < 0.05] = np.nan
     names = tuple(f"P{number:04d}" for number in range(people))
-    return Asked(of, replace(DECIDED, alpha=alpha), names, values, 1, lambda _what: None)
+    single = {item: rows[:, :, None] for item, rows in values.items()}
+    return of_tables(of, replace(DECIDED, alpha=alpha), names, single)
 
 
 def test_in_a_large_family_of_many_people_nothing_is_out_of_reach() -> None:

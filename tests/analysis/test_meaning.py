@@ -9,8 +9,8 @@ import pytest
 from study_app.analysis.decided import NOTHING, Direction
 from study_app.analysis.questions import Item, Setting
 from study_app.analysis.report.meaning import by_delay, meaning, tempting_ms
-from study_app.analysis.report.short import limits
-from study_app.analysis.results import Against, BlockFound, Lowest, p_of_difference
+from study_app.analysis.report.short import findings, limits
+from study_app.analysis.results import Against, BlockFound, Lowest
 from study_app.analysis.results import Results as Found
 from study_app.analysis.statistics.equivalence import tost
 from study_app.analysis.statistics.families import holm
@@ -27,9 +27,9 @@ DOUBTED = [-1, 0, 0, 0, 0]
 
 def against(differences: Mapping[float, list[int]], expected: Direction | None) -> tuple[Against, ...]:
     each = [tost(values, 1.0) for values in differences.values()]
-    adjusted = holm([p_of_difference(one) for one in each])
+    adjusted = holm([one.p_difference for one in each])
     return tuple(
-        Against("different", ms, 0.0, one, p, len(each), expected)
+        Against("different", ms, 0.0, one.judged(p, len(each)), p, len(each), expected)
         for ms, one, p in zip(differences, each, adjusted, strict=True)
     )
 
@@ -70,7 +70,7 @@ def test_a_difference_at_a_shorter_delay_speaks_against_the_longer_one() -> None
     block = delays({50: AWAY, 100: SCATTERED})
     assert tempting_ms(block) == 50
     (*verdicts, told) = by_delay(block)[1]
-    assert verdicts == ["100 ms", "–", "–", "Different"]
+    assert verdicts == ["100 ms", "–", "–", "Different", "–"]
     assert "speak against the sentence “delays up to 100 ms do not matter”: “Different” differs at 50 ms (+3.40" in told
 
 
@@ -89,6 +89,11 @@ def test_a_trend_that_shows_only_within_its_statement_speaks_against_nothing() -
     assert of_five.over_all_ms == 100  # the second step has p = .19, the first .0003
     assert "speak against" in claim(delays({50: SCATTERED}, (alone,)))
     assert "speak against" not in claim(delays({50: SCATTERED}, (of_five,)))
+    block = delays({50: SCATTERED, 100: SCATTERED}, (of_five,))
+    assert "“Different” 100 ms. Each is an upper bound" in " ".join(findings(found(block)))
+    assert "“Different” 50 ms. Each is an upper bound" in " ".join(findings(found(delays({50: CALM}, (alone,)))))
+    limit = meaning(block, found(block))[1]
+    assert "already below" not in limit
 
 
 def test_a_difference_against_the_stated_direction_is_told_and_speaks_against_nothing() -> None:
@@ -105,8 +110,10 @@ def test_one_of_many_comparisons_that_differs_by_chance_speaks_against_nothing()
     alone = delays({50: chance})
     assert alone.against[0].verdict == "different"
     many = delays({50: chance, **{float(ms): SCATTERED * 2 for ms in range(75, 201, 25)}})
-    assert many.against[0].found.verdict == "different"
     assert many.against[0].verdict == "inconclusive"
+    last = delays({**{float(ms): SCATTERED * 2 for ms in range(75, 201, 25)}, 225: chance})
+    assert "different only before Holm's correction for 7 comparisons" in claim(last)
+    assert "normality" not in claim(last)
     assert "speak against" not in claim(many)
 
 
@@ -120,15 +127,20 @@ def test_five_people_cannot_make_a_single_comparison_different_by_taking_them_as
 
 def test_what_only_t_calls_equivalent_is_told_as_inconclusive(rek: Results) -> None:
     block = delays({50: DOUBTED})
-    assert block.against[0].found.verdict == "equivalent"
+    assert block.against[0].found.p is not None
+    assert block.against[0].found.p < 0.05
     assert block.against[0].found.checks_agree is False
+    assert "within the bound by t alone" in claim(block)
     ((*told, said),) = by_delay(block)
-    assert told == ["50 ms", "–", "–", "Different"]
+    assert told == ["50 ms", "–", "–", "Different", "–"]
     assert said.startswith("So these data do not support the sentence “delays up to 50 ms do not matter”")
     assert "inconclusive for “Different”" in claim(block)
     assert "stay within the bound" not in claim(block)
     rek.add("P001", lambda *_: 4)
-    assert any("inconclusive: 1 of 1 comparisons" in line for line in limits(load_study(rek.folder), found(block)))
+    assert any(
+        "inconclusive or out of reach: 1 of 1 comparisons" in line
+        for line in limits(load_study(rek.folder), found(block))
+    )
 
 
 def test_what_every_check_calls_equivalent_is_told_as_such() -> None:

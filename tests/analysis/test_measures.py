@@ -87,5 +87,5 @@ def test_by_participant_takes_the_median_of_repeats_and_leaves_gaps() -> None:
         ("P2", "D1", "a", None),
         ("P1", "D2", "b", 1),
     ]
-    found = measures.by_participant(table(rows), ["P1", "P2"], ["D1", "D2"], "a")
+    found = measures.by_participant(table(rows), ["P1", "P2"], {"D1": 0, "D2": 1}, "a")
     np.testing.assert_array_equal(found, [[3.5, np.nan], [np.nan, 7.0]])

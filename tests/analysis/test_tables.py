@@ -1,3 +1,4 @@
+import json
 from pathlib import Path
 
 import pytest
@@ -5,8 +6,11 @@ import pytest
 from study_app.analysis import reading
 from study_app.analysis.tables import Study, load_study
 from study_app.errors import AnalysisError, StoreError
-from study_app.store.columns import RESPONSES, header
+from study_app.protocol.load import parse, source_bytes
+from study_app.store.columns import RESPONSES, TRIALS, header
+from study_app.store.tables import only
 from tests.analysis.conftest import CANNOT_JUDGE, Answer, Results, make_results
+from tests.store.earlier import TRIALS_HEADER
 
 
 def by_condition(condition: str, item: str) -> Answer:
@@ -56,6 +60,34 @@ def test_opened_settings_have_names_delays_ascending_and_liquids_as_in_the_proto
     assert [setting.code for setting in liquids.settings] == [
         rek.code(condition, "liquids") for condition in ("water", "honey", "light_oil")
     ]
+
+
+SWAPPED = {'"L"': '"X"', '"D"': '"L"', '"X"': '"D"'}
+
+
+def test_what_a_block_compares_is_told_by_its_receipt_and_not_by_the_letter_of_its_codes(tmp_path: Path) -> None:
+    text = source_bytes("rek2024").decode()
+    for old, new in SWAPPED.items():
+        text = text.replace(f"code_prefix = {old}", f"code_prefix = {new}")
+    results = make_results(tmp_path / "swapped", parse(text.encode(), "swapped.toml"))
+    results.add("P001", by_condition)
+    assert [(block.codes[0], block.kind) for block in load_study(results.folder).blocks] == [
+        ("D1", "liquids"),
+        ("L1", "delays"),
+    ]
+    results.open()
+    assert [block.kind for block in load_study(results.folder).blocks] == ["liquids", "delays"]
+
+
+def test_receipts_of_earlier_versions_do_not_say_what_a_block_compares(rek: Results) -> None:
+    path = rek.add("P001", by_condition).receipt
+    told = json.loads(path.read_bytes())
+    for block in told["protocol"]["blocks"].values():
+        del block["compares"]
+    path.write_text(json.dumps(told))
+    assert [block.kind for block in load_study(rek.folder).blocks] == ["liquids", "delays"]
+    rek.open()
+    assert [block.kind for block in load_study(rek.folder).blocks] == ["liquids", "delays"]
 
 
 def test_of_a_repeated_trial_the_last_attempt_counts_and_the_first_is_kept(rek: Results) -> None:
@@ -276,6 +308,20 @@ def test_a_changed_table_is_refused_with_file_row_and_value(real: Results, old: 
     message = refusal(real.folder)
     assert says in message
     assert str(path) in message
+
+
+def test_a_table_of_an_earlier_version_is_read_as_if_its_later_columns_held_nothing(rek: Results) -> None:
+    rek.add("P001", by_condition)
+    before = load_study(rek.folder).trials
+    path = rek.trials("P001")
+    earlier = tuple(column for column in TRIALS if column.name in TRIALS_HEADER.split(","))
+    path.write_bytes(only(path.read_bytes(), earlier))
+    assert path.read_text(encoding="utf-8").startswith(TRIALS_HEADER + "\n")
+    trials = load_study(rek.folder).trials
+    assert trials[["withheld_share", "limiter_estimator"]].isna().all(axis=None)
+    assert trials["force_mean_n"].equals(before["force_mean_n"])
+    path.write_bytes(only(path.read_bytes(), [column for column in earlier if column.name != "valid"]))
+    assert "does not begin with the columns" in refusal(rek.folder)
 
 
 def test_a_torn_table_is_refused(rek: Results) -> None:

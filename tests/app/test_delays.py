@@ -23,7 +23,7 @@ from study_app.haptics.servo import Servo
 from study_app.protocol.load import parse
 from study_app.protocol.schedule import Trial, build_schedule, draw_key, stream
 from study_app.protocol.words import words
-from study_app.session.runner import SETTLED_S
+from study_app.session.trial import SETTLED_S
 from tests.compiled import needs_servo
 from tests.session.fakes import FakeJournal
 
@@ -127,7 +127,7 @@ def test_what_is_drawn_is_of_the_moment_that_was_asked_for_at_every_delay(room):
         room.servo.advance(ticks[seen % len(ticks)])
         seen += 1
         samples.append(reader.read())
-        count = len(room.frames[-1][1])
+        count = len(room.frames[-1][1]) if room.frames else 0
         room.bridge._frame()
         trial, frames = room.frames[-1]
         if len(frames) != count + 1:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +16,11 @@ from study_app.app import preflight
 from study_app.app.preflight import Appraisal, Preflight
 from study_app.errors import DeviceLost
 from study_app.evaluation.appraised import Costs, Errors
+from study_app.evaluation.fastest import Stroke
 from study_app.gui.beginning import Ready
 from study_app.gui.choices import NewSession
 from study_app.gui.theme import LIGHT
+from study_app.haptics.dynamics import UNKNOWN, Dynamics
 from study_app.haptics.telemetry import Timing
 from study_app.protocol.load import load
 from study_app.session.preflight import Facts, Screen
@@ -46,8 +49,11 @@ class Answering:
     def __init__(self) -> None:
         self.asked = 0
         self.works = True
+        self.devices: list[Dynamics] = []
 
-    def ask(self, _scene: Any) -> int:
+    def ask(self, _scene: Any, stroke: Any, dynamics: Dynamics) -> int:
+        assert stroke.speed_mps > 0
+        self.devices.append(dynamics)
         self.asked += 1
         return self.asked
 
@@ -119,6 +125,25 @@ def test_going_back_does_not_wait_for_what_is_being_measured(asked: Preflight, m
     assert waited == [True]
 
 
+def test_strokes_are_asked_of_the_measured_device_and_again_when_its_delay_has_changed(
+    qapp: Any, machine: Any, monkeypatch: Any, qtbot: Any
+) -> None:
+    found = replace(FACTS, dynamics=Dynamics(0.0004, 20e-6, 0.3), delay_ticks=1)
+    screen = QGuiApplication.primaryScreen()
+    made = Preflight(CHOSEN, load("demo"), Ready(machine, found), screen, "Participant P001", LIGHT)
+    first: Any = made._appraisal._appraiser
+    assert first.devices == [Dynamics(0.001, 20e-6, 0.3)]
+    slower = replace(found, delay_ticks=3)
+    monkeypatch.setattr(preflight, "measured", lambda *_words, **_named: slower)
+    with qtbot.waitSignal(made._measured):
+        made._again()
+    again: Any = made._appraisal._appraiser
+    assert again.devices == [Dynamics(0.003, 20e-6, 0.3)]
+    assert not first.works
+    made.close()
+    QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+
+
 def test_a_mistake_in_measuring_does_not_leave_the_window_waiting(
     asked: Preflight, monkeypatch: Any, qtbot: Any
 ) -> None:
@@ -144,9 +169,26 @@ def test_an_error_that_is_not_known_is_not_called_none(monkeypatch: Any, told: A
     monkeypatch.setattr(preflight, "Appraiser", Answering)
     monkeypatch.setattr(Answering, "given", told)
     protocol = load("demo")
-    scene = protocol.scene_for(next(iter(protocol.conditions)))
-    appraisal = Appraisal([scene, scene])
+    asked = preflight._scenes(protocol)[0]
+    appraisal = Appraisal([asked, asked], UNKNOWN)
     while not appraisal.over:
         appraisal.look()
     assert appraisal.error_n == largest
     assert appraisal.tick_s == pytest.approx(146e-9)
+
+
+def test_the_share_withheld_is_asked_of_each_liquid_in_the_fastest_stroke_of_its_tasks(monkeypatch: Any) -> None:
+    monkeypatch.setattr(preflight, "Appraiser", Answering)
+    protocol = load("rek2024")
+    asked = preflight._scenes(protocol)
+    assert {one.liquid for one in asked} == set(protocol.liquids)
+    assert {one.stroke for one in asked if one.liquid == "honey"} == {Stroke(5.0, 0.03)}  # it is explored
+    monkeypatch.setattr(Answering, "given", tuple(Errors(0.0, 0.0, 0.0, (), 0.01 * (n + 1)) for n in range(len(asked))))
+    appraisal = Appraisal(asked, UNKNOWN)
+    assert appraisal.withheld is None
+    while not appraisal.over:
+        appraisal.look()
+    assert appraisal.withheld == {
+        name: pytest.approx(0.01 * (1 + max(n for n, one in enumerate(asked) if one.liquid == name)))
+        for name in protocol.liquids
+    }

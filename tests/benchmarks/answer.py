@@ -3,7 +3,8 @@
 Run it by itself: ``python tests/benchmarks/answer.py [PROTOCOL] [ANSWERS] [FOLDER]``. Each answer is a page of
 statements that is confirmed: from the key that confirms it to the end of the first painting of what follows, in a
 window of 1366 × 768 without a screen, with a journal whose lines are flushed to the disk of FOLDER (default: the
-system's temporary one). A plain write and flush on the same disk is timed beside it: most of the time waits for that.
+system's temporary one). A plain write and flush on the same disk is timed as well: an answer waits for that most of the
+time. A page of statements that are shown, and a look at the device with which a target is reached, wait for no flush.
 """
 
 from __future__ import annotations
@@ -25,8 +26,8 @@ from study_app.gui.participant import ParticipantWindow
 from study_app.protocol.load import load, parse, source_bytes
 from study_app.protocol.schedule import build_schedule
 from study_app.protocol.words import words
-from study_app.session.events import Begin, Chosen, Continue, Event, Submitted
-from study_app.session.pages import Page
+from study_app.session.events import Begin, Chosen, Continue, Event, ItemShown, Submitted
+from study_app.session.pages import Page, TaskPage
 from study_app.session.ports import Ports
 from study_app.session.runner import Runner
 from study_app.session.state import Phase
@@ -40,17 +41,22 @@ def main(name: str = "rek2024", answers: int = 100, folder: str = "") -> None:
     application = QApplication.instance() or QApplication([])
     pages_ms: list[float] = []
     choices_ms: list[float] = []
+    shown_ms: list[float] = []
+    reached_ms: list[float] = []
+    took_ms = pages_ms, choices_ms, shown_ms, reached_ms
     with tempfile.TemporaryDirectory(dir=folder or None) as scratch:
         number = 0
         while len(pages_ms) < answers:
             number += 1
-            session(application, name, Path(scratch) / "results", f"P{number:03d}", pages_ms, choices_ms)
+            session(application, name, Path(scratch) / "results", f"P{number:03d}", *took_ms)
         flush_ms = flushes(Path(scratch) / "probe")
     print(f"{load(name).study.name}: {len(pages_ms)} pages answered in {number} sessions, offscreen")
     print("                                   p50 ms    p99 ms    max ms")
     for what, took in (
         ("page confirmed → next page painted", pages_ms),
         ("choice → on the disk", choices_ms),
+        ("statements of a page shown", shown_ms),
+        ("look at the device, target reached", reached_ms),
         ("4 kB written and flushed, bare", flush_ms),
     ):
         p50, p99 = np.percentile(took, (50, 99))
@@ -58,7 +64,14 @@ def main(name: str = "rek2024", answers: int = 100, folder: str = "") -> None:
 
 
 def session(
-    application: object, name: str, results: Path, participant: str, pages_ms: list[float], choices_ms: list[float]
+    application: object,
+    name: str,
+    results: Path,
+    participant: str,
+    pages_ms: list[float],
+    choices_ms: list[float],
+    shown_ms: list[float],
+    reached_ms: list[float],
 ) -> None:
     """Go through a session with a servo that is all memory; time what follows each answer."""
     source = source_bytes(name)
@@ -83,6 +96,8 @@ def session(
 
     def present(page: Page) -> None:
         window.show_page(page)
+        if isinstance(page, TaskPage):
+            runner.frame_shown(servo.now_ns(), servo.now_ns())
 
     ports = Ports(servo, store, present, clock.seconds)
     runner = Runner(study, build_schedule(study, participant, 1), store.key.codes, ports, study.study.languages[0])
@@ -100,6 +115,10 @@ def session(
         if state.phase is Phase.READING:
             runner.post(Continue(clock.seconds()))
         elif state.phase is Phase.ANSWERING:
+            began = time.perf_counter()
+            for item in state.trial.items:
+                runner.post(ItemShown(clock.seconds(), item))
+            shown_ms.append((time.perf_counter() - began) * 1e3)
             for item in state.trial.items:
                 began = time.perf_counter()
                 runner.post(Chosen(clock.seconds(), item, 4))
@@ -111,7 +130,11 @@ def session(
         else:
             servo.run(1.0, places[turn % len(places)])
             runner.post(Continue(clock.seconds()))
+            lines = len(store.lines)
+            began = time.perf_counter()
             runner.poll()
+            if any(line["event"] == "target_reached" for line in store.lines[lines:]):
+                reached_ms.append((time.perf_counter() - began) * 1e3)
             turn += 1
         QApplication.processEvents()
     window.may_close = True

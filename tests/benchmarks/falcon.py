@@ -15,14 +15,15 @@ from typing import Any
 import numpy as np
 
 from study_app.devices.falcon.bulk import BULK, BulkCalls
-from study_app.devices.falcon.exchange import exchange_functions, new_exchange, push
+from study_app.devices.falcon.exchange import exchange_functions, new_exchange
 from study_app.devices.falcon.geometry import GEOMETRIES, SAFE_BOX_M, WORKSPACE_M
 from study_app.devices.falcon.kinematics import angles, forward, inverse, new_mechanism
 from study_app.devices.falcon.packets import FLAGS_AT, PARSER, STATUS, feed, pack, strip
+from study_app.devices.falcon.sending import push
 from study_app.devices.falcon.wire import ENDPOINT_IN, PACKET, ZERO
 from study_app.haptics.cfunctions import READ, WRITE, c_function, call_at, record_at
 from study_app.haptics.compiled import kernel
-from study_app.haptics.layout import READING, records
+from study_app.haptics.layout import new_command, new_reading, records
 
 BATCH = 1_000
 BATCHES = 400
@@ -120,12 +121,14 @@ def turn_all(falcon: Any, replies: Any, forces: Any, scratch: Any, parser: Any, 
 
 
 @kernel
-def exchange_all(context: int, reading: int, forces: Any, since_ns: int, read: int, write: int) -> int:
+def exchange_all(context: int, reading: int, command: Any, forces: Any, since_ns: int, read: int, write: int) -> int:
     """Take turns as the servo does; return how many gave no position."""
     failed = 0
     for turn in range(BATCH):
         failed += _read(read, context, since_ns + turn * 1_000_000, reading)
-        _write(write, context, forces[turn, 0], forces[turn, 1], forces[turn, 2])
+        for axis in range(3):
+            command[0].force_n[axis] = command[0].sent_n[axis] = forces[turn, axis]
+        _write(write, context, np.intp(command.ctypes.data))
     return failed
 
 
@@ -145,7 +148,7 @@ def main() -> None:
         feed(parser, replies[0].bytes[turn, 2:], PACKET, status)
         counts[turn] = status.encoders
     read, write = (function.address for function in exchange_functions())
-    reading = records(READING, 1)
+    reading, command = new_reading(), new_command()
     parts = {
         "unpack (status bytes, parser)": lambda _: unpack_all(replies[0], scratch, parser, status),
         "position (forward kinematics, warm)": lambda _: place_all(falcon, counts),
@@ -153,7 +156,7 @@ def main() -> None:
         "pack": lambda _: pack_all(falcon),
         "unpack + position + torques + pack": lambda _: turn_all(falcon, replies[0], forces, scratch, parser, status),
         "the servo's read and write, no USB": lambda batch: exchange_all(
-            memory.ctypes.data, reading.ctypes.data, forces, (1 + batch) * BATCH * 1_000_000, read, write
+            memory.ctypes.data, reading.ctypes.data, command, forces, (1 + batch) * BATCH * 1_000_000, read, write
         ),
     }
     taken: dict[str, list[float]] = {name: [] for name in parts}

@@ -24,8 +24,8 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.tasks import Reach
 from study_app.protocol.words import words
 from study_app.session.pages import ItemView, Page, PausePage, Progress, QuestionnairePage, TaskPage, TextPage
-from study_app.session.runner import TankView
 from study_app.session.tasks import TaskView
+from study_app.session.trial import TankView
 
 SIZE = (1920, 1080)
 FRAMES = 400

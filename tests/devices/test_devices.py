@@ -11,7 +11,8 @@ if numba.config.DISABLE_JIT:
 from study_app.devices import is_falcon, is_simulated, kind_of, list_devices, moves_by_itself, open_device
 from study_app.errors import DeviceNotFound
 from study_app.haptics.cfunctions import READ_LOST, READ_NEW, READ_NOTHING_NEW
-from study_app.haptics.layout import READING, records
+from study_app.haptics.layout import new_reading
+from tests.devices.contract import write
 
 MS = 1_000_000
 
@@ -21,7 +22,7 @@ class Readings:
 
     def __init__(self, device, start_ns=10 * MS):
         self.device, self.now_ns = device, start_ns
-        self.reading = records(READING, 1)
+        self.reading = new_reading()
 
     def at(self, now_ns):
         self.now_ns = now_ns
@@ -70,7 +71,7 @@ class TestEverySimulatedDevice:
         device = open_device(name)
         readings = Readings(device)
         readings.after(1)
-        assert device.write.ctypes(device.context, 4.0, 0.0, -4.0) == 0
+        assert write(device, (4.0, 0.0, -4.0))[0] == 0
         readings.after(300)
         assert readings.position_m[0] > 0.005
         assert readings.position_m[2] < -0.005
@@ -80,7 +81,7 @@ class TestEverySimulatedDevice:
         device = open_device(name)
         readings = Readings(device)
         readings.after(1)
-        device.write.ctypes(device.context, 4.0, 0.0, 0.0)
+        write(device, (4.0, 0.0, 0.0))
         device.close()
         readings.after(300)
         assert abs(readings.position_m[0]) < 0.001
@@ -90,7 +91,7 @@ class TestEverySimulatedDevice:
         readings = Readings(device)
         device.unplug()
         assert readings.after(1) == READ_LOST
-        assert device.write.ctypes(device.context, 0.0, 0.0, 0.0) == READ_LOST
+        assert write(device)[0] == READ_LOST
         device.open()
         assert readings.after(1) == READ_NEW
 

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import io
 import json
+import math
 import os
 import signal
+from dataclasses import replace
 
 import numba
+import numpy as np
 import pytest
 
 if numba.config.DISABLE_JIT:
@@ -16,10 +19,18 @@ if numba.config.DISABLE_JIT:
 from study_app.evaluation import appraise
 from study_app.evaluation.appraised import Costs
 from study_app.evaluation.appraiser import Appraiser, serve
+from study_app.evaluation.fastest import Stroke, fastest_stroke, withheld_share
+from study_app.haptics.dynamics import UNKNOWN, Dynamics
+from study_app.haptics.liquid import Box
+from study_app.haptics.motion import Motion
+from study_app.haptics.offline import samples_along
 from study_app.haptics.scene import Ewma, Line, Raw
-from study_app.protocol.load import load_scenes
+from study_app.protocol.load import load, load_scenes
+from study_app.protocol.tasks import Explore, Reach
 
 THESIS, PHYSICAL = load_scenes("rek2024"), load_scenes("physical_liquids")
+SHAKE = Stroke(5.0, 0.03)
+QUICK = Stroke(8.0, 0.03)
 
 
 def test_costs_name_every_effect_and_why_it_is_not_there() -> None:
@@ -77,11 +88,61 @@ def test_the_lag_of_a_filter_is_that_of_its_closed_form(velocity: Ewma, lag_ms: 
     assert 1e3 * appraise.lag_s(scene) == pytest.approx(lag_ms, rel=1e-6)
 
 
+def test_an_exploration_may_be_shaken_and_a_reach_goes_as_far_as_its_targets() -> None:
+    tank_m = (0.1, 0.06, 0.06)
+    assert fastest_stroke(Explore(kind="explore", min_s=1, max_s=3, instruction="Explore."), tank_m) == SHAKE
+    assert fastest_stroke(Explore(kind="explore", min_s=1, max_s=3, instruction="Explore."), (0.04, 0.06, 0.06)) == (
+        5.0,
+        0.02,
+    )
+    reach = load("rek2024").tasks["reach"]
+    assert isinstance(reach, Reach)
+    stroke = fastest_stroke(reach, tank_m)
+    following = zip(reach.targets_m, (*reach.targets_m[1:], reach.targets_m[0]), strict=True)
+    assert 2 * stroke.amplitude_m == pytest.approx(max(math.dist(*pair) for pair in following))
+    assert stroke.frequency_hz == pytest.approx(1 / 0.6)
+
+
+def test_slow_strokes_lack_nothing_and_the_share_withheld_is_that_of_the_samples() -> None:
+    assert withheld_share(THESIS["water"], Stroke(0.5, 0.03), UNKNOWN) < 1e-6
+    assert withheld_share(THESIS["water"].model_copy(update={"liquids": ()}), SHAKE, UNKNOWN) == 0.0
+    assert 0.0 < withheld_share(THESIS["light_oil"], QUICK, UNKNOWN) <= 1.0
+
+
+def test_a_stroke_is_made_where_the_device_is_in_the_scene() -> None:
+    here = THESIS["light_oil"]
+    origin_m = (2.0, -1.0, 0.5)
+    there = here.model_copy(
+        update={
+            "origin_m": origin_m,
+            "liquids": tuple(
+                liquid.model_copy(update={"region": Box(centre_m=origin_m, size_m=(1.0, 1.0, 1.0))})
+                for liquid in here.liquids
+            ),
+        }
+    )
+    assert withheld_share(there, QUICK, UNKNOWN) == pytest.approx(withheld_share(here, QUICK, UNKNOWN), rel=1e-3)
+
+
+def test_what_is_withheld_depends_on_the_device_and_the_rate() -> None:
+    scene = THESIS["light_oil"]
+    usual = withheld_share(scene, QUICK, Dynamics(1e-3))
+    light = withheld_share(scene, QUICK, Dynamics(1e-3, mass_kg=0.02))
+    late = withheld_share(scene, QUICK, Dynamics(3e-3))
+    slow = withheld_share(scene.model_copy(update={"rate_hz": 500.0}), QUICK, Dynamics(1e-3))
+    assert len({usual, light, late, slow}) == 4
+    assert light > usual
+    t_s = np.arange(10) / 1000
+    delays = samples_along(scene, Motion(t_s, np.zeros((10, 3))), Dynamics(2.5e-3)).delay_ticks
+    assert set(delays) == {3}
+
+
 def test_the_process_answers_the_newest_question_and_ends_when_told() -> None:
     appraiser = Appraiser()
     try:
         appraiser.ask(THESIS["honey"])
-        newest = appraiser.ask(THESIS["water"])
+        device = Dynamics(2e-3, mass_kg=0.05)
+        newest = appraiser.ask(THESIS["light_oil"], QUICK, device)
         answered: dict[int, list[object]] = {}
         while len(answered.get(newest, [])) < 2:
             told = appraiser.answers(wait_s=120.0)  # the first time it compiles
@@ -91,7 +152,9 @@ def test_the_process_answers_the_newest_question_and_ends_when_told() -> None:
         first, second = answered[newest]
         assert isinstance(first, Costs)
         assert [it.effect for it in first.effects if it.ns is not None] == ["drag", "wake"]
-        assert second == appraise.errors(THESIS["water"])
+        share = withheld_share(THESIS["light_oil"], QUICK, device)
+        assert share != withheld_share(THESIS["light_oil"], QUICK, UNKNOWN)
+        assert second == replace(appraise.errors(THESIS["light_oil"]), withheld=share)
         assert appraiser.works
     finally:
         appraiser.close()

@@ -27,7 +27,7 @@ def samples(count=10):
 
 
 def audited(made):
-    audit = Audit(8.0, PERIOD_NS, 0.05)
+    audit = Audit(8.0, 1.5, PERIOD_NS, 0.05)
     audit.take(made[: len(made) // 2])
     audit.take(made[len(made) // 2 :])
     return audit.counts
@@ -49,8 +49,8 @@ def test_good_samples_break_no_promise():
 @pytest.mark.parametrize(
     ("field", "value", "promise"),
     [
-        ("device_force_n", (3.0, 0.51, 4.0), {"steps": 2}),
-        ("device_force_n", (3.0, 0.5, 4.0), {}),
+        ("device_force_n", (3.0, 1.51, 4.0), {"steps": 2}),
+        ("device_force_n", (3.0, 1.5, 4.0), {}),
         ("device_force_n", (8.01, 0.0, 4.0), {"excess": 1, "steps": 2}),
         ("device_force_n", (3.0, math.nan, 4.0), {"no_number": 1}),
         ("device_force_n", (math.inf, 0.0, 0.0), {"no_number": 1, "steps": 1}),

@@ -16,15 +16,20 @@ from study_app.devices.scripted import ScriptedDevice
 from study_app.errors import StoreError
 from study_app.evaluation.replay import replay
 from study_app.haptics.clock import VirtualClock
+from study_app.haptics.dynamics import Dynamics
 from study_app.haptics.servo import Servo
 from study_app.protocol.schedule import build_schedule
 from study_app.session.events import Begin, Continue, EndAsked, ForceStopped, PauseAsked, RepeatAsked, ResumeAsked
+from study_app.session.pages import Page, TaskPage
 from study_app.session.ports import Ports
 from study_app.session.rehearsal import rehearse
+from study_app.session.resume import resume_at
 from study_app.session.runner import Runner
 from study_app.store import recording
 from study_app.store.journal import SessionClock
 from study_app.store.layout import StudyFolder
+from study_app.store.open_session import SessionStore
+from study_app.store.resume import reopen
 from study_app.store.session import begin
 from tests.compiled import needs_servo
 from tests.faults import short
@@ -35,37 +40,86 @@ pytestmark = needs_servo
 SECONDS = 1000  # ticks
 
 
+class LightDevice(ScriptedDevice):
+    """A device whose light handle and force limit permit less force than those of `ScriptedDevice`."""
+
+    def __init__(self) -> None:
+        super().__init__(force_limit_n=1.0)
+
+    @property
+    def dynamics(self) -> Dynamics:
+        return Dynamics(0.0, 10e-6, 0.005)
+
+
+def begun(folder: Path, device: ScriptedDevice, servo: Servo) -> SessionStore:
+    return begin(
+        folder,
+        small.protocol(),
+        b"small",
+        "P001",
+        seed=1,
+        operator="",
+        language="en",
+        device=device.describe(),
+        screens={},
+        simulated=True,
+        recordings=True,
+        clock=SessionClock(servo.now_ns),
+    )
+
+
+def held(store: SessionStore, device: ScriptedDevice, servo: Servo) -> tuple[Runner, Callable[[int], None]]:
+    """Return the runner of a session in which a hand moves, and what lets ticks pass."""
+    study, t_s = small.protocol(), np.arange(0, 60, 0.005)
+    schedule = build_schedule(study, "P001", 1)
+
+    def present(page: Page) -> None:
+        if isinstance(page, TaskPage):
+            runner.frame_shown(servo.now_ns(), servo.now_ns())
+
+    def wait(ticks: int) -> None:
+        for _ in range(ticks // 50):
+            servo.advance(50)
+            runner.poll()
+
+    ports = Ports(servo, store, present, store.clock.seconds, store.recorder)
+    runner = Runner(study, schedule, store.key.codes, ports, "en", resume_at(study, schedule, store.lines))
+    device.follow(t_s, np.column_stack((0.03 * np.sin(6 * t_s), 0.01 * np.cos(9 * t_s), 0 * t_s)))
+    return runner, wait
+
+
+def resumed_on_another_device(folder: Path) -> Path:
+    """Hold a session that goes on with another device after its first trial; return its folder."""
+    with ScriptedDevice() as device, Servo(device, clock=VirtualClock(), elements=100) as servo:
+        with begun(folder, device, servo) as store:
+            runner, wait = held(store, device, servo)
+            runner.post(Begin(store.clock.seconds()))
+            runner.post(Continue(store.clock.seconds()))
+            wait(1500)
+            runner.post(PauseAsked(store.clock.seconds(), "operator"))
+        place: Path = store.folder.path
+    with LightDevice() as device, Servo(device, clock=VirtualClock(), elements=100) as servo:
+        described = device.describe()
+        with reopen(
+            place, small.protocol(), b"small", operator="", device=described, screens={}, now_ns=servo.now_ns
+        ) as store:
+            runner, wait = held(store, device, servo)
+            servo.advance(900)  # its recording begins at a tick that the one before holds too
+            runner.post(Begin(store.clock.seconds()))
+            runner.post(ResumeAsked(store.clock.seconds(), "operator"))
+            wait(1500)
+            runner.post(EndAsked(store.clock.seconds(), "aborted", ""))
+    return place
+
+
 def troubled(folder: Path) -> Path:
     """Hold a session in which all happens that changes a force from outside; return its folder."""
-    study = small.protocol()
     device = ScriptedDevice()
-    t_s = np.arange(0, 60, 0.005)
     with device, Servo(device, clock=VirtualClock(), elements=100) as servo:
-        clock = SessionClock(servo.now_ns)
-        store = begin(
-            folder,
-            study,
-            b"small",
-            "P001",
-            seed=1,
-            operator="",
-            language="en",
-            device=device.describe(),
-            screens={},
-            simulated=True,
-            recordings=True,
-            clock=clock,
-        )
+        store = begun(folder, device, servo)
+        clock = store.clock
         with store:
-            ports = Ports(servo, store, lambda _page: None, clock.seconds, store.recorder)
-            runner = Runner(study, build_schedule(study, "P001", 1), store.key.codes, ports, "en")
-            device.follow(t_s, np.column_stack((0.03 * np.sin(6 * t_s), 0.01 * np.cos(9 * t_s), 0 * t_s)))
-
-            def wait(ticks: int) -> None:
-                for _ in range(ticks // 50):
-                    servo.advance(50)
-                    runner.poll()
-
+            runner, wait = held(store, device, servo)
             runner.post(Begin(clock.seconds()))
             servo.advance(20)
             runner.post(Continue(clock.seconds()))  # so early that the servo's own fade is under way
@@ -125,6 +179,17 @@ def test_repeats_pauses_stops_and_fades_come_out_to_the_last_bit(tmp_path: Path)
     found = replay(troubled(tmp_path / "results"))
     assert (found.differences, found.uncompared) == ((), ())
     assert found.recordings == 5
+
+
+def test_a_session_that_goes_on_with_another_device_comes_out_to_the_last_bit(tmp_path: Path) -> None:
+    place = resumed_on_another_device(tmp_path / "results")
+    found = replay(place)
+    assert (found.differences, found.uncompared) == ((), ())
+    assert (found.recordings, found.proved) == (2, True)
+    receipt = json.loads((place / "receipt.json").read_text())
+    (place / "receipt.json").write_text(json.dumps(receipt | {"resumed": []}))
+    with pytest.raises(StoreError, match="lacks the device since"):
+        replay(place)
 
 
 def rewrite(path: Path, change: Callable[[dict[str, Any]], None]) -> None:
@@ -213,7 +278,7 @@ def test_a_receipt_that_lacks_what_ran_is_one_sentence(rehearsed: Path, tmp_path
     receipt = json.loads((place / "receipt.json").read_text())
     for changed, said in (
         ({other: value for other, value in receipt.items() if other != name}, f"lacks '{name}': restore it"),
-        (receipt | {name: "?"}, "give no protocol"),
+        (receipt | {name: "?"}, f"is no receipt .{name} is '.'"),
     ):
         (place / "receipt.json").write_text(json.dumps(changed))
         with pytest.raises(StoreError, match=said) as raised:
@@ -232,6 +297,30 @@ def test_missing_samples_are_said_and_not_compared(rehearsed: Path, tmp_path: Pa
     assert found.differences == ()
     (said,) = found.uncompared
     assert said.startswith("trial 1, attempt 1: samples are missing after")
+
+
+@pytest.mark.parametrize(
+    ("column", "change", "named"),
+    [
+        ("device_force_x_n", 5.0, "column device_force_n"),
+        ("device_force_z_n", 2.0**-13, "column device_force_n"),
+        ("undelivered_y_n", 5.0, "column command_n"),
+        ("withheld_x_n", 5.0, "column force_n"),
+        ("velocity_y_mps", 0.1, "column velocity_mps"),
+        ("wake_z_mps", 0.1, "column wake_mps"),
+        ("limiters", 8, "column limiters"),
+    ],
+)
+def test_a_recorded_column_that_was_changed_is_named(
+    rehearsed: Path, tmp_path: Path, column: str, change: float, named: str
+) -> None:
+    place = copied(rehearsed, tmp_path / "column")
+
+    def add(columns: dict[str, Any]) -> None:
+        columns[column][-100] += change
+
+    rewrite(place / "recordings" / "trial-001.parquet", add)
+    assert any(f"the {named} differs in second" in said for said in replay(place).differences)
 
 
 def test_no_sentence_tells_a_condition(rehearsed: Path, tmp_path: Path) -> None:

@@ -180,7 +180,7 @@ def test_a_servo_that_takes_no_turn_is_not_waited_for(scenes, monkeypatch):
 
 def test_memory_that_is_kept_is_found(scenes):
     kept = []
-    found = stepped(scenes, lambda _run: kept.append(bytearray(b"x") * (96 << 20)))
+    found = stepped(scenes, lambda _run: kept.append(bytearray(b"x") * (384 << 20)))
     assert found.growth_bytes > 48 << 20  # what was freed before may have held a part of it
     assert [finding for finding in found.findings if "memory grew by" in finding]
 
@@ -219,7 +219,7 @@ def test_dropped_samples_that_are_not_counted_are_found(scenes):
     [
         ("counts", "excess", 1, "above the limit"),
         ("counts", "no_number", 1, "no numbers"),
-        ("counts", "steps", 1, "not 0.5 N"),
+        ("counts", "steps", 1, "not 1.5 N"),
         ("counts", "unstopped", 1, "while stopped"),
         ("counts", "believed", 1, "no place"),
         ("counts", "drift_ns", 1, "off its ticks"),

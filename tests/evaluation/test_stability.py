@@ -12,10 +12,12 @@ from study_app import cli
 from study_app.cli.words import EXIT_FOUND
 from study_app.errors import StoreError, StudyError
 from study_app.evaluation.stability import sweep as stability
-from study_app.evaluation.stability.cases import GRIPS, Case, liquids, parse, scene_of, some, sweep
+from study_app.evaluation.stability.bench import trace_of
+from study_app.evaluation.stability.cases import GRIPS, Case, liquids, parse, scene_of
 from study_app.evaluation.stability.fidelity import LIMITED, STUDY_LOOPS, fidelities
+from study_app.evaluation.stability.groups import Group, groups, some, sweep
 from study_app.evaluation.stability.measures import fast_part, smooth
-from study_app.evaluation.stability.verdict import judge, trace_of
+from study_app.evaluation.stability.verdict import judge
 from study_app.haptics.layout import LIMITER_NAMES
 from study_app.protocol.load import load, shipped
 from tests.haptics.scenes import COMPILED
@@ -28,7 +30,7 @@ PRESETS = [name for name in liquids() if name not in LIMITED]
 
 @pytest.fixture(scope="module")
 def swept():
-    return stability.run_sweep(some(sweep(), 120))
+    return stability.run_sweep(some(sweep(), 120), [Group("gentle", (Case(), Case(plant="arm")))])
 
 
 def test_the_sweep_has_5000_cases_and_everything_that_it_should():
@@ -95,6 +97,9 @@ def test_a_case_is_a_line_that_reproduces_it(case):
 @pytest.mark.parametrize(
     ("line", "said"),
     [
+        ("plant=leg", "none of handle, arm"),
+        ("believed=5", "between -1 and 4"),
+        ("release_s=2.5", "between 0.3 and 2"),
         ("scale", "'scale' is none"),
         ("scales=3", "did you mean 'scale'"),
         ("delay=1.5", "whole number"),
@@ -193,6 +198,12 @@ def test_the_files_hold_every_case_and_the_lines_that_reproduce_the_failing_ones
     assert "60 cases" in written["stability.md"].read_text("utf-8")
     assert written["map.png"].read_bytes().startswith(b"\x89PNG")
     assert b"Friction b" in written["map.svg"].read_bytes()
+    failing = dataclasses.replace(swept.off[0], reasons=("force",), case=Case(plant="arm"))
+    more = dataclasses.replace(few, others=(stability.Judged("second plant", (failing,)),))
+    lines = next(
+        path for path in stability.write(tmp_path / "more", more, found) if path.name == "unstable-safety-on.txt"
+    )
+    assert [parse(line) for line in lines.read_text("utf-8").splitlines()] == [failing.case]
     (tmp_path / "file").write_text("")
     with pytest.raises(StoreError, match="choose another with --to"):
         stability.write(tmp_path / "file" / "below", few, found)
@@ -202,6 +213,10 @@ def test_the_files_hold_every_case_and_the_lines_that_reproduce_the_failing_ones
 def test_the_summary_counts_cases_reasons_and_limiters(swept):
     text = stability.summary(swept, fidelities(["honey"], STUDY_LOOPS))
     assert "120 cases" in text
+    first, gentle = (line.split() for line in text.splitlines() if line.startswith(("  first plant", "  gentle")))
+    assert first[2:4] == ["120", "0"]
+    assert gentle[1:3] == ["2", "0"]
+    assert float(gentle[4]) == 0.0
     (line,) = [line for line in text.splitlines() if line.startswith("unstable")]
     assert line.split() == ["unstable", str(sum(not verdict.stable for verdict in swept.off)), "0"]
     assert "slope" in text
@@ -231,11 +246,14 @@ def test_the_command_judges_one_case_in_words():
 def test_it_ends_with_3_where_safety_does_not_hold(monkeypatch):
     judged = stability.judge(parse(UNSTABLE), safe=False)
     monkeypatch.setattr(stability, "judge", lambda case, safe: dataclasses.replace(judged, case=case, safe=safe))
+    monkeypatch.setattr(stability, "judge_driven", lambda case: dataclasses.replace(judged, case=case, safe=True))
     few = fidelities(["honey"], STUDY_LOOPS)
     monkeypatch.setattr("study_app.evaluation.stability.fidelity.fidelities", lambda: few)
     ran = command("--cases", "2")
     assert ran.return_value == EXIT_FOUND
-    assert len([line for line in ran.stderr.splitlines() if line.startswith("liquid=")]) == 2
+    lines = [line for line in ran.stderr.splitlines() if line.startswith("liquid=")]
+    assert len(lines) == 2 * (1 + len(groups(count=2)))
+    assert {parse(line).plant for line in lines} == {"handle", "arm", "falcon"}
 
 
 def test_a_line_that_is_none_is_refused():

@@ -8,8 +8,8 @@ import numpy as np
 
 from study_app.protocol.tasks import Explore, Reach
 from study_app.session.pages import ItemView, Progress, QuestionnairePage, TaskPage, TextPage
-from study_app.session.runner import TankView
 from study_app.session.tasks import TaskView
+from study_app.session.trial import TankView
 
 LABELS = (
     "Completely disagree",

@@ -19,7 +19,8 @@ from study_app.protocol.words import words
 from study_app.session.events import Begin, Chosen, Continue, Submitted, TaskDone
 from study_app.session.pages import Page, QuestionnairePage, TaskPage, TextPage
 from study_app.session.ports import Ports
-from study_app.session.runner import SETTLED_S, Runner
+from study_app.session.runner import Runner
+from study_app.session.trial import SETTLED_S
 from tests.gui.small import ManualClock
 from tests.session.fakes import FakeJournal, FakeServo
 
@@ -54,6 +55,7 @@ class Held:
         while not (isinstance(self.page, TaskPage) and self.page.trial == first.number):
             self._pass()
         self.began_ns = self.servo.now_ns()
+        self.runner.frame_shown(self.began_ns, self.began_ns)
 
     def _present(self, page: Page) -> None:
         self.page = page

@@ -233,6 +233,15 @@ def test_painted_views_are_told(opened: Opened, qtbot: Any) -> None:
     assert told.args == [123_456_789_012]
 
 
+def test_a_late_frame_of_the_tank_before_is_not_told_as_one_of_the_next(opened: Opened, qtbot: Any) -> None:
+    opened.window.show_page(task_page())
+    before = opened.window.tank
+    assert before is not None
+    opened.window.show_page(task_page())
+    with qtbot.assertNotEmitted(opened.window.painted):
+        before.painted.emit(1)
+
+
 def test_views_without_a_tank_are_ignored(opened: Opened) -> None:
     opened.window.show_page(questionnaire())
     opened.window.show_view(view())

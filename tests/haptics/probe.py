@@ -12,7 +12,8 @@ from study_app.haptics.cfunctions import (
     fence,
     record_at,
 )
-from study_app.haptics.layout import READING, records
+from study_app.haptics.dynamics import UNKNOWN
+from study_app.haptics.layout import COMMAND, READING, records
 
 WRITES = 8192
 
@@ -29,6 +30,9 @@ PROBE = np.dtype(
         ("stall_at_read", np.int64),
         ("stall_ns", np.int64),
         ("buttons", np.int64),
+        ("delay_ticks", np.int64),  # as it says it measured it
+        ("share_sent", np.float64),  # of the force, as it says
+        ("held_when_lost_n", np.float64),  # along x, as it says once it was lost
         ("hangs", np.int64),  # while not 0, a reading does not end
         ("clock", np.intp),
         ("forces_n", np.float64, (WRITES, 3)),
@@ -40,6 +44,7 @@ NEVER = 1 << 60
 
 _probe_at = record_at(PROBE)
 _reading_at = record_at(READING)
+_command_at = record_at(COMMAND)
 _clock_at = record_at(CLOCK)
 
 
@@ -60,16 +65,22 @@ def _read(context, now_ns, reading):
     for axis in range(3):
         out.position_m[axis] = probe.velocity_mps[axis] * (now_ns - probe.began_ns) * 1e-9
     out.buttons = probe.buttons
+    out.delay_ticks = probe.delay_ticks
     if probe.reads == probe.bad_at_read:
         out.position_m[1] = np.nan
     return READ_NEW
 
 
-def _write(context, fx, fy, fz):
-    probe = _probe_at(context)
+def _write(context, command):
+    probe, row = _probe_at(context), _command_at(command)
     force = probe.forces_n[probe.writes % WRITES]
-    force[0], force[1], force[2] = fx, fy, fz
+    for axis in range(3):
+        force[axis] = row.force_n[axis]
+        if probe.share_sent != 1.0:
+            row.sent_n[axis] = probe.share_sent * row.force_n[axis]
     probe.writes += 1
+    if probe.reads >= probe.lost_at_read and probe.held_when_lost_n != 0.0:
+        row.sent_n[0] = probe.held_when_lost_n
     return READ_LOST if probe.writes >= probe.lost_at_write else 0
 
 
@@ -81,10 +92,13 @@ class Probe:
     read = c_function(READ, _read)
     write = c_function(WRITE, _write)
 
-    def __init__(self, velocity_mps=(0.2, 0.0, 0.0), memory=None):
+    def __init__(self, velocity_mps=(0.2, 0.0, 0.0), memory=None, dynamics=UNKNOWN):
+        self.dynamics = dynamics
         self.memory = records(PROBE, 1) if memory is None else memory
         self.state = self.memory[0]
         self.state.velocity_mps = velocity_mps
+        self.state.delay_ticks = -1
+        self.state.share_sent = 1.0
         for name in ("lost_at_read", "lost_at_write", "silent_from_read", "bad_at_read", "stall_at_read"):
             self.state[name] = NEVER
         self.context = self.memory.ctypes.data

@@ -5,6 +5,7 @@ from typing import Any
 import numba
 import numpy as np
 
+from study_app.haptics.dynamics import UNKNOWN, Dynamics
 from study_app.haptics.layout import SAMPLE, records
 from study_app.haptics.motion import Motion
 from study_app.haptics.pack import pack
@@ -108,8 +109,8 @@ def vectors(table: Any, kind: str) -> Any:
 class Hand:
     """Moves a model as a servo would: one call, one turn of 1 ms unless said otherwise."""
 
-    def __init__(self, felt: Scene, *, faded_in: bool = True) -> None:
-        self.model = pack(felt)
+    def __init__(self, felt: Scene, *, faded_in: bool = True, dynamics: Dynamics = UNKNOWN) -> None:
+        self.model = pack(felt, dynamics=dynamics)
         self.safety = new_safety()
         self.safety[0].fade = 1.0 if faded_in else 0.0
         self.sample = records(SAMPLE, 1)

@@ -18,10 +18,10 @@ from study_app.devices.scripted import ScriptedDevice
 from study_app.errors import StudyError
 from study_app.haptics.clock import VirtualClock
 from study_app.haptics.layout import LIMITER_FADE
+from study_app.haptics.limits import SLEW_N
 from study_app.haptics.override import override_all
 from study_app.haptics.pack import built_alike
 from study_app.haptics.paths import path
-from study_app.haptics.safety import SLEW_N
 from study_app.haptics.scene import Scene
 from study_app.haptics.servo import Servo
 from study_app.protocol.load import load_scene

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from study_app.haptics.layout import LIMITER_GLITCH
+from study_app.haptics.limits import SLEW_N
 from study_app.haptics.motion import Motion
 from study_app.haptics.offline import simulate
 from study_app.haptics.scene import Ewma
@@ -145,7 +146,7 @@ def test_hazard_10_a_clock_that_jumps_does_no_harm(felt, jump_ns):
         sample = hand.turn((0.0002 * k, -0.01, 0.0), after_ns=jump_ns if k == 60 else TICK_NS)
         assert np.isfinite(sample.force_n).all()
         assert np.linalg.norm(sample.device_force_n) <= 8 * (1 + 1e-12)
-        assert np.linalg.norm(sample.device_force_n - before) <= 0.5 + 1e-9
+        assert np.linalg.norm(sample.device_force_n - before) <= SLEW_N + 1e-9
         before = sample.device_force_n.copy()
     assert sample.velocity_mps[0] == pytest.approx(0.2 * felt.scale, rel=1e-3)
     assert sample.limiters & LIMITER_GLITCH == 0

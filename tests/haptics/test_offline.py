@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from study_app.haptics.layout import LIMITER_SLEW
+from study_app.haptics.limits import SLEW_N
 from study_app.haptics.motion import Motion, write
 from study_app.haptics.offline import COLUMNS, simulate
 from study_app.haptics.override import override_all
@@ -113,8 +114,8 @@ def test_the_table_holds_inputs_and_results_by_name():
 
 
 def test_what_is_sent_is_slewed_from_zero_with_the_start_fade_over():
-    table = simulate(WATER, moving(np.tile([1.0, 0.0, 0.0], (3, 1))))
-    assert table.device_fx_n[0] == pytest.approx(-0.5)
+    table = simulate(WATER, moving(np.tile([1.6, 0.0, 0.0], (3, 1))))
+    assert table.device_fx_n[0] == pytest.approx(-SLEW_N)
     assert table.limiters[0] == LIMITER_SLEW
     assert table.device_fx_n[2] == table.fx_n[2]
 

@@ -36,6 +36,9 @@ acts = st.one_of(
 @settings(max_examples=examples(60), deadline=None)
 @given(todo=st.lists(acts, max_size=30), estimator=st.sampled_from(list(ESTIMATORS)), faded_in=st.booleans())
 @example(todo=[("stride", (5.0, 0.1, -4.0), 40)], estimator="ewma", faded_in=True)
+@example(
+    todo=[("stride", (0.0, 0.0, 3.0), 14), ("stride", (0.0, 5e-265, 0.0), 1)], estimator="raw", faded_in=True
+)  # the square of the speed underflows
 def test_any_bytes_at_any_time_give_a_finite_force_within_the_limit(name, todo, estimator, faded_in):
     hand = Hand(ALL[name].model_copy(update={"velocity": ESTIMATORS[estimator]}), faded_in=faded_in)
 

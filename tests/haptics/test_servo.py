@@ -457,6 +457,7 @@ def test_the_thread_turns_while_python_computes_and_ends_when_told(probe):
         wait_until(lambda: force_n(servo.telemetry) > 0.1)
         assert servo.now_ns() >= servo.telemetry.latest().time_ns
         assert servo.describe()["priority"].split()[0] in {"real-time", "raised", "normal"}
+        assert servo.describe()["delay_ticks"] == servo.delay_ticks == servo.dynamics.delay_ticks(servo.rate_hz)
         samples = reader.read()
     assert (samples.lateness_ns >= 0).all()
     assert is_zero(probe.forces_n[-1])

@@ -126,6 +126,7 @@ def replayed(samples, scene):
     for i in range(len(again)):
         if i > 0 and again[i].scene != again[i - 1].scene:
             begin_scene(safety[0])
+        safety[0].delay_ticks = again[i].delay_ticks
         tick(model if again[i].scene else rest, safety[0], again[i])
     return again.device_force_n
 

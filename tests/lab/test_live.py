@@ -308,7 +308,8 @@ def test_limiters_are_counted_as_telemetry_has_them() -> None:
     run(live, 6000)
     ring = live.servo.telemetry.ring[:6000]
     told = {it.name: it for it in live.limiters()}
-    assert told["Slew, 0.5 N a tick"].ticks == np.count_nonzero(ring.limiters & LIMITER_SLEW) > 0
+    assert told["Fade"].ticks == np.count_nonzero(ring.limiters & LIMITER_FADE) > 0
+    assert told["Slew, 1.5 N per tick"].ticks == np.count_nonzero(ring.limiters & LIMITER_SLEW)
     assert len(told) == len(LIMITER_NAMES)
     assert not told["Force stopped"].acting
     live.stop_force()

@@ -9,7 +9,7 @@ from click.testing import CliRunner
 
 from study_app.cli import commands
 from study_app.errors import StoreError
-from study_app.haptics.scene import Scene
+from study_app.haptics.scene import Ewma, Kalman, Scene
 from study_app.lab.changes import changed
 from study_app.lab.presets import Choice, liquids_at_hand, preset_text, save
 from study_app.lab.workbench import Setting
@@ -73,4 +73,19 @@ def test_the_shipped_liquids_are_at_hand_with_those_of_a_folder_and_without_brok
     assert {it.source for it in at_hand} == {*shipped(), str(tmp_path / "mine.toml")}
     assert len({it.title for it in at_hand}) == len(at_hand)
     water = next(it for it in at_hand if it.liquid == "water")
-    assert water.setting().origin == water.scene
+    assert water.scene.velocity == Ewma()  # as its file says
+    assert water.setting().origin == water.scene.model_copy(update={"velocity": Kalman()})
+
+
+def test_a_liquid_goes_on_with_its_own_estimator_if_that_is_not_the_usual_one(tmp_path: Path) -> None:
+    slow = load_scene("rek2024", "honey").model_copy(update={"velocity": Ewma(alpha=0.05)})
+    path = tmp_path / "slow.toml"
+    save(path, preset_text(Setting("Honey", slow, slow)))
+    assert Choice(str(path), "honey", "Honey").setting().scene.velocity == Ewma(alpha=0.05)
+
+
+def test_what_the_lab_saves_names_kalman(tmp_path: Path) -> None:
+    path = tmp_path / "honey.toml"
+    save(path, preset_text(Choice("rek2024", "honey", "Honey").setting()))
+    assert 'kind = "kalman"' in path.read_text()
+    assert load_scene(str(path), "honey").velocity == Kalman()

@@ -10,7 +10,7 @@ if numba.config.DISABLE_JIT:
     pytest.skip("the servo exists compiled only", allow_module_level=True)
 
 from study_app.haptics.layout import SAMPLE, records
-from study_app.haptics.scene import Scene
+from study_app.haptics.scene import Kalman, Scene
 from study_app.lab.changes import changed
 from study_app.lab.shadow import SPAN_S, Shadow
 from study_app.lab.tail import MOST_POINTS
@@ -54,6 +54,18 @@ def test_so_they_are_with_every_effect(name: str) -> None:
     run(live, 2500)
     assert live.shadow.differing == 0
     live.close()
+
+
+def test_so_they_are_with_the_kalman_filter_on_a_light_handle() -> None:
+    device = scripted()
+    device._state.handle.mass_kg = 0.05
+    live = live_with(device)
+    scene = SCENES["honey"].model_copy(update={"velocity": Kalman()})
+    live.feel(Workbench(Setting("honey", scene, scene), bench().b))
+    live.play("reach")
+    run(live, 2000)
+    assert live.shadow.followed > 1900
+    assert live.shadow.differing == 0
 
 
 def test_the_other_side_is_what_it_would_be_were_it_felt() -> None:

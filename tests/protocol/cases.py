@@ -39,6 +39,9 @@ liquid = "thin"
 [conditions.is_thick]
 liquid = "thick"
 
+[conditions.on_time]
+liquids = ["thin","thick"]
+
 [conditions.both]
 liquids = ["thin", "thick"]
 delay_ms = 120
@@ -112,7 +115,7 @@ part = 2
 title = { en = "Looking", nl = "Kijken" }
 setting_label = { en = "Delay", nl = "Vertraging" }
 code_prefix = "D"
-conditions = ["is_thin", "both"]
+conditions = ["on_time", "both"]
 order = "shuffled"
 task = "reach"
 questionnaire = "short"
@@ -191,6 +194,8 @@ class Case(NamedTuple):
 def case(name: str, old: str, new: str, *expected: tuple[str | None, str, str]) -> Case:
     return Case(name, ((old, new),), tuple(Expected(*one) for one in expected))
 
+
+LOOK_DIFFERS = ('conditions = ["on_time", "both"]', "blocks.look.conditions", "differ in liquid and in delay")
 
 CASES = (
     # keys
@@ -331,8 +336,9 @@ CASES = (
     case("unknown liquid", 'liquid = "thick"', 'liquid = "thik"',
          ("thik", "conditions.is_thick.liquid", 'no liquid "thik" (did you mean "thick"?)')),
     case("unknown liquid in a list", '["thin", "thick"]', '["thin", "tick"]',
-         ("tick", "conditions.both.liquids.2", 'no liquid "tick"')),
-    case("unknown condition", 'conditions = ["is_thin", "both"]', 'conditions = ["is_thin", "booth"]',
+         ("tick", "conditions.both.liquids.2", 'no liquid "tick"'),
+         LOOK_DIFFERS),
+    case("unknown condition", 'conditions = ["on_time", "both"]', 'conditions = ["is_thin", "booth"]',
          ("booth", "blocks.look.conditions.2", 'no condition "booth" (did you mean "both"?)')),
     case("unknown task", 'task = "reach"', 'task = "search"', ("search", "blocks.look.task", 'no task "search"')),
     case("unknown questionnaire", 'task = "reach"\nquestionnaire = "short"', 'task = "reach"\nquestionnaire = "shirt"',
@@ -347,7 +353,9 @@ CASES = (
          ("sequence", "sequence.5", 'block "feel" comes twice')),
     case("condition twice", '["is_thin", "is_thick"]', '["is_thin", "is_thin"]',
          ('"is_thin", "is_thin"', "blocks.feel.conditions.2", '"is_thin" is there twice')),
-    case("liquid twice", '["thin", "thick"]', '["thin", "thin"]', ("liquids =", "conditions.both.liquids.2", "twice")),
+    case("liquid twice", '["thin", "thick"]', '["thin", "thin"]',
+         ('liquids = ["thin", "thin"]', "conditions.both.liquids.2", "twice"),
+         LOOK_DIFFERS),
     case("item twice", 'id = "cold"', 'id = "warm"',
          ('id = "warm"\ntext = { en = "It is cold', "questionnaires.short.items.2.id", 'a second item "warm"')),
     case("item without id", 'id = "cold"\n', "",
@@ -382,8 +390,16 @@ CASES = (
     case("practice in a judged liquid", 'liquid = "other"', 'liquid = "thick"',
          ('conditions = ["apart"]', "blocks.warm_up.conditions", 'practice is in "thick"')),
     case("codes of two blocks", 'code_prefix = "D"', 'code_prefix = "L"',
-         ('code_prefix = "L"\nconditions = ["is_thin", "both"]', "blocks.look.code_prefix",
+         ('code_prefix = "L"\nconditions = ["on_time", "both"]', "blocks.look.code_prefix",
           'block "feel" has the prefix "L" too')),
+    case("liquid and delay vary", 'conditions = ["on_time", "both"]', 'conditions = ["is_thin", "both"]',
+         ('conditions = ["is_thin", "both"]', "blocks.look.conditions", "differ in liquid and in delay")),
+    case("delays that compare liquids", 'code_prefix = "D"', 'compares = "liquids"\ncode_prefix = "D"',
+         ("compares", "blocks.look.compares", 'is "liquids", and its conditions differ in delays')),
+    case("liquids that compare delays", 'code_prefix = "L"', 'compares = "delays"\ncode_prefix = "L"',
+         ("compares", "blocks.feel.compares", 'is "delays", and its conditions differ in liquids')),
+    case("practice that compares", 'conditions = ["apart"]', 'compares = "liquids"\nconditions = ["apart"]',
+         ("compares", "blocks.warm_up.compares", "a practice block compares nothing")),
     case("part left out", "part = 2", "part = 3", ("part = 3", "blocks.look.part", "is 3, must be 1 or 2")),
     case("first part", "part = 1", "part = 2",
          ('part = 2\ntitle = { en = "Feeling"', "blocks.feel.part", "is 2, must be 1")),

@@ -82,6 +82,7 @@ def test_what_only_some_protocols_have():
             ("labels.nl", 'cannot_judge = { en = "No idea", nl = "Geen idee" }\nlabels.nl'),
             ('id = "cold"', 'id = "cold"\nrequired = false'),
             ('liquids = ["thin", "thick"]', 'liquids = ["thin", "other"]'),
+            ('liquids = ["thin","thick"]', 'liquids = ["thin","other"]'),
             ('conditions = ["apart"]', 'conditions = ["practised"]'),
             ('[conditions.apart]\nliquid = "other"', '[conditions.practised]\nliquid = "syrup"'),
             (

@@ -179,7 +179,7 @@ def test_ids_that_fill_no_round_are_told():
 
 
 def test_one_participant_and_no_block_to_balance():
-    alone = SOUND.replace('["is_thin", "is_thick"]', '["is_thin"]').replace('["is_thin", "both"]', '["both"]')
+    alone = SOUND.replace('["is_thin", "is_thick"]', '["is_thin"]').replace('["on_time", "both"]', '["both"]')
     judged = balance(parse(alone.encode(), "small"), ("P001",), 1)
     assert judged.blocks == ()
     assert describe_balance(judged) == (

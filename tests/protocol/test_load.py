@@ -182,3 +182,25 @@ def test_whatever_is_changed_gives_a_protocol_or_a_list_of_problems(changes: lis
         assert build_schedule(protocol, "P1", 1).trials
         assert describe(protocol)
     assert all(problem.message and problem.place for problem in problems)
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("a = " + "[" * 3000 + "]" * 3000, "file: is nested too deeply"),
+        ("format = " + "9" * 6000, "file: holds a whole number beyond 64 bits"),
+        ("format = 1\n[limits]\nlateness_ms = " + "9" * 4000, "file: holds a whole number beyond 64 bits"),
+    ],
+)
+def test_what_python_cannot_hold_is_a_problem_of_the_file(text: str, sentence: str) -> None:
+    with pytest.raises(ProtocolError, match=sentence):
+        parse(text.encode(), "odd")
+
+
+@pytest.mark.parametrize("value", ["q" * 6000, "q " * 3000, "task.x" * 1000])
+def test_a_message_repeats_200_characters_of_a_value_at_most(value: str) -> None:
+    text = source_bytes("demo").decode()
+    (line, *_) = (line for line in text.splitlines() if line.startswith("task = "))
+    with pytest.raises(ProtocolError) as raised:
+        parse(text.replace(line, f'task = "{value}"', 1).encode(), "odd")
+    assert max(len(str(problem)) for problem in raised.value.problems) < 500

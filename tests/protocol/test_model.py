@@ -71,7 +71,7 @@ def test_a_study_without_main_block_is_refused():
     text = SOUND
     for letter, part in (("L", 1), ("D", 2)):
         text = text.replace(f'code_prefix = "{letter}"\n', "").replace(f"part = {part}\n", 'phase = "baseline"\n')
-    text = text.replace('["is_thin", "is_thick"]', '["is_thin"]').replace('["is_thin", "both"]', '["is_thin"]')
+    text = text.replace('["is_thin", "is_thick"]', '["is_thin"]').replace('["on_time", "both"]', '["is_thin"]')
     with pytest.raises(ProtocolError, match="there is no main block"):
         parse(text.encode(), "small.toml")
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from study_app.errors import StoreError
 from study_app.haptics.scene import Scene
+from study_app.session.pages import TaskPage
 from study_app.session.ports import Ports
 from study_app.session.runner import Runner
 from study_app.session.state import SessionState
@@ -82,21 +83,28 @@ class FakeServo:
 
 
 class FakeJournal:
-    """Keeps lines; after ``fails_after`` lines the disk is full."""
+    """Keeps lines; after ``fails_after`` lines the disk is full; ``unflushed`` is why lines could not be flushed."""
 
     def __init__(self, log: list[Any]) -> None:
         self.lines: list[dict[str, Any]] = []
+        self.waited: list[str] = []
         self.fails_after: int | None = None
         self.finish_fails = False
+        self.unflushed: str | None = None
         self.tables_written = 0
         self.status: str | None = None
         self._log = log
 
-    def append(self, event: str, *, t_s: float | None = None, **fields: Any) -> None:
+    def append(self, event: str, *, t_s: float | None = None, waits: bool = True, **fields: Any) -> None:
         if self.fails_after is not None and len(self.lines) >= self.fails_after:
             raise StoreError("disk full")
         self._log.append(event)
+        self.waited += [event] if waits else []
         self.lines.append({"event": event, "t_s": t_s, **fields})
+
+    def check_flushed(self) -> None:
+        if self.unflushed is not None:
+            raise StoreError(self.unflushed)
 
     def write_tables(self) -> None:
         if self.fails_after is None:
@@ -113,7 +121,10 @@ class FakeJournal:
 
 
 class World:
-    """A runner of the small study with everything around it; ``log`` is what happened, in order."""
+    """A runner of the small study with everything around it; ``log`` is what happened, in order.
+
+    With ``paints`` a tank's first frame is painted as soon as its page is presented.
+    """
 
     def __init__(self, seed: int = 1, recorder: Any = None) -> None:
         self.log: list[Any] = []
@@ -121,6 +132,7 @@ class World:
         self.journal = FakeJournal(self.log)
         self.pages: list[Any] = []
         self.on_page: Callable[[Any], None] = lambda _page: None
+        self.paints = True
         plan = small.opened(seed).plan
         ports = Ports(self.servo, self.journal, self._present, self.clock, recorder)
         self.runner = Runner(plan.protocol, plan.schedule, plan.key, ports, plan.language)
@@ -140,4 +152,6 @@ class World:
     def _present(self, page: Any) -> None:
         self.log.append(type(page).__name__)
         self.pages.append(page)
+        if self.paints and isinstance(page, TaskPage):
+            self.runner.frame_shown(self.servo.now_ns(), self.servo.now_ns())
         self.on_page(page)

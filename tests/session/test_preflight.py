@@ -12,6 +12,7 @@ from study_app.devices.scripted import ScriptedDevice
 from study_app.errors import StoreError
 from study_app.haptics.clock import VirtualClock
 from study_app.haptics.clock_grants import Grant
+from study_app.haptics.dynamics import Dynamics
 from study_app.haptics.servo import Servo
 from study_app.haptics.telemetry import Timing
 from study_app.protocol.model import Protocol
@@ -63,12 +64,34 @@ def test_where_all_is_well_nothing_is_said_but_so() -> None:
         ({"probe_s": 0.4}, "Results folder", "warning"),
         ({"free_bytes": 50_000_000}, "Free space", "failure"),
         ({"free_bytes": None}, "Free space", "warning"),
+        ({"dynamics": Dynamics(0.0018), "delay_ticks": 2}, "Loop delay", "warning"),
+        ({"withheld": {"thin": 0.01, "thick": 0.051}}, "Force withheld", "warning"),
+        ({"withheld": {"thin": 0.01, "thick": 0.05}}, "Force withheld", "ok"),
     ],
 )
 def test_each_fact_has_its_limit(changed: dict[str, Any], name: str, verdict: str) -> None:
     assert verdicts(**changed)[name] == verdict
     reason = refused(checks(replace(WELL, **changed), small.protocol()))
     assert (name.lower() in reason) == (verdict == "failure")
+
+
+@pytest.mark.parametrize("blinding", ["double", "single"])
+def test_the_share_withheld_is_told_by_liquid_where_the_operator_may_know_them(blinding: Any) -> None:
+    study = small.protocol()
+    study = study.model_copy(update={"study": study.study.model_copy(update={"blinding": blinding})})
+    facts = replace(WELL, withheld={"thin": 0.001, "thick": 0.032})
+    (found,) = [check for check in checks(facts, study) if check.name == "Force withheld"]
+    assert (found.value, found.share) == ("at most 3.2 %", pytest.approx(0.64))
+    liquids = "" if blinding == "double" else ": thick 3.2 %, thin 0.1 %"
+    assert found.about == f"in the fastest stroke of a task, limit 5 %{liquids}"
+
+
+@pytest.mark.parametrize(("delay_s", "said"), [(None, "assumed"), (0.00093, "0.93 ms, measured by the device")])
+def test_the_delay_of_the_loop_is_told_with_where_it_comes_from(delay_s: float | None, said: str) -> None:
+    facts = replace(WELL, dynamics=Dynamics(delay_s))
+    (found,) = [check for check in checks(facts, small.protocol()) if check.name == "Loop delay"]
+    assert found.value == "1 tick"
+    assert said in found.about
 
 
 def test_what_was_not_granted_is_told_with_how_to_grant_it() -> None:
@@ -123,6 +146,7 @@ def test_servo_and_disk_are_measured_and_nothing_is_left(tmp_path: Path) -> None
     facts = measured(tmp_path / "not" / "yet")
     assert facts.timing.rate_hz == pytest.approx(1000, rel=1e-3)
     assert facts.fresh_share == 1.0
+    assert (facts.dynamics.delay_s, facts.delay_ticks) == (0.0, 0)
     assert 0 <= facts.sample_age_s <= 0.001
     assert facts.probe_s is not None
     assert facts.free_bytes is not None

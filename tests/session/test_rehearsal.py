@@ -19,10 +19,10 @@ from study_app.protocol.schedule import stream
 from study_app.session import rehearsal
 from study_app.session.feelings import feelings
 from study_app.session.pages import TextPage
-from study_app.session.runner import TankView
 from study_app.session.simulated import Reacher, Senses, choices, reading_s
 from study_app.session.strokes import RATE_HZ, exploration
 from study_app.session.tasks import TaskView
+from study_app.session.trial import TankView
 from study_app.store.description import write_description
 from study_app.store.layout import StudyFolder
 from study_app.store.session import SessionStore
@@ -165,9 +165,9 @@ def test_a_device_that_is_lost_ends_the_rehearsal_with_a_word_why(
 ) -> None:
     look = rehearsal.Rehearsal._see
 
-    def pull_the_cable(self: Any, senses: Any, hand: Any) -> bool:
+    def pull_the_cable(self: Any, senses: Any) -> TankView | None:
         self._machine.device.unplug()
-        return look(self, senses, hand)
+        return look(self, senses)
 
     monkeypatch.setattr(rehearsal.Rehearsal, "_see", pull_the_cable)
     with pytest.raises(SessionError, match="stopped answering"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import Any
 
 import pytest
@@ -23,8 +24,9 @@ from study_app.session.events import (
 )
 from study_app.session.moves import END_SHOWN_S
 from study_app.session.pages import EndPage, PausePage, QuestionnairePage, TaskPage, TroublePage
-from study_app.session.runner import BUTTON_CONTINUE, BUTTON_STOP, RETRY_S, SETTLED_S
+from study_app.session.runner import BUTTON_CONTINUE, BUTTON_STOP, RETRY_S
 from study_app.session.state import Phase
+from study_app.session.trial import SETTLED_S
 from tests.session.fakes import World
 
 LEFT, RIGHT, AWAY = (-0.02, 0.0, 0.0), (0.02, 0.0, 0.0), (0.0, 0.01, 0.0)
@@ -92,8 +94,30 @@ def test_an_answer_is_kept_before_the_page_it_leads_to_and_tables_follow_every_p
     world.log.clear()
     tables = world.journal.tables_written
     world.runner.post(Submitted(9.5))
-    assert world.log == ["responses", "trial_started", "load", "TaskPage"]
+    assert world.log == ["responses", "trial_started", "TaskPage", "load"]
     assert world.journal.tables_written == tables + 1
+
+
+def test_nothing_but_what_a_person_gave_waits_for_the_disk() -> None:
+    world = at_block("seeing")
+    world.runner.post(Note(world.clock(), "mark", ""))
+    world.runner.post(Note(world.clock(), "note", "tired"))
+    world.runner.post(PauseAsked(world.clock(), "operator"))
+    world.runner.post(ResumeAsked(world.clock(), "operator"))
+    world.runner.post(RepeatAsked(world.clock(), "a sneeze"))
+    while not world.runner.finished:
+        for item in world.state.trial.items if world.state.phase is Phase.ANSWERING else ():
+            world.runner.post(ItemShown(world.clock(), item))
+        step(world)
+    waited = Counter(world.journal.waited)
+    assert waited == Counter(
+        line["event"]
+        for line in world.journal.lines
+        if line["event"] in {"choice", "responses", "repeat"}
+        or (line["event"], line.get("page", line.get("kind"))) in {("page_left", "welcome"), ("note", "note")}
+    )
+    assert waited["choice"] > 0
+    assert len(world.journal.of("target_reached")) > 0
 
 
 def test_lines_carry_the_time_of_the_event_they_tell(world: World) -> None:
@@ -149,6 +173,49 @@ def test_samples_from_before_the_scene_was_in_force_do_not_count(practising: Wor
     practising.servo.scene = 1
     practising.run(3.2)
     assert practising.journal.of("trial_ended")[0]["duration_s"] == pytest.approx(3.0)
+
+
+def unpainted(recorder: Any = None) -> World:
+    """Return a world whose practice was asked for two seconds ago, and no frame of its tank was painted."""
+    world = World(recorder=recorder)
+    world.paints = False
+    world.runner.post(Begin(0.0))
+    world.runner.post(Continue(0.0))
+    world.run(2.0)
+    return world
+
+
+def test_force_task_and_recording_begin_with_the_first_painted_frame_of_the_tank() -> None:
+    tape = Tape()
+    world = unpainted(tape)
+    assert "load" not in world.log
+    assert tape.told == []
+    assert world.runner.task.elapsed_s == 0.0
+    assert world.runner.view(world.servo.now_ns()).task.elapsed_s == 0.0
+    world.runner.post(Continue(2.0))  # there is nothing to leave yet, though the exploration lasts 1 s at least
+    world.runner.frame_shown(world.servo.now_ns(), world.servo.now_ns())
+    assert world.log[-1] == "load"
+    world.run(1.4)
+    assert world.runner.task.elapsed_s == pytest.approx(1.399)
+    world.run(1.8)
+    (row,) = world.journal.of("trial_ended")
+    assert row["duration_s"] == pytest.approx(3.0)
+    assert row["ticks"] == 3001
+    assert row["first_frame_gap_ms"] == pytest.approx(2000)
+    assert recorded(tape)[0][0] == 2000 - 600 + 1
+
+
+def test_a_trial_that_is_paused_before_its_first_frame_was_neither_felt_nor_recorded() -> None:
+    tape = Tape()
+    world = unpainted(tape)
+    world.runner.post(PauseAsked(2.0, "operator"))
+    (row,) = world.journal.of("trial_ended")
+    assert (row["outcome"], row["duration_s"], row["ticks"], row["first_frame_gap_ms"]) == ("interrupted", 0, 0, None)
+    assert row["samples_dropped"] == 0
+    assert tape.told == []
+    world.runner.frame_shown(1, 0)  # the last frame of a tank that is gone
+    world.runner.post(ResumeAsked(3.0, "operator"))
+    assert "load" not in world.log
 
 
 def test_every_target_that_is_reached_is_kept_at_once() -> None:
@@ -233,8 +300,8 @@ def test_the_row_of_a_trial_holds_the_error_of_the_delay_and_never_the_delay() -
     world.run(0.1, LEFT)
     world.run(0.5, RIGHT)
     row = world.journal.of("trial_ended")[-1]
-    assert (row["frames"], row["frames_late"]) == (4, 1)  # the study allows 25 ms
-    assert row["delay_error_mean_ms"] == pytest.approx(13.75 + 1000 * SETTLED_S)
+    assert (row["frames"], row["frames_late"]) == (5, 1)  # the study allows 25 ms
+    assert row["delay_error_mean_ms"] == pytest.approx((4 * (13.75 + 1000 * SETTLED_S) - 137) / 5)
     assert row["delay_error_max_ms"] == pytest.approx(40 + 1000 * SETTLED_S)
     assert 137 not in [round(value) for value in row.values() if isinstance(value, float)]
 
@@ -260,7 +327,35 @@ def test_the_row_of_a_trial_sums_up_force_path_and_limiters(practising: World) -
     assert row["force_peak_n"] == pytest.approx(5)
     assert (row["limiter_slope"], row["limiter_norm"], row["limiter_slew"]) == (1000, 1000, 0)
     assert row["lateness_p99_ms"] == pytest.approx(2)
-    assert (row["frames"], row["delay_error_mean_ms"]) == (0, None)
+    assert (row["frames"], row["first_frame_gap_ms"], row["worst_frame_gap_ms"]) == (1, 0.0, None)
+
+
+def test_the_row_of_a_trial_holds_the_share_of_the_force_withheld_in_its_task(practising: World) -> None:
+    practising.servo.scene = 0
+    practising.servo.run(0.5, permitted_n=9.0, withheld_n=9.0)  # before the task
+    practising.servo.scene = 1
+    practising.servo.run(1.0, permitted_n=4.0, withheld_n=0.5)
+    practising.servo.run(1.0, permitted_n=2.0)
+    practising.servo.run(1.001)
+    practising.run(0.2, permitted_n=9.0, withheld_n=9.0)  # after it
+    (row,) = practising.journal.of("trial_ended")
+    assert row["withheld_share"] == pytest.approx(0.5 / 6, abs=1e-6)
+
+
+def test_a_trial_without_force_has_no_share_withheld(practising: World) -> None:
+    practising.run(3.2)
+    assert practising.journal.of("trial_ended")[0]["withheld_share"] is None
+
+
+def test_the_row_of_a_trial_says_that_the_loops_delay_changed(practising: World) -> None:
+    practising.run(0.5, delay_ticks=1)
+    for _ in range(2):
+        practising.run(0.5, delay_ticks=3)
+        practising.run(0.5, delay_ticks=2)
+    practising.run(0.7, delay_ticks=2)
+    practising.run(3.2, delay_ticks=2)
+    rows = practising.journal.of("trial_ended")
+    assert [(row["loop_delay_ticks"], row["loop_delay_changes"]) for row in rows] == [(3, 4), (2, 0)]
 
 
 def test_samples_that_were_lost_are_counted_for_their_trial_alone(practising: World) -> None:
@@ -392,6 +487,22 @@ def test_a_full_disk_stops_the_force_shows_a_calm_page_and_tells_the_operator(pr
     assert isinstance(practising.pages[-1], TroublePage)
     assert "disk" not in practising.pages[-1].paragraph
     assert not any(isinstance(page, TaskPage) and page.trial == 2 for page in practising.pages)
+
+
+def test_lines_that_cannot_be_flushed_in_the_background_stall_the_session_until_they_are(practising: World) -> None:
+    practising.run(0.1)
+    practising.journal.unflushed = "no flush"
+    practising.run(0.1)
+    assert practising.runner.stalled == "no flush"
+    assert not practising.servo.force_is_on
+    assert isinstance(practising.pages[-1], TroublePage)
+    practising.run(RETRY_S + 0.01)
+    assert practising.runner.stalled == "no flush"
+    practising.journal.unflushed = None
+    practising.run(RETRY_S + 0.01)
+    assert practising.runner.stalled is None
+    assert practising.pages[-1] == PausePage(force_off=True)
+    assert practising.journal.of("trial_ended")[-1]["outcome"] == "interrupted"
 
 
 def test_when_the_disk_takes_data_again_all_is_kept_in_order_and_once_and_the_session_is_paused() -> None:
@@ -556,7 +667,7 @@ def test_every_turn_of_a_trial_is_recorded_and_those_shortly_before_it() -> None
     first, second = recorded(tape)
     assert first == list(range(5000 - 600 + 1, 5000 + 3200 + 1))  # until it was left, after its end was shown
     assert second == list(range(8200 - 600 + 1, 8250 + 1))
-    assert [told for told in tape.told if isinstance(told, tuple)] == [
+    assert [told for told in tape.told if isinstance(told, tuple) and told[0] != "frame"] == [
         ("start", 1, 1, 1000.0),
         ("stop",),
         ("start", 2, 1, 1000.0),
@@ -575,7 +686,8 @@ def test_frames_are_recorded_with_their_trial_and_attempts_have_recordings_of_th
     world.run(0.5)
     world.runner.post(ResumeAsked(1.0, "operator"))
     told = [told for told in tape.told if isinstance(told, tuple)]
-    assert told == [("start", 1, 1, 1000.0), ("frame", 500, 400), ("stop",), ("start", 1, 2, 1000.0)]
+    first = [("start", 1, 1, 1000.0), ("frame", 0, 0), ("frame", 500, 400), ("stop",)]
+    assert told == [*first, ("start", 1, 2, 1000.0), ("frame", 10**9, 10**9)]
 
 
 def test_a_trial_with_a_late_screen_or_a_late_servo_says_so(practising: World) -> None:

@@ -14,11 +14,12 @@ from study_app.haptics.clock import VirtualClock
 from study_app.haptics.servo import Servo
 from study_app.protocol.model import Protocol
 from study_app.protocol.schedule import build_schedule, draw_key, stream
-from study_app.session.events import Begin, Continue, EndAsked, ForceStopped, PauseAsked, ResumeAsked
-from study_app.session.pages import PausePage, TroublePage
+from study_app.session.events import Begin, Continue, EndAsked, ForceStopped, PauseAsked, RepeatAsked, ResumeAsked
+from study_app.session.pages import PausePage, TaskPage, TroublePage
 from study_app.session.ports import Ports
-from study_app.session.runner import BUTTON_STOP, SETTLED_S, Runner
+from study_app.session.runner import BUTTON_STOP, Runner
 from study_app.session.state import Phase
+from study_app.session.trial import SETTLED_S
 from study_app.store.journal import SessionClock
 from study_app.store.session import begin
 from study_app.store.tables import trials
@@ -36,13 +37,20 @@ class Bench:
         self.servo, self.device = servo, device
         self.journal = FakeJournal([])
         self.pages: list[Any] = []
+        self.paints = True
         plan = small.opened().plan
-        ports = Ports(servo, self.journal, self.pages.append, self.clock)
+        ports = Ports(servo, self.journal, self.present, self.clock)
         self.runner = Runner(plan.protocol, plan.schedule, plan.key, ports, plan.language)
         t_s = np.arange(0, 20, 0.005)
         device.follow(t_s, np.column_stack((0.03 * np.sin(6 * t_s), 0 * t_s, 0 * t_s)))
         self.runner.post(Begin(self.clock()))
         self.runner.post(Continue(self.clock()))
+
+    def present(self, page: Any) -> None:
+        """Paint a tank's first frame at once."""
+        self.pages.append(page)
+        if isinstance(page, TaskPage) and self.paints:
+            self.runner.frame_shown(self.servo.now_ns(), self.servo.now_ns())
 
     def clock(self) -> float:
         return self.servo.now_ns() / 1e9
@@ -64,6 +72,21 @@ def bench() -> Iterator[Bench]:
 
 def test_a_trial_is_felt(bench: Bench) -> None:
     assert bench.run(800).max() > 0.5
+
+
+def test_there_is_no_force_before_the_first_painted_frame_and_then_it_fades_in(bench: Bench) -> None:
+    bench.run(800)
+    bench.paints = False
+    bench.runner.post(RepeatAsked(bench.clock(), "the window was hidden"))
+    bench.run(60)
+    assert (bench.run(500) == 0).all()
+    assert bench.runner.task is not None
+    assert bench.runner.task.elapsed_s == 0
+    bench.runner.frame_shown(bench.servo.now_ns(), bench.servo.now_ns())
+    force_n = bench.run(500)
+    assert force_n[0] < 0.1
+    assert force_n.max() > 0.5
+    assert bench.runner.task.elapsed_s == pytest.approx(0.499, abs=0.002)
 
 
 def test_a_force_stop_is_zero_force_with_the_next_tick_and_until_it_is_faded_in(bench: Bench) -> None:
@@ -129,7 +152,7 @@ def test_a_task_is_followed_on_the_device_and_drawn_from_its_history(bench: Benc
 class Judged:
     """A whole practice trial on the real servo, kept in a real session: what its row says of it."""
 
-    def __init__(self, folder: Path, *, late_ns: int = 0, stall_s: float = 0.0) -> None:
+    def __init__(self, folder: Path, *, late_ns: int = 0, opening_s: float = 0.0, stall_s: float = 0.0) -> None:
         study = small.protocol()
         device, clock = ScriptedDevice(), VirtualClock()
         with device, Servo(device, clock=clock, elements=100) as servo:
@@ -152,6 +175,7 @@ class Judged:
                 runner = Runner(study, build_schedule(study, "P001", 1), store.key.codes, ports, "en")
                 runner.post(Begin(0.0))
                 runner.post(Continue(0.0))
+                servo.advance(round(opening_s * 1000))  # the tank is not on the screen yet
                 for frame in range(200):
                     if frame == 60:
                         clock._memory[0].now_ns += late_ns  # the system gave the servo no time
@@ -206,6 +230,14 @@ def test_the_error_of_the_delay_does_not_tell_whether_there_is_one() -> None:
 def test_a_late_servo_makes_its_trial_invalid(tmp_path: Path) -> None:
     row = Judged(tmp_path / "study", late_ns=30_000_000).row
     assert row["worst_gap_ms"] == pytest.approx(31, abs=1)
+    assert row["valid"] is False
+
+
+def test_a_tank_that_appears_late_makes_its_trial_invalid(tmp_path: Path) -> None:
+    row = Judged(tmp_path / "study", opening_s=0.4).row
+    assert row["first_frame_gap_ms"] == pytest.approx(419, abs=1)
+    assert row["worst_frame_gap_ms"] == pytest.approx(16)
+    assert row["duration_s"] == pytest.approx(3)
     assert row["valid"] is False
 
 

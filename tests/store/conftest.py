@@ -212,6 +212,7 @@ def made_samples(count: int, *, first_tick: int = 0, scene: int = 1, seed: int =
     samples["device_force_n"] = samples["force_n"]
     limited = generator.random(count) < 0.1
     samples["device_force_n"][limited] *= 0.8
+    samples["command_n"] = samples["device_force_n"]
     samples["limiters"][limited] = 8
     samples["fresh"] = generator.random(count) < 0.9
     samples["buttons"] = np.arange(count) // 700 % 16

@@ -3,7 +3,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from study_app.store.events import EVENTS, lacking_fields, unknown_events
+import pytest
+
+from study_app.store.events import EVENTS, problem, unknown_events
 from study_app.store.session import SessionStore
 
 OF_ALL = {"n": 1, "t_s": 0.0, "at": "2026-03-01T10:00:00.000+01:00"}
@@ -25,19 +27,36 @@ def test_whatever_the_store_writes_is_in_the_dictionary(
     attend(store)
     store.finish("completed")
     assert list(unknown_events(store.lines)) == []
-    assert list(lacking_fields(store.lines)) == []
+    assert [problem(each) for each in store.lines if problem(each)] == []
 
 
-def test_a_line_without_a_field_of_its_event_is_named() -> None:
-    lines = [line("note", kind="note"), line("paused"), line("resumed", by="operator"), {"n": 4, "event": "resumed"}]
-    assert list(lacking_fields(lines)) == [
-        "line 1 (note) lacks text",
-        "line 1 (paused) lacks by",
-        "line 4 (resumed) lacks t_s, at, by",
-    ]
+@pytest.mark.parametrize(
+    ("held", "sentence"),
+    [
+        (line("note", kind="note"), "(note) lacks text"),
+        ({"n": 4, "event": "resumed"}, "(resumed) lacks t_s, at, by"),
+        (line("weather") | {"at": "noon"}, "(weather) holds at 'noon', expected: time"),
+        (line("weather") | {"at": "2026-03-01T10:00:00.000"}, "(weather) holds at '2026-03-01T10:00:00.000', expected"),
+        (line("weather") | {"t_s": True}, "(weather) holds t_s True, expected: number"),
+        (line("weather") | {"t_s": 1e300}, "(weather) has t_s 1e+300"),
+        (line("weather") | {"t_s": -1.0}, "(weather) has t_s -1"),
+        ({"n": 4, "event": ["note"]}, "names no event"),
+        (line("page_shown", page=["consent"]), "(page_shown) holds page ['consent'], expected: text"),
+        (line("choice", trial="1", item="calm", value=3), "holds trial '1', expected: integer"),
+        (line("choice", trial=1, item="calm", value="x" * 999), "…, expected: integer"),
+        (line("responses", trial=1, attempt=1, items=[{"item": "calm"}]), "expected: list of answers"),
+        (line("trial_ended", trial=1, attempt=1, outcome="complete", force_peak_n="3"), "holds force_peak_n '3'"),
+        (line("preflight", checks=[3]), "holds checks [3], expected: list of objects"),
+    ],
+)
+def test_what_is_wrong_with_a_line_is_named(held: dict[str, Any], sentence: str) -> None:
+    said = problem(held)
+    assert said is not None
+    assert sentence in said
+    assert len(said) < 300
 
 
 def test_an_event_of_another_version_is_told_once_and_lacks_nothing() -> None:
-    lines = [line("weather"), line("note", kind="note", text=""), line("weather")]
+    lines = [line("weather", trial="x"), line("note", kind="note", text=""), line("weather")]
     assert list(unknown_events(lines)) == ["weather"]
-    assert list(lacking_fields(lines)) == []
+    assert [problem(each) for each in lines] == [None] * 3

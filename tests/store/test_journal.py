@@ -1,8 +1,10 @@
 from __future__ import annotations
 
+import contextlib
 import json
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager
@@ -12,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from study_app.errors import StoreError
@@ -23,9 +25,9 @@ AWKWARD = 'comma, "quote",\nnew line\r\n\ttab 🌊 \u2028\x85 =SUM(A1)' + "é" *
 
 def three_answers(path: Path) -> Path:
     with Journal.create(path) as journal:
-        journal.append("session_started", participant="P007")
+        journal.append("began", participant="P007")
         for trial in (1, 2, 3):
-            journal.append("choice", trial=trial, item="calm", value=trial, text='naïve 🌊, "q"\n')
+            journal.append("counted", trial=trial, item="calm", value=trial, text='naïve 🌊, "q"\n')
     return path
 
 
@@ -33,13 +35,13 @@ def test_a_line_explains_itself_and_is_returned_as_it_will_be_read(tmp_path: Pat
     path = tmp_path / "journal.jsonl"
     with Journal.create(path, clock) as journal:
         written = [
-            journal.append("page_shown", page="consent"),
-            journal.append("choice", t_s=12.3456789, item="calm", value=None),
+            journal.append("shown", page="consent"),
+            journal.append("counted", t_s=12.3456789, item="calm", value=None),
         ]
     assert read(path) == written
     assert written[1] == {
         "n": 2,
-        "event": "choice",
+        "event": "counted",
         "t_s": 12.345679,
         "at": "2026-03-01T10:00:12.345+01:00",
         "item": "calm",
@@ -54,7 +56,7 @@ def test_a_line_is_on_the_disk_when_append_returns(tmp_path: Path, monkeypatch: 
     with Journal.create(path) as journal:
         monkeypatch.setattr("study_app.store.journal.os.fsync", lambda _: flushed.append(path.read_bytes()))
         for count in (1, 2, 3):
-            journal.append("choice", value=count)
+            journal.append("counted", value=count)
             assert len(flushed) == count
             assert flushed[-1] == path.read_bytes()
     assert flushed[-1].count(b"\n") == 3
@@ -76,7 +78,7 @@ def test_cut_at_any_byte_it_reads_to_the_last_whole_line(tmp_path: Path) -> None
         assert contents.damage is None
 
 
-@pytest.mark.parametrize("tail", [b"\0" * 4096, b'{"n":5,"event"\n', b"\xff\xfe\n\0\0\n", b"[5]\n", b"7"])
+@pytest.mark.parametrize("tail", [b"\0" * 4096, b'{"n":5,"event"', b"\xff\xfe\0\0", b'{"n":5}', b"7"])
 def test_what_a_power_cut_leaves_at_the_end_is_left_out_and_counted(tmp_path: Path, tail: bytes) -> None:
     path = three_answers(tmp_path / "journal.jsonl")
     with path.open("ab") as file:
@@ -87,14 +89,20 @@ def test_what_a_power_cut_leaves_at_the_end_is_left_out_and_counted(tmp_path: Pa
     assert contents.damage is None
 
 
-def test_a_broken_line_before_whole_ones_is_damage_and_not_a_torn_tail(tmp_path: Path) -> None:
+@pytest.mark.parametrize("broken", [(1,), (3,), (2, 3), (1, 2, 3)])
+@pytest.mark.parametrize("tail", [b"", b'{"n":5,"ev'])
+def test_a_broken_line_with_its_newline_is_damage_wherever_it_is(
+    tmp_path: Path, broken: tuple[int, ...], tail: bytes
+) -> None:
     path = three_answers(tmp_path / "journal.jsonl")
     lines = path.read_bytes().split(b"\n")
-    lines[1] = lines[1][:20]
-    path.write_bytes(b"\n".join(lines))
-    with pytest.raises(StoreError, match=r"journal\.jsonl, line 2: damaged, though whole lines follow"):
+    for index in broken:
+        lines[index] = b"#" + lines[index][1:]
+    path.write_bytes(b"\n".join(lines) + tail)
+    with pytest.raises(StoreError, match=rf"journal\.jsonl, line {broken[0] + 1}: damaged; restore it from a copy"):
         read(path)
-    assert len(scan(path).lines) == 1
+    contents = scan(path)
+    assert (len(contents.lines), contents.torn_bytes) == (broken[0], 0)
 
 
 @pytest.mark.parametrize("order", [(0, 1, 3), (0, 1, 1, 2), (1, 2, 3)])
@@ -134,15 +142,15 @@ def test_after_a_full_disk_it_goes_on_where_it_was(
 ) -> None:
     path = tmp_path / "journal.jsonl"
     journal = Journal.create(path)
-    first = journal.append("choice", value=1)
+    first = journal.append("counted", value=1)
     with monkeypatch.context() as patched:
         if not mended:
             patched.setattr(journal, "_take_back", _refuse)
         with files_up_to(500), pytest.raises(StoreError, match=r"journal\.jsonl cannot be written \(File too large\)"):
-            journal.append("note", text=AWKWARD)
+            journal.append("said", text=AWKWARD)
     assert read(path) == [first]
     assert (scan(path).torn_bytes == 0) == mended
-    second = journal.append("choice", value=2)
+    second = journal.append("counted", value=2)
     journal.close()
     assert second["n"] == 2
     assert read(path) == [first, second]
@@ -152,18 +160,163 @@ def _refuse() -> None:
     raise OSError(28, "No space left on device")
 
 
+class Disk:
+    """What ``os.fsync`` does while it is patched: remembers what is on the disk, and fails, or holds, where told to.
+
+    A flush that fails loses what it was to flush, as a system does that drops the pages it could not write.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.content = b""
+        self.by: list[int] = []
+        self.fails = 0
+        self.failed = threading.Event()
+        self.flushed = threading.Event()
+        self.free = threading.Event()
+        self.free.set()
+
+    def fsync(self, _descriptor: int) -> None:
+        assert self.free.wait(20)
+        self.by.append(threading.get_ident())
+        if self.fails:
+            self.fails -= 1
+            with self.path.open("r+b") as file:
+                size = file.seek(0, 2)
+                file.seek(len(self.content))
+                file.write(bytes(size - len(self.content)))
+            self.failed.set()
+            raise OSError(5, "Input/output error")
+        self.content = self.path.read_bytes()
+        self.flushed.set()
+
+    @property
+    def mine(self) -> int:
+        """How many flushes the thread that asks waited for."""
+        return self.by.count(threading.get_ident())
+
+
+@pytest.fixture
+def disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Disk:
+    made = Disk(tmp_path / "journal.jsonl")
+    monkeypatch.setattr("study_app.store.journal.os.fsync", made.fsync)
+    return made
+
+
+def test_a_line_that_nobody_waits_for_is_flushed_behind_and_in_order(disk: Disk) -> None:
+    journal = Journal.create(disk.path)
+    before = disk.mine  # the folder's entry
+    disk.free.clear()  # no flush ends
+    written = [journal.append("seen", waits=False, item=number) for number in range(9)]
+    assert read(disk.path) == written
+    assert disk.mine == before
+    disk.free.set()
+    answer = journal.append("counted", value=1)
+    assert disk.content.count(b"\n") == 10
+    journal.append("shown", waits=False)
+    journal.close()
+    assert disk.content == disk.path.read_bytes()
+    assert read(disk.path)[9] == answer
+    assert len(disk.by) - before <= 4  # one flush is enough for all lines that wait
+
+
+def test_a_flush_that_fails_behind_is_told_with_the_next_line_and_loses_none(
+    disk: Disk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("study_app.store.journal.RETRY_S", 3600.0)
+    journal = Journal.create(disk.path)
+    first = journal.append("counted", value=1)
+    disk.fails = 2
+    shown = journal.append("seen", waits=False, item="calm")
+    assert disk.failed.wait(20)
+    with pytest.raises(StoreError, match=r"journal\.jsonl cannot be written \(Input/output error\)"):
+        journal.append("seen", waits=False, item="strong")
+    second = journal.append("seen", waits=False, item="strong")  # waits, since one failed
+    assert disk.content == disk.path.read_bytes()
+    journal.close()
+    assert read(disk.path) == [first, shown, second]
+    assert [line["n"] for line in (first, shown, second)] == [1, 2, 3]
+
+
+def test_a_flush_that_fails_in_the_background_is_told_and_repeated(disk: Disk, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("study_app.store.journal.RETRY_S", 0.0)
+    journal = Journal.create(disk.path)
+    journal.append("counted", value=1)
+    journal.check_flushed()
+    disk.fails = -1  # every flush fails
+    disk.flushed.clear()
+    shown = journal.append("seen", waits=False, item="calm")
+    for _ in range(3):
+        assert disk.failed.wait(20)
+        disk.failed.clear()
+    with pytest.raises(StoreError, match=r"journal\.jsonl cannot be written \(Input/output error\)"):
+        journal.check_flushed()
+    with journal._flushing:  # no flush is under way
+        disk.fails = 0
+    assert disk.flushed.wait(20)
+    with journal._flushing:
+        journal.check_flushed()
+    assert disk.content == disk.path.read_bytes()
+    assert read(disk.path)[-1] == shown
+    journal.close()
+
+
+def test_a_close_that_cannot_flush_the_last_lines_says_so(disk: Disk, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("study_app.store.journal.RETRY_S", 3600.0)
+    journal = Journal.create(disk.path)
+    disk.fails = -1
+    journal.append("seen", waits=False, item="calm")
+    with pytest.raises(StoreError, match="Input/output error"):
+        journal.close()
+    assert journal.closed
+    journal.close()
+
+
+@settings(max_examples=60, deadline=None)
+@given(lines=st.lists(st.tuples(st.booleans(), st.booleans()), max_size=12), cut=st.integers(0, 400))
+def test_a_power_cut_takes_no_answer_and_leaves_no_hole(
+    tmp_path_factory: pytest.TempPathFactory, lines: list[tuple[bool, bool]], cut: int
+) -> None:
+    """Of what no flush has reached yet any part may be on the disk; flushes may fail."""
+    disk = Disk(tmp_path_factory.mktemp("cut") / "journal.jsonl")
+    with pytest.MonkeyPatch.context() as patched, contextlib.ExitStack() as over:
+        patched.setattr("study_app.store.journal.os.fsync", disk.fsync)
+        journal = Journal.create(disk.path)
+        over.callback(journal.close)
+        kept: list[Any] = []
+        answers = 0
+        for waits, fails in lines:
+            disk.fails = int(fails)
+            try:
+                kept.append(journal.append("counted" if waits else "seen", waits=waits))
+            except StoreError:
+                continue
+            if waits:
+                answers = len(kept)
+        with journal._flushing:  # no flush is under way
+            content, flushed = disk.path.read_bytes(), disk.content
+            disk.fails = 0
+    if flushed == content[: len(flushed)]:
+        flushed = content[: len(flushed) + cut]
+    disk.path.write_bytes(flushed)
+    left = scan(disk.path)
+    assert left.damage is None
+    assert left.lines == kept[: len(left.lines)]
+    assert len(left.lines) >= answers
+
+
 def test_after_its_end_it_takes_nothing(tmp_path: Path) -> None:
     journal = Journal.create(tmp_path / "journal.jsonl")
     journal.close()
-    with pytest.raises(StoreError, match="'note' came after the session's end"):
-        journal.append("note", text="late")
+    with pytest.raises(StoreError, match="'said' came after the session's end"):
+        journal.append("said", text="late")
 
 
 def test_a_field_cannot_take_the_place_of_a_lines_number_or_time(tmp_path: Path) -> None:
     with Journal.create(tmp_path / "journal.jsonl") as journal:
         for own in ("n", "at"):
             with pytest.raises(ValueError, match="are the journal's own"):
-                journal.append("note", **{own: 1})
+                journal.append("said", **{own: 1})
     assert read(tmp_path / "journal.jsonl") == []
 
 
@@ -175,7 +328,7 @@ journal = Journal.create(Path(sys.argv[1]))
 count = 0
 while True:
     count += 1
-    journal.append("choice", value=count, text="x" * (count % 977))
+    journal.append("counted", value=count, text="x" * (count % 977))
     print(count, flush=True)
 """
 
@@ -199,7 +352,7 @@ def test_setting_the_wall_clock_back_moves_no_time(tmp_path: Path) -> None:
     clock = SessionClock(lambda: now[0], origin)
     with Journal.create(tmp_path / "journal.jsonl", clock) as journal:
         now[0] += 2_500_000_000
-        line = journal.append("page_shown", page="consent")
+        line = journal.append("shown", page="consent")
     assert line["t_s"] == 2.5
     assert line["at"] == "2026-10-25T02:00:01.500+02:00"
 
@@ -237,13 +390,32 @@ def test_a_reopened_journal_goes_on_after_its_last_whole_line(tmp_path: Path) ->
     for torn in (b"", b'{"n":5,"ev', b"\0" * 99):
         path.write_bytes(whole + torn)
         with Journal.reopen(path, scan(path), SessionClock()) as journal:
-            line = journal.append("choice", value=4)
+            line = journal.append("counted", value=4)
             assert not journal.closed
         assert journal.closed
         assert line["n"] == 5
         assert read(path)[-1] == line
         assert path.read_bytes().startswith(whole + b'{"n":5')
-    assert [name.name for name in tmp_path.iterdir()] == ["journal.jsonl"]
+    kept = sorted(name.name for name in tmp_path.iterdir())
+    assert kept == ["journal-torn-1.txt", "journal-torn-2.txt", "journal.jsonl"]
+
+
+@pytest.mark.parametrize("other", [None, b"", b"another"])
+def test_a_journal_that_is_no_longer_under_its_name_takes_no_line_until_it_is_back(
+    tmp_path: Path, other: bytes | None
+) -> None:
+    path = tmp_path / "journal.jsonl"
+    with Journal.create(path) as journal:
+        journal.append("counted", value=1)
+        path.rename(tmp_path / "away.jsonl")
+        if other is not None:
+            path.write_bytes(other)
+        for waits in (True, False):
+            with pytest.raises(StoreError, match=r"journal\.jsonl was moved, deleted or replaced .*: put it back"):
+                journal.append("counted", value=2, waits=waits)
+        (tmp_path / "away.jsonl").replace(path)
+        journal.append("counted", value=2)
+    assert [line["value"] for line in read(path)] == [1, 2]
 
 
 def test_numbers_become_plain_and_those_that_are_none_null() -> None:
@@ -263,8 +435,8 @@ json_values = st.recursive(
 def test_any_value_comes_back(tmp_path_factory: pytest.TempPathFactory, value: Any) -> None:
     path = tmp_path_factory.mktemp("journal") / "journal.jsonl"
     with Journal.create(path) as journal:
-        journal.append("note", text=AWKWARD, value=value)
-        journal.append("note", text="")
+        journal.append("said", text=AWKWARD, value=value)
+        journal.append("said", text="")
     assert [(line["text"], line.get("value")) for line in read(path)] == [(AWKWARD, value), ("", None)]
     assert path.read_bytes().count(b"\n") == 2
 
@@ -272,5 +444,5 @@ def test_any_value_comes_back(tmp_path_factory: pytest.TempPathFactory, value: A
 def test_half_a_surrogate_pair_is_kept_as_an_escape(tmp_path: Path) -> None:
     path = tmp_path / "journal.jsonl"
     with Journal.create(path) as journal:
-        journal.append("note", text="half \ud83c here")
+        journal.append("said", text="half \ud83c here")
     assert json.loads(path.read_text(encoding="utf-8"))["text"] == "half \ud83c here"

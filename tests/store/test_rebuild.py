@@ -138,7 +138,7 @@ def test_a_damaged_journal_is_refused_untouched(tmp_path: Path, ended: SessionSt
     lines = ended.folder.journal.read_bytes().split(b"\n")
     ended.folder.journal.write_bytes(b"\n".join([lines[0], lines[1][:20], *lines[2:]]))
     before = every_byte(tmp_path)
-    with pytest.raises(StoreError, match="line 2: damaged, though whole lines follow"):
+    with pytest.raises(StoreError, match="line 2: damaged; restore it from a copy"):
         rebuild(ended.folder.path)
     assert every_byte(tmp_path) == before
     assert not is_open(ended.folder.path)

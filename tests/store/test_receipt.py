@@ -22,6 +22,11 @@ def test_the_protocol_is_kept_without_its_conditions(protocol: Protocol) -> None
     assert shown["limits"] == whole["limits"]
     assert shown["blocks"]["liquids"]["codes"] == ["L1", "L2"]
     assert shown["blocks"]["practice"]["codes"] == ["practice"]
+    assert {name: block["compares"] for name, block in shown["blocks"].items() if block["phase"] == "main"} == {
+        "liquids": "liquids",
+        "delays": "delays",
+    }
+    assert shown["blocks"]["practice"]["compares"] is None
     assert not any("conditions" in block for block in shown["blocks"].values())
 
 

@@ -121,8 +121,8 @@ def test_half_an_hour_takes_at_most_sixty_megabytes(tmp_path: Path, samples_of: 
 def test_a_recording_says_what_it_is_without_being_read(tmp_path: Path, samples_of: Make) -> None:
     facts = read_facts(write(tmp_path / "trial-003.parquet", samples_of(2_500), rate_hz=500).path)
     assert facts.pop("crc32")["rows"] == 500
-    assert len(facts.pop("first_device_force_n")) == 3
-    assert facts == {"format": 1, "kind": "samples", **FACTS, "rate_hz": 500, "dropped": 0, "rows": 2_500}
+    assert facts.pop("first_device_force_n") == facts.pop("first_command_n")
+    assert facts == {"format": 2, "kind": "samples", **FACTS, "rate_hz": 500, "dropped": 0, "rows": 2_500}
 
 
 def test_any_reader_of_parquet_finds_columns_with_unit_and_meaning(tmp_path: Path, samples_of: Make) -> None:
@@ -217,9 +217,9 @@ def test_what_is_no_recording_is_named(tmp_path: Path, samples_of: Make) -> None
 
 def test_a_newer_format_is_told(tmp_path: Path, samples_of: Make, monkeypatch: pytest.MonkeyPatch) -> None:
     with monkeypatch.context() as newer:
-        newer.setattr(recording, "FORMAT", 2)
+        newer.setattr(recording, "FORMAT", 3)
         path = write(tmp_path / "trial-003.parquet", samples_of(10)).path
-    with pytest.raises(StoreError, match="has format 2, this version reads 1: use a newer version"):
+    with pytest.raises(StoreError, match="has format 3, this version reads 1 to 2: use a newer version"):
         read_samples(path)
 
 

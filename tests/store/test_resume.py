@@ -178,8 +178,8 @@ def test_a_trial_under_way_was_interrupted(
     assert ",interrupted," in content.splitlines()[1]
 
 
-@pytest.mark.parametrize("tail", [b'{"n":3,"event":"choi', b"\0" * 4096, b'{"n":3}', b"\xff\n"])
-def test_a_torn_line_is_cut_off_and_counted(start: Callable[..., SessionStore], again: Again, tail: bytes) -> None:
+@pytest.mark.parametrize("tail", [b'{"n":3,"event":"choi', b"\0" * 4096, b'{"n":3}', b"\xff"])
+def test_a_torn_line_is_cut_off_counted_and_kept(start: Callable[..., SessionStore], again: Again, tail: bytes) -> None:
     with start() as store:
         store.append("note", kind="note", text="kept")
     whole = store.folder.journal.read_bytes()
@@ -189,6 +189,32 @@ def test_a_torn_line_is_cut_off_and_counted(start: Callable[..., SessionStore], 
     assert store.folder.journal.read_bytes().startswith(whole + b'{"n":3,"event":"session_resumed"')
     assert resumed.lines[-1]["torn_bytes"] == len(tail)
     assert journal.read(store.folder.journal) == list(resumed.lines)
+    assert (store.folder.path / "journal-torn-1.txt").read_bytes() == tail
+
+
+def test_what_was_cut_off_is_never_written_over(start: Callable[..., SessionStore], again: Again) -> None:
+    store = start()
+    store.close()
+    for tail in (b"first", b"second"):
+        with store.folder.journal.open("ab") as file:
+            file.write(tail)
+        again().close()
+    kept = sorted(store.folder.path.glob("journal-torn-*"))
+    assert [path.read_bytes() for path in kept] == [b"first", b"second"]
+
+
+def test_damaged_lines_at_the_end_are_no_torn_tail(
+    tmp_path: Path, start: Callable[..., SessionStore], again: Again
+) -> None:
+    with start() as store:
+        for text in ("one", "two"):
+            store.append("note", kind="note", text=text)
+    lines = store.folder.journal.read_bytes().split(b"\n")
+    store.folder.journal.write_bytes(b"\n".join([lines[0], *(b"#" + line[1:] for line in lines[1:3]), b""]))
+    before = every_byte(tmp_path)
+    with pytest.raises(StoreError, match="line 2: damaged"):
+        again()
+    assert every_byte(tmp_path) == before
 
 
 def test_a_finished_session_is_refused_untouched(
@@ -371,7 +397,7 @@ def test_a_damaged_journal_is_refused_untouched(
     lines = store.folder.journal.read_bytes().split(b"\n")
     store.folder.journal.write_bytes(b"\n".join([lines[0], lines[1][:20], *lines[2:]]))
     before = every_byte(tmp_path)
-    with pytest.raises(StoreError, match="line 2: damaged, though whole lines follow"):
+    with pytest.raises(StoreError, match="line 2: damaged; restore it from a copy"):
         again()
     assert every_byte(tmp_path) == before
 

@@ -102,7 +102,13 @@ def test_the_first_line_says_what_is_run(start: Callable[..., SessionStore]) -> 
         "protocol_hash": SOURCE_HASH,
         "version": __version__,
         "device": "scripted",
-        "limits": {"lateness_ms": 2.0, "worst_gap_ms": 20.0, "delay_error_ms": 25.0, "frame_gap_ms": 250.0},
+        "limits": {
+            "lateness_ms": 2.0,
+            "worst_gap_ms": 20.0,
+            "delay_error_ms": 25.0,
+            "frame_gap_ms": 250.0,
+            "withheld_percent": 5.0,
+        },
     }
 
 

@@ -183,11 +183,15 @@ def test_notes_and_marks_stay_with_the_trial_they_were_made_in() -> None:
         ({"lateness_p99_ms": 0.1, "worst_gap_ms": 20.5, "delay_error_p95_ms": 1.0}, False),
         ({"lateness_p99_ms": 0.1, "worst_gap_ms": 1.0, "delay_error_p95_ms": -30.0}, False),
         ({"lateness_p99_ms": 0.1, "worst_gap_ms": 1.0, "delay_error_p95_ms": None}, True),
+        ({"lateness_p99_ms": 0.1, "withheld_share": 0.05}, True),
+        ({"lateness_p99_ms": 0.1, "withheld_share": 0.0501}, False),
+        ({"lateness_p99_ms": 0.1, "withheld_share": None}, True),
         ({}, None),
     ],
 )
 def test_a_trial_is_valid_within_the_protocols_limits(measured: dict[str, float], *, valid: bool | None) -> None:
-    script = Script(limits={"lateness_ms": 2, "worst_gap_ms": 20, "delay_error_ms": 25})
+    limits = {"lateness_ms": 2, "worst_gap_ms": 20, "delay_error_ms": 25, "withheld_percent": 5}
+    script = Script(limits=limits)
     script.trial(1)
     script.end(1, **measured)
     assert trials(script.lines)[0]["valid"] is valid

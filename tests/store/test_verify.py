@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import base64
+import csv
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -12,9 +13,16 @@ from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
 from study_app.protocol.schedule import build_schedule
 from study_app.store import blinding, journal, receipt
+from study_app.store.abandoned import never_begun
+from study_app.store.columns import TABLES
 from study_app.store.exclusions import exclude
+from study_app.store.layout import StudyFolder
+from study_app.store.participants import write_participants
+from study_app.store.rebuild import rebuild
 from study_app.store.session import SessionStore
+from study_app.store.tables import only
 from study_app.store.verify import Findings, verify
+from tests.store.earlier import TRIALS_HEADER
 
 SESSION = "data/sub-P007/ses-01"
 
@@ -56,6 +64,18 @@ def study(
 
 def told(findings: Findings) -> str:
     return "\n".join(map(str, findings.errors))
+
+
+def test_a_table_of_an_earlier_version_is_compared_in_the_columns_it_has(study: Path) -> None:
+    (path,) = (study / SESSION).glob("*trials_data.csv")
+    earlier = only(
+        path.read_bytes(), [column for column in TABLES["trials"] if column.name in TRIALS_HEADER.split(",")]
+    )
+    assert earlier.startswith(TRIALS_HEADER.encode() + b"\n")
+    path.write_bytes(earlier)
+    assert [line for line in told(verify(study)).splitlines() if "its checksum differs" not in line] == []
+    path.write_bytes(earlier.replace(b"complete", b"timeout", 1))
+    assert "is not what the journal gives, from line" in told(verify(study))
 
 
 def warned(findings: Findings) -> str:
@@ -142,7 +162,7 @@ FRAMES = f"{SESSION}/recordings/trial-002_attempt-2_frames.parquet"
         (f"{SESSION}/receipt.json", of_receipt(key_hash="0" * 64), "another key's hash"),
         (f"{SESSION}/receipt.json", append(b"}"), "is no receipt"),
         (f"{SESSION}/receipt.json", Path.unlink, "receipt.json: cannot be read"),
-        (f"{SESSION}/checksums.sha256", Path.unlink, "checksums.sha256: cannot be read"),
+        (f"{SESSION}/checksums.sha256", Path.unlink, "checksums.sha256: is missing: was the program killed at the"),
         (f"{SESSION}/checksums.sha256", append(b"\xff"), "is no list of checksums"),
         (f"{SESSION}/mood.txt", lambda path: path.write_text("fine"), "mood.txt: has come since the session ended"),
         (RECORDING, Path.unlink, "is missing, though the journal tells of it (trial 1, attempt 1)"),
@@ -201,7 +221,7 @@ def test_what_should_be_known_is_a_warning(study: Path, start: Callable[..., Ses
     (store.folder.path / ".receipt.json.0123abcd.tmp").write_bytes(b"{")
     (study / "data" / ".x.csv.0123abcd.tmp").write_bytes(b"{")
     store.folder.recordings.mkdir()
-    (store.folder.recordings / "trial-009.parquet").write_bytes(b"PAR1")
+    (store.folder.recordings / "trial-002.parquet").write_bytes(b"PAR1")
     (study / "data" / "sub-P010" / "ses-01").mkdir(parents=True)
     open_one = start("P011")
     findings = verify(study)
@@ -212,7 +232,7 @@ def test_what_should_be_known_is_a_warning(study: Path, start: Callable[..., Ses
         "sub-P009/ses-01/journal.jsonl: has events 'weather', which this version does not know",
         "sub-P009/ses-01/.receipt.json.0123abcd.tmp: was left half-written",
         "sub-P009/ses-01/recordings: trial 1, attempt 1 has none: No space left on device",
-        "sub-P009/ses-01/recordings/trial-009.parquet: is in no line of the journal",
+        "sub-P009/ses-01/recordings/trial-002.parquet: is in no line of the journal",
         "sub-P010/ses-01: was claimed, and its program was ended before it wrote a journal",
         "sub-P011/ses-01: runs in another program",
         "data/.x.csv.0123abcd.tmp: was left half-written by a program that was ended, or is just being written",
@@ -346,3 +366,102 @@ def test_nothing_of_the_key_is_shown(study: Path) -> None:
 def test_a_folder_that_is_no_study_is_named(tmp_path: Path) -> None:
     with pytest.raises(StoreError, match="is no study's folder"):
         verify(tmp_path)
+
+
+def test_a_description_of_an_earlier_version_is_a_warning_and_a_column_it_never_had_an_error(study: Path) -> None:
+    path = study / "dataset_description.json"
+    content = json.loads(path.read_bytes())
+    variables = [it for it in content["variableMeasured"] if it["name"] != "withheld_share"]
+    variables[0] = variables[0] | {"description": "In other words."}
+    path.write_text(json.dumps(content | {"variableMeasured": variables}))
+    findings = verify(study)
+    assert not any(error.place == path.name for error in findings.errors)
+    assert "describes the columns as an earlier version of the program did" in warned(findings)
+    path.write_text(json.dumps(content | {"variableMeasured": variables[1:]}))
+    assert "is not what this version writes" in told(verify(study))
+
+
+def test_damaged_lines_at_the_end_are_an_error(study: Path, start: Callable[..., SessionStore]) -> None:
+    with start("P009") as store:
+        for text in ("one", "two"):
+            store.append("note", kind="note", text=text)
+    lines = store.folder.journal.read_bytes().split(b"\n")
+    store.folder.journal.write_bytes(b"\n".join([lines[0], *(b"#" + line[1:] for line in lines[1:3]), b""]))
+    assert "sub-P009/ses-01/journal.jsonl: line 2: damaged; restore it from a copy" in told(verify(study))
+
+
+def only_the_journals_lines(count: int) -> Callable[[Path], None]:
+    def act(path: Path) -> None:
+        path.write_bytes(b"".join(path.read_bytes().splitlines(keepends=True)[:count]))
+
+    return act
+
+
+@pytest.mark.parametrize(
+    ("damage", "sentence"),
+    [
+        (Path.unlink, "journal.jsonl: is missing, though receipt"),
+        (only_the_journals_lines(0), "journal.jsonl: holds no whole line, though receipt"),
+        (lambda path: path.write_bytes(bytes(path.stat().st_size)), "journal.jsonl: holds no whole line, though"),
+    ],
+)
+@pytest.mark.parametrize("left", ["receipt.json", "checksums.sha256", "*_data.csv", "recordings/*"])
+def test_a_lost_journal_is_an_error_by_whatever_else_is_left(
+    study: Path, damage: Callable[[Path], Any], sentence: str, left: str
+) -> None:
+    folder = study / SESSION
+    damage(folder / "journal.jsonl")
+    kept = {folder / "journal.jsonl", folder / "receipt.json", *folder.glob(left)}
+    for path in folder.rglob("*"):
+        if path.is_file() and path not in kept:
+            path.unlink()
+    if left != "receipt.json":
+        of_receipt(status="unfinished")(folder / "receipt.json")
+    assert sentence in told(verify(study))
+    assert not never_begun(folder)
+    write_participants(StudyFolder(study), "brackish")
+    rows = list(csv.DictReader((study / PARTICIPANTS).read_text(encoding="utf-8").splitlines()))
+    assert [(row["participant"], row["study"], row["status"]) for row in rows] == [
+        ("P007", "brackish", "damaged"),
+        ("P008", "brackish", "withdrawn"),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("left", "sentence"),
+    [
+        ("checksums.sha256", "checksums.sha256: was made when the session had ended, though the journal has no end"),
+        ("*responses_data.csv", "responses_data.csv: is not what the journal gives"),
+        ("*trials_data.csv", "trials_data.csv: is not what the journal gives"),
+        ("recordings/trial-004.parquet", "trial-004.parquet: is of a trial that the journal never started"),
+    ],
+)
+def test_a_journal_cut_in_half_says_less_than_what_is_left(study: Path, left: str, sentence: str) -> None:
+    folder = study / SESSION
+    only_the_journals_lines(5)(folder / "journal.jsonl")
+    of_receipt(status="unfinished", reason="", ended_at=None)(folder / "receipt.json")
+    kept = {folder / "journal.jsonl", folder / "receipt.json", *folder.glob(left)}
+    for path in folder.rglob("*"):
+        if path.is_file() and path not in kept:
+            path.unlink()
+    assert sentence in told(verify(study))
+
+
+def test_a_receipt_of_a_session_resumed_more_often_than_the_journal_tells_is_an_error(study: Path) -> None:
+    of_receipt(resumed=[{"at": "now"}])(study / SESSION / "receipt.json")
+    assert "tells that the session was resumed more often than the journal does" in told(verify(study))
+
+
+def test_a_session_killed_between_its_last_line_and_its_checksums_is_finished_by_rebuild(
+    study: Path, start: Callable[..., SessionStore], attend: Callable[[SessionStore], None]
+) -> None:
+    store = start("P009")
+    attend(store)
+    store.append("session_ended", status="completed", reason="")
+    store.close()
+    found = told(verify(study))
+    for name in ("receipt.json: its status is 'unfinished'", "checksums.sha256: is missing"):
+        (line,) = (line for line in found.splitlines() if f"sub-P009/ses-01/{name}" in line)
+        assert "rebuild" in line
+    rebuild(store.folder.path)
+    assert told(verify(study)) == ""

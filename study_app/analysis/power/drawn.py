@@ -10,10 +10,10 @@ from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as t_distribution
 
 from study_app.analysis.measures import Array
-from study_app.analysis.statistics.lattice import doubled_ranks
+from study_app.analysis.statistics.equivalence_power import equivalent as shows_equivalence
+from study_app.analysis.statistics.equivalence_power import sizes
 
 DRAWS: Final = 1999
 """Rearrangements; the report goes through all of them, or draws more."""
@@ -78,10 +78,10 @@ def signed(answers: Array, rng: np.random.Generator) -> Array:
     differences = answers[:, :, 0] - answers[:, :, 1]
     studies, n, items = differences.shape
     flat = differences.transpose(0, 2, 1).reshape(-1, n)
-    sizes = _sizes(flat).astype(np.float32)
-    whole = sizes.sum(axis=1)
-    up = (rng.random((DRAWS, n)) < 0.5).astype(np.float32) @ sizes.T
-    seen = np.where(flat > 0, sizes, 0).sum(axis=1)
+    ranked = sizes(flat).astype(np.float32)
+    whole = ranked.sum(axis=1)
+    up = (rng.random((DRAWS, n)) < 0.5).astype(np.float32) @ ranked.T
+    seen = np.where(flat > 0, ranked, 0).sum(axis=1)
     p = _p(np.maximum(up, whole - up), np.maximum(seen, whole - seen))
     return p.reshape(studies, items)
 
@@ -92,38 +92,15 @@ def _p(drawn: Single, seen: Single) -> Array:
 
 
 def equivalent(differences: Array, bound: float, alpha: float, rng: np.random.Generator) -> NDArray[np.bool_]:
-    """Return whether equivalence within ± ``bound`` is shown as in the report: by t, by signs and by signed ranks.
+    """Return whether equivalence within ± ``bound`` is shown as in the report.
 
     Parameters
     ----------
     differences : (studies, participants, …) array
     """
-    n = differences.shape[1]
-    spread = differences.std(axis=1, ddof=1)
-    reach = float(t_distribution.ppf(1 - alpha, n - 1)) * spread / np.sqrt(n)
-    shown = np.asarray((spread > 0) & (np.abs(differences.mean(axis=1)) + reach <= bound))
-    rows = np.moveaxis(differences, 1, -1)[shown]
-    up = (rng.random((DRAWS, n)) < 0.5).astype(np.float32)
-    agreed = np.ones(len(rows), dtype=bool)
-    for shifted in (rows + bound, bound - rows):
-        agreed &= _above(np.abs(shifted), shifted > 0, up) <= alpha
-        agreed &= _above(_sizes(shifted), shifted > 0, up) <= alpha
-    shown[shown] = agreed
-    return shown
-
-
-def _sizes(differences: Array) -> Array:
-    """Return the (doubled) ranks of differences (rows, n) among those that are not 0, whose own are 0."""
-    if not len(differences):
-        return differences
-    ranked = doubled_ranks(np.abs(differences)) - 2 * (differences == 0).sum(axis=1, keepdims=True)
-    return np.where(differences == 0, 0, ranked)
-
-
-def _above(sizes: Array, positive: NDArray[np.bool_], up: Single) -> Array:
-    """Return the one-sided p (rows,) that the ``positive`` of ``sizes`` (rows, n) outweigh the others."""
-    seen = np.where(positive, sizes, 0).sum(axis=1).astype(np.float32)
-    return _p(up @ sizes.T.astype(np.float32), seen * np.float32(1 - 1e-6))
+    rows = np.moveaxis(differences, 1, -1)
+    shown = shows_equivalence(rows.reshape(-1, rows.shape[-1]), bound, alpha, rng, DRAWS)
+    return np.asarray(shown.reshape(rows.shape[:-1]))
 
 
 def holm(ps: Array, alpha: float) -> NDArray[np.bool_]:

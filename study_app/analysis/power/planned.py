@@ -86,8 +86,8 @@ def plan(protocol: Protocol, felt: Feelings) -> Plan:
 def _planned(protocol: Protocol, block: Block, felt: Feelings, language: str) -> Planned:
     conditions = list(block.conditions)
     delays = {name: protocol.conditions[name].delay_ms for name in conditions}
-    one_liquid = len({protocol.conditions[name].liquid_ids for name in conditions}) == 1
-    kind: Kind = "delays" if one_liquid and len(set(delays.values())) > 1 else "liquids"
+    kind = protocol.compared_in(block.id)
+    assert kind is not None  # noqa: S101 - a main block
     if kind == "delays":
         conditions.sort(key=delays.__getitem__)
     questionnaire = protocol.questionnaire_of(block.id)

@@ -73,12 +73,16 @@ def _delivered(study: Study, results: Results) -> Iterator[str]:
     yield paragraph(
         "Age of what was drawn, less the delay asked for: mean over trials of each trial's mean, and the trial whose "
         "mean was farthest off; on the program's clock, without the display's own latency. Within limits: "
-        + "; ".join(
-            f"{what.replace('_ms', '').replace('_', ' ')} at most {limit:g} ms" for what, limit in limits.items()
-        )
+        + "; ".join(_limit(what, limit) for what, limit in limits.items())
         + ". Trials beyond them are counted all the same, unless they are excluded above.",
         "soft",
     )
+
+
+def _limit(what: str, limit: float) -> str:
+    """Return a limit in words: "frame gap at most 250 ms"."""
+    name, _, unit = what.rpartition("_")
+    return f"{name.replace('_', ' ')} at most {limit:g} {'%' if unit == 'percent' else unit}"
 
 
 def _within(one: Delivered) -> str:

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict
+from functools import partial
 from importlib import metadata
 from platform import python_version
 from typing import Any, Final
 
 from study_app import __version__
 from study_app.analysis.codebook import head
+from study_app.analysis.failures import Failure, Failures
 from study_app.analysis.judging import ALONE, HOLM
 from study_app.analysis.report.words import name
-from study_app.analysis.results import Against, BlockFound, Results, Tested, p_of_difference, plain
+from study_app.analysis.results import Against, BlockFound, Results, Tested, plain
 from study_app.analysis.statistics.outcome import Outcome
 from study_app.analysis.tables import Study
 from study_app.store import blinding
@@ -67,9 +69,14 @@ MOTION: Final = (
 )
 
 
+def tests(results: Results) -> list[dict[str, Any]]:
+    """Return a row for every test."""
+    return [row for found in results.blocks for row in _tests(found)]
+
+
 def tests_csv(results: Results) -> bytes:
     """Return a table with a row for every test."""
-    return csv_bytes(TESTS, [row for found in results.blocks for row in _tests(found)])
+    return csv_bytes(TESTS, tests(results))
 
 
 def motion_csv(results: Results) -> bytes:
@@ -96,6 +103,7 @@ def _tests(found: BlockFound) -> Iterator[dict[str, Any]]:
     for question, tests in (
         ("settings differ", found.omnibus),
         ("answers follow the delay", found.trends),
+        ("sessions differ", found.by_session),
         ("settings differ, mixed model", found.mixed),
         ("settings differ, incomplete participants too", found.incomplete),
     ):
@@ -130,7 +138,7 @@ def _differs(found: BlockFound, against: Against) -> dict[str, Any]:
     return _row(found, "a delay differs", outcome) | {
         "test": "difference, paired",
         "statistic": outcome.t,
-        "p": p_of_difference(outcome),
+        "p": outcome.p_difference,
         "method": "t test, two-sided" if outcome.p_different_ranks is None else by,
         "p_adjusted": against.p_adjusted,
         "smallest_p": None if outcome.p_different_ranks is None else 0.5 ** (outcome.n - 1),
@@ -179,23 +187,28 @@ def _row(found: BlockFound, question: str, outcome: Outcome) -> dict[str, Any]:
     }
 
 
-def document(study: Study, results: Results, texts: Mapping[str, Any]) -> bytes:
-    """Return everything as JSON; ``texts`` are the findings in words."""
-    content = {
-        "format": FORMAT,
-        "program": f"liquid-study {__version__}",
-        "versions": versions(),
-        "study": {
+def document(study: Study, results: Results, texts: Mapping[str, Any], failures: Failures) -> bytes:
+    """Return everything as JSON; ``texts`` are the findings in words. A part that fails is null."""
+    parts: dict[str, Callable[[], Any]] = {
+        "versions": versions,
+        "study": lambda: {
             **head(study),
             "blinded": not study.revealed,
             "key_opened": list(blinding.reveals(study.folder)),
         },
-        "sessions": sessions(study),
-        "exclusions": [asdict(one) for one in study.exclusions],
-        "doubts": [{"file": _within(study, doubt.path), "what": doubt.what} for doubt in study.doubts],
-        "files": files(study),
-        **texts,
-        "results": plain(results),
+        "sessions": lambda: sessions(study),
+        "exclusions": lambda: [asdict(one) for one in study.exclusions],
+        "doubts": lambda: [{"file": _within(study, doubt.path), "what": doubt.what} for doubt in study.doubts],
+        "files": lambda: files(study),
+        **{what: partial(plain, text) for what, text in texts.items()},
+        "results": lambda: plain(results),
+    }
+    held = {name: failures.attempt(f"report.json, {name}", make) for name, make in parts.items()}
+    content = {
+        "format": FORMAT,
+        "program": f"liquid-study {__version__}",
+        "failures": [{**asdict(one), "why": one.why} for one in failures.found],
+        **{name: None if isinstance(part, Failure) else part for name, part in held.items()},
     }
     return f"{json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False)}\n".encode()
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
-from study_app.analysis.report.words import counted, interval, listed, ms, number, p_equals, short
+from study_app.analysis.report.words import beyond, counted, interval, listed, ms, number, p_equals, percent, short
 from study_app.analysis.results import Against, BlockFound, Delivered, Lowest, Results
 
-VERDICTS: Final = ("equivalent", "different", "inconclusive")
+VERDICTS: Final = ("equivalent", "different", "inconclusive", "out of reach")
 
 
 def tempting_ms(found: BlockFound) -> float | None:
@@ -98,7 +98,7 @@ def _achieved(at: Delivered | None, control: Delivered | None) -> str:
 
 
 def _as_lowest(found: BlockFound, delay_ms: float) -> Iterator[str]:
-    lowest = {one.item: one.steps.lowest_ms for one in found.lowest}
+    lowest = {one.item: one.over_all_ms for one in found.lowest}
     at = [f"“{short(found, item)}”" for item, lowest_ms in lowest.items() if lowest_ms == delay_ms]
     below = [f"“{short(found, item)}”" for item, lowest_ms in lowest.items() if (lowest_ms or delay_ms) < delay_ms]
     people = counted(found.n, "participant")
@@ -106,7 +106,10 @@ def _as_lowest(found: BlockFound, delay_ms: float) -> Iterator[str]:
     if below:
         told += f" For {listed(below)} a trend shows already below {ms(delay_ms)}."
     if at:
-        told += f" For {listed(at)} it is the lowest delay up to which the answers of these {people} show a trend."
+        told += (
+            f" For {listed(at)} it is the lowest delay up to which the answers of these {people} show a trend, "
+            "corrected for all statements."
+        )
     yield (
         f"As a limit.{told or ' No statement has its lowest delay with a trend here.'} Such a delay depends on how "
         "many take part: more participants tend to find a lower one. It is an upper bound of what is noticed, and says "
@@ -143,10 +146,23 @@ def _by_verdict(found: BlockFound, here: list[Against]) -> str:
 
 def _difference(one: Against) -> str:
     found = one.found
-    doubted = ", but not without normality" if one.verdict != found.verdict else ""
+    people = "" if found.beyond is None else f", beyond the bound {beyond(found)}"
     if found.interval is None:
-        return f"{number(found.effect)}, no interval: {found.no_interval}"
-    return f"{number(found.effect)}, {100 * found.interval.level:.0f} % interval {interval(found.interval)}{doubted}"
+        return f"{number(found.effect)}, no interval: {found.no_interval}{people}"
+    shown = f"{percent(found.interval.level)} interval {interval(found.interval)}"
+    return f"{number(found.effect)}, {shown}{people}{_only(one)}"
+
+
+def _only(one: Against) -> str:
+    """Say which test alone would have decided otherwise."""
+    found = one.found
+    if one.verdict not in ("inconclusive", "out of reach"):
+        return ""
+    if found.p is not None and found.p <= found.alpha:
+        return ", within the bound by t alone, which asks for normality"
+    if found.p_difference is not None and found.p_difference <= found.alpha:
+        return f", different only before Holm's correction for {one.members} comparisons"
+    return ""
 
 
 def _needed(here: list[Against]) -> str:
@@ -165,7 +181,8 @@ def _said(found: BlockFound, here: list[Against]) -> str:
     if all(one.verdict == "equivalent" for one in here):
         return (
             f"What can be said: at {delay} the mean answers to these statements stay within the bound. Not that "
-            "nothing changes within it, not that no single person notices it, and not for other tasks or statements."
+            "nothing changes within it, not that no single person notices it (people beyond the bound: "
+            f"{listed([beyond(one.found) for one in here])}), and not for other tasks or statements."
         )
     reasons = speaking_against(found, here[0].delay_ms)
     if reasons:

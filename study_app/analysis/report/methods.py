@@ -7,7 +7,15 @@ from collections.abc import Iterator, Sequence
 from study_app import __version__
 from study_app.analysis.captions import people_a_setting
 from study_app.analysis.measures import QUARTILES
-from study_app.analysis.report.words import counted, listed, number, settings_noun, test_name
+from study_app.analysis.report.words import (
+    all_of,
+    counted,
+    listed,
+    percent,
+    said_of_presentations,
+    settings_noun,
+    test_name,
+)
 from study_app.analysis.results import BlockFound, Results, Tested
 from study_app.analysis.tables import Study
 
@@ -29,6 +37,7 @@ def _sentences(study: Study, results: Results) -> Iterator[str]:
         "never means, except in the test of equivalence, which is about the mean difference."
     )
     for found in blocks:
+        yield from said_of_presentations(found)
         yield from _liquids(found) if found.kind == "liquids" else _delays(found, results)
     yield from _common(results, blocks)
     yield f"Sessions and analysis: liquid-study {__version__}."
@@ -40,9 +49,15 @@ def _sample(study: Study) -> str:
     out = study.left_out + len(study.excluded_sessions)
     gone = f"; {counted(out, 'further session')} {'was' if out == 1 else 'were'} left out" if out else ""
     return (
-        f"{people[:1].upper()}{people[1:]}{kind} took part in “{study.title}” (protocol {study.name}, version "
-        f"{study.version}){gone}, {_under(study)}."
+        f"{people[:1].upper()}{people[1:]}{kind} took part in “{study.title}” (protocol {study.name}, "
+        f"{told_versions(study)}){gone}, {_under(study)}."
     )
+
+
+def told_versions(study: Study) -> str:
+    """Return the versions of the protocol whose sessions are pooled."""
+    versions = study.versions
+    return f"version {versions[0]}" if len(versions) == 1 else f"versions {listed(versions)}, pooled"
 
 
 def _under(study: Study) -> str:
@@ -76,7 +91,7 @@ def _liquids(found: BlockFound) -> Iterator[str]:
     noun = settings_noun(found)
     if found.overall is not None:
         yield (
-            f"The {noun}s were compared over all {counted(len(found.items), 'statement')} at once by permuting them "
+            f"The {noun}s were compared over {all_of(len(found.items), 'statement')} at once by permuting them "
             "within participants, the statistic being the sum of the statements' Friedman statistics."
         )
     if found.omnibus:
@@ -88,7 +103,7 @@ def _liquids(found: BlockFound) -> Iterator[str]:
     if found.pairs:
         yield (
             "Where these showed a difference, pairs were compared by Wilcoxon's signed ranks (exact; equal pairs left "
-            "out) with the matched rank-biserial correlation, Holm-adjusted within the statement."
+            "out) with the matched rank-biserial correlation, Holm-adjusted over all pairs of all these statements."
         )
     if found.named is not None:
         yield (
@@ -117,25 +132,33 @@ def _delays(found: BlockFound, results: Results) -> Iterator[str]:
         one = next((one for one in found.trends if one.outcome.p is not None), found.trends[0])
         yield (
             f"Trends over the delay were tested by Page's L ({one.outcome.method.split(',')[0]}), one-sided in the "
-            f"direction stated beforehand, {_families(found.trends)}; "
-            "where a trend showed, the longest delay was dropped and the test repeated until it no longer did, which "
-            "gives an upper bound of the lowest delay that is noticed (the error rate holds for each statement)."
+            f"direction stated {'beforehand' if results.decided.binding else 'by the protocol'}, "
+            f"{_families(found.trends)}; where a trend showed, the longest delay was dropped and the test repeated "
+            "until it no longer did, which gives an upper bound of the lowest delay that is noticed (every step at "
+            "alpha over the number of statements, so that the error rate holds over all of them)."
         )
     if found.against:
-        bound, level = found.against[0].found.bound, 100 - 200 * results.decided.alpha
+        bound, level = found.against[0].found.bound, percent(1 - 2 * results.decided.alpha)
         points = "point" if bound == 1 else "points"
         yield (
             f"Equivalence to {found.delays_ms[0]:g} ms was tested by two one-sided t tests on paired differences with "
-            f"a bound of ±{bound:g} {points}, decided before the first session, and {level:g} % "
-            "intervals, and called equivalent only where tests without normality agreed; it was called different where "
+            f"a bound of ±{bound:g} {points}{_beforehand(results)}, and {level} intervals, and called equivalent only "
+            "where changes of signs, signed ranks and the bootstrap-t agreed; it was called different where "
             "the larger p of a t test and of exact signed ranks, Holm-adjusted over all these comparisons, was at most "
             "alpha, and otherwise inconclusive."
         )
     if found.threshold is not None:
         yield (
             "The detection threshold is the 50 % point between guesses and lapses of a logistic function fitted by "
-            "maximum likelihood to agreement (5 to 7), with a profile interval, all participants pooled."
+            "maximum likelihood to agreement (5 to 7) in single answers, all participants pooled, with a profile "
+            "interval that is scaled by how far participants differ. It is stated only where a permutation test "
+            "against a flat line shows a rise, and where the delays that were presented hold it."
         )
+
+
+def _beforehand(results: Results) -> str:
+    """Say that a decision came before the data, where all sessions kept to it."""
+    return ", decided before the first session" if results.decided.binding else ""
 
 
 def _common(results: Results, blocks: list[BlockFound]) -> Iterator[str]:
@@ -143,8 +166,13 @@ def _common(results: Results, blocks: list[BlockFound]) -> Iterator[str]:
     if decided.binding:
         which = "all statements were primary" if not decided.primary else f"primary: {', '.join(decided.primary)}"
         yield (
-            f"Decided before the first session: alpha = {number(decided.alpha, 3).rstrip('0')}, {which}; different "
-            "questions are not corrected for each other."
+            f"Decided before the first session: alpha = {decided.alpha:g}, {which}; different questions are not "
+            "corrected for each other."
+        )
+    elif decided.made:
+        yield (
+            "The decisions about the analysis changed between sessions: all results are exploratory, by the decisions "
+            f"of the first session (alpha = {decided.alpha:g})."
         )
     else:
         yield f"Nothing was decided beforehand: all results are exploratory, at {decided.alpha:g}."

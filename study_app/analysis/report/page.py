@@ -15,24 +15,55 @@ PAGE = """<!DOCTYPE html>
 <title>{title}</title>
 <style>
 body {{ font-family: Inter, "Segoe UI", "DejaVu Sans", sans-serif; font-size: 15px; line-height: 1.5; color: #13202c;
-  background: #ffffff; max-width: 62em; margin: 2em auto; padding: 0 1.5em; }}
-h1 {{ font-size: 26px; line-height: 1.2; margin-bottom: 4px; }}
-h2 {{ font-size: 20px; margin: 40px 0 8px; padding-top: 12px; border-top: 1px solid #dce2e8; }}
-h3 {{ font-size: 16px; margin: 24px 0 4px; }}
-p, li {{ max-width: 48em; }}
-table {{ border-collapse: collapse; font-size: 13px; font-variant-numeric: tabular-nums; margin: 8px 0; }}
-th, td {{ text-align: left; padding: 3px 12px 3px 0; border-bottom: 1px solid #e6ebef; vertical-align: top; }}
+  background: #f4f6f8; max-width: 1080px; margin: 0 auto; padding: 16px 24px; }}
+h1 {{ font-size: 28px; line-height: 1.2; margin: 0 0 4px; font-weight: 600; }}
+h2 {{ font-size: 20px; margin: 32px 0 8px; font-weight: 600; }}
+h3 {{ font-size: 16px; margin: 24px 0 4px; font-weight: 600; }}
+p {{ margin: 8px 0; }}
+p, li {{ max-width: 52em; }}
+ul {{ margin: 8px 0; padding-left: 20px; }}
+table {{ border-collapse: collapse; font-size: 13px; font-variant-numeric: tabular-nums; margin: 8px 0; width: auto; }}
+th, td {{ text-align: left; padding: 4px 16px 4px 0; border-bottom: 1px solid #e6ebef; vertical-align: top; }}
 th {{ color: #45535f; font-weight: 600; }}
+td {{ max-width: 28em; }}
 td.n, th.n {{ text-align: right; }}
-.soft {{ color: #45535f; font-size: 13px; }}
-.mark {{ background: #fff1d6; color: #8a5200; font-weight: 600; padding: 2px 8px; border-radius: 8px; }}
-.sealed {{ background: #edf1f4; color: #45535f; font-weight: 600; padding: 2px 8px; border-radius: 8px; }}
+td.n, td.s {{ white-space: nowrap; }}
+.soft {{ color: #45535f; font-size: 13px; font-weight: 400; }}
+.mark, .sealed, .chip {{ font-size: 13px; font-weight: 600; padding: 3px 10px; border-radius: 13px;
+  white-space: nowrap; }}
+.mark {{ background: #fff1d6; color: #8a5200; }}
+.sealed, .chip {{ background: #edf1f4; color: #45535f; }}
 .box {{ background: #f4f6f8; border-radius: 12px; padding: 4px 20px; margin: 12px 0; }}
 .care {{ border-left: 4px solid #8a5200; padding-left: 16px; }}
 .scroll {{ overflow-x: auto; }}
-img {{ max-width: 100%; }}
+img {{ max-width: 100%; height: auto; }}
 code {{ font-size: 12px; overflow-wrap: anywhere; }}
-@media print {{ body {{ font-size: 10pt; margin: 0; max-width: none; }} h2, h3, figure {{ break-after: avoid; }} }}
+.answer, details.part {{ background: #ffffff; border: 1px solid #dce2e8; border-radius: 12px; margin: 12px 0; }}
+.answer {{ padding: 12px 24px; display: flex; flex-wrap: wrap; gap: 4px 24px; align-items: center;
+  justify-content: space-between; break-inside: avoid; }}
+.answer .said {{ flex: 1 1 420px; }}
+.answer h2 {{ font-size: 13px; font-weight: 500; color: #45535f; margin: 0; }}
+.answer .told {{ font-size: 17px; line-height: 1.4; font-weight: 600; margin: 4px 0 8px; }}
+.answer ul {{ margin: 4px 0; }}
+.answer li {{ font-size: 14px; font-variant-numeric: tabular-nums; }}
+.first .limits {{ font-size: 17px; margin: 24px 0 8px; }}
+.first .care li {{ font-size: 14px; }}
+details.part {{ padding: 0 24px; }}
+details.part[open] {{ padding-bottom: 16px; }}
+summary {{ cursor: pointer; color: #0b65a3; font-size: 14px; }}
+details.part > summary {{ padding: 12px 0; color: #13202c; }}
+details.part > summary h2 {{ display: inline; font-size: 16px; margin: 0; }}
+summary:focus-visible {{ outline: 2px solid #0b65a3; outline-offset: 2px; }}
+@media (max-width: 600px) {{ body {{ padding: 16px 12px; }}
+  .answer, details.part {{ padding-left: 16px; padding-right: 16px; }}
+  .answer .said {{ flex-basis: 100%; }} h1 {{ font-size: 24px; }} }}
+@media print {{ body {{ font-size: 10pt; padding: 0; max-width: none; background: #ffffff; }}
+  h2, h3, figure, summary {{ break-after: avoid; }} tr, figure, img {{ break-inside: avoid; }}
+  .first {{ break-after: page; }} .answer {{ padding: 8px 14px; margin: 8px 0; }} .answer .told {{ font-size: 12pt; }}
+  .answer .said {{ flex: 1 1 0; }} .answer img {{ width: 210px; }} .answer ul {{ margin: 2px 0; }}
+  .answer li, .first .care li {{ font-size: 9pt; }}
+  .scroll {{ overflow: visible; }} table {{ font-size: 7.5pt; }} th, td {{ padding-right: 8px; }}
+  details::details-content {{ content-visibility: visible; block-size: auto; }} }}
 </style>
 </head>
 <body>
@@ -40,6 +71,10 @@ code {{ font-size: 12px; overflow-wrap: anywhere; }}
 </body>
 </html>
 """
+
+
+SHORT = 16
+"""Cells of so many letters stay on one line."""
 
 
 def page(title: str, body: Iterable[str]) -> str:
@@ -57,18 +92,34 @@ def paragraph(words: str, kind: str = "") -> str:
     return f'<p class="{kind}">{escape(words)}</p>' if kind else f"<p>{escape(words)}</p>"
 
 
+def not_there(why: str) -> str:
+    """Return what stands in the place of a part that could not be computed."""
+    return box([paragraph(f"Not there: {why}.")], "care")
+
+
 def bullets(lines: Iterable[str]) -> str:
     """Return a list, empty where there are no lines."""
     told = "".join(f"<li>{escape(line)}</li>" for line in lines)
     return f"<ul>{told}</ul>" if told else ""
 
 
+def folded(parts: Sequence[str]) -> list[str]:
+    """Return a section that opens on a click (and on paper): its first part, a heading, stays in sight."""
+    return ['<details class="part">', f"<summary>{parts[0]}</summary>", *parts[1:], "</details>"] if parts else []
+
+
 def table(head: Sequence[str], rows: Iterable[Sequence[str]], *, words: int = 1, last: int = 0) -> str:
     """Return a table whose first ``words`` and ``last`` columns are words and whose others are numbers."""
     kinds = ["" if place < words or place >= len(head) - last else ' class="n"' for place in range(len(head))]
     lines = ["".join(f"<th{kind}>{escape(cell)}</th>" for kind, cell in zip(kinds, head, strict=True))]
-    lines += ["".join(f"<td{kind}>{escape(cell)}</td>" for kind, cell in zip(kinds, row, strict=True)) for row in rows]
+    lines += ["".join(_cell(kind, cell) for kind, cell in zip(kinds, row, strict=True)) for row in rows]
     return '<div class="scroll"><table>' + "".join(f"<tr>{line}</tr>" for line in lines) + "</table></div>"
+
+
+def _cell(kind: str, words: str) -> str:
+    """Return a cell; one of few words is not broken into lines."""
+    short = ' class="s"' if len(words) <= SHORT else ""
+    return f"<td{kind or short}>{escape(words)}</td>"
 
 
 def box(parts: Iterable[str], kind: str = "box") -> str:

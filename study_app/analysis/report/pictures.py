@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 
-from study_app.analysis import captions, figures, movement, multiples, recognition_matrix, style
+from study_app.analysis import captions, figures, movement, multiples, psychometric_figure, recognition_matrix, style
+from study_app.analysis.failures import Failure, Failures
 from study_app.analysis.performance import OF_REACHES
 from study_app.analysis.questions import Block
-from study_app.analysis.report.words import counted, number, p_equals
+from study_app.analysis.report.words import counted, interval, number, p_equals
 from study_app.analysis.results import BlockFound, Results
 from study_app.analysis.tables import Study
 
@@ -30,26 +32,45 @@ class Picture:
     files: dict[str, bytes]
 
 
-def pictures(study: Study, results: Results, forms: Sequence[str] = style.FORMATS) -> Iterator[Picture]:
-    """Draw every figure that there are answers or recordings for, block by block, in each of ``forms``."""
+def pictures(
+    study: Study, results: Results, forms: Sequence[str] = style.FORMATS, failures: Failures | None = None
+) -> Iterator[Picture]:
+    """Draw every figure that there are answers or recordings for, block by block, in each of ``forms``.
+
+    A figure that fails is left out, and kept in ``failures``.
+    """
+    held = Failures() if failures is None else failures
     for block, found in zip(study.blocks, results.blocks, strict=True):
         if not found.n:
             continue
         several = len(study.blocks_of(block.kind)) > 1
-        yield _answers(study, block, found, f"{block.kind}-{block.id}" if several else block.kind, forms)
-        if found.named is not None:
-            yield _recognition(study, block, found, f"recognition-{block.id}" if several else "recognition", forms)
-        if found.delays_ms and results.performance is not None and results.performance.recorded_in(block.id):
-            yield _movement(study, block, results, f"movement-{block.id}" if several else "movement", forms)
+        for what, draw in _of_block(study, results, block, found, forms):
+            name = f"{what}-{block.id}" if several else what
+            drawn = held.attempt(f"figure {name}", partial(draw, name), block=block.id)
+            if not isinstance(drawn, Failure):
+                yield drawn
+
+
+def _of_block(
+    study: Study, results: Results, block: Block, found: BlockFound, forms: Sequence[str]
+) -> Iterator[tuple[str, Callable[[str], Picture]]]:
+    """Yield what a block's figures are called, and how each is drawn."""
+    yield block.kind, lambda name: _answers(study, block, found, name, forms)
+    if found.named is not None:
+        yield "recognition", lambda name: _recognition(study, block, found, name, forms)
+    if found.threshold is not None and any(found.threshold.asked):
+        yield "threshold", lambda name: _threshold(study, block, found, name, forms)
+    if found.delays_ms and results.performance is not None and results.performance.recorded_in(block.id):
+        yield "movement", lambda name: _movement(study, block, results, name, forms)
 
 
 def _answers(study: Study, block: Block, found: BlockFound, name: str, forms: Sequence[str]) -> Picture:
-    lowest = {one.item: one.steps.lowest_ms for one in found.lowest if one.steps.lowest_ms is not None}
+    lowest = {one.item: one.over_all_ms for one in found.lowest if one.over_all_ms is not None}
     caption = captions.caption(study, block)
     if lowest:
         caption += (
-            " Dashed: lowest delay at which stepping down still shows a trend, an upper bound of the delay that is "
-            "noticed."
+            " Dashed: lowest delay at which stepping down still shows a trend, with the error rate held over all "
+            "statements; an upper bound of the delay that is noticed."
         )
     return Picture(block.id, name, caption, {form: figures.render(study, block, form, lowest) for form in forms})
 
@@ -90,6 +111,36 @@ def _recognition(study: Study, block: Block, found: BlockFound, name: str, forms
         f"The name that was rated highest for each liquid ({simulated}{captions.counts(study, block)[0]}). Cells: "
         f"counts and share of the row; framed: right. Undecided: {counted(2, 'name')} or more were rated equally high."
         f"{chance}"
+    )
+    return Picture(block.id, name, caption, files)
+
+
+def _threshold(study: Study, block: Block, found: BlockFound, name: str, forms: Sequence[str]) -> Picture:
+    threshold = found.threshold
+    assert threshold is not None  # noqa: S101 - asked by the caller
+    lowest = min((one.over_all_ms for one in found.lowest if one.over_all_ms is not None), default=None)
+    title = "When a delay is noticed"
+    files = {
+        form: style.file_bytes(
+            psychometric_figure.draw(
+                threshold, lowest, title=title, marks=figures.marks(study), counts=("",), fonts=style.fonts_for(form)
+            ).figure,
+            form,
+            f"{study.name}: {title}",
+        )
+        for form in forms
+    }
+    simulated = "SIMULATED participants, no people; " if study.simulated else ""
+    curve = f"No curve: {threshold.note}."
+    if threshold.effect is not None:
+        curve = (
+            f"Curve: {threshold.method}; diamond: the detection threshold, {threshold.effect:.0f} ms, on its 95 % "
+            f"interval {interval(threshold.interval, 0)} ms."
+        )
+    dashed = "" if lowest is None else f" Dashed: the lowest delay up to which a statement follows it, {lowest:g} ms."
+    caption = (
+        f"Share of answers that noticed the delay, over the delay asked for ({simulated}n = {threshold.n}). {curve}"
+        f"{dashed}"
     )
     return Picture(block.id, name, caption, files)
 

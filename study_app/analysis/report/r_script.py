@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
+from study_app.analysis.report.listing import tests
 from study_app.analysis.results import BlockFound, Results
 from study_app.analysis.statistics.friedman import Friedman
 from study_app.analysis.statistics.trend import EXACT_UP_TO
@@ -12,7 +13,8 @@ from study_app.analysis.tables import Study
 
 START: Final = """\
 # Computes the main numbers of report.html again, in base R (4.0 or newer, no packages), from the table of responses
-# beside this file, and says where they differ:  Rscript report.R   (exit code 1 if any does)
+# beside this file, and says where they differ:  Rscript report.R   (exit code 1 if any does, or if there is
+# nothing to compare)
 # The exact p of trends and of pairs come from all rearrangements, up to {exact} participants; beyond that, and for
 # Friedman's test, the approximate p are compared.
 
@@ -20,9 +22,11 @@ answers <- read.csv("{table}", colClasses = "character", na.strings = "n/a", enc
 answers <- answers[answers$counted == "true", ]
 answers$response <- as.numeric(answers$response)
 differing <- 0
+compared <- 0
 
 same <- function(what, reported, computed) {{
   ok <- isTRUE(all.equal(reported, computed, tolerance = 1e-6, check.attributes = FALSE))
+  compared <<- compared + 1
   if (!ok) differing <<- differing + 1
   cat(sprintf("%-64s report %12.6g   R %12.6g   %s\\n", what, reported, computed, if (ok) "" else "DIFFERS"))
 }}
@@ -42,9 +46,10 @@ orders <- function(k) if (k == 1) matrix(1) else {{
 }}
 
 # One row a participant, one column a setting; a participant's repeated answers count by their median.
-wide <- function(block, item, codes) {{
+# Codes with one name in columns are presentations of one setting.
+wide <- function(block, item, codes, columns = codes) {{
   rows <- answers[answers$block == block & answers$item == item, ]
-  tapply(rows$response, list(rows$participant, factor(rows$code, codes)), median, na.rm = TRUE)
+  tapply(rows$response, list(rows$participant, factor(rows$code, codes, columns)), median, na.rm = TRUE)
 }}
 whole <- function(table) table[complete.cases(table), , drop = FALSE]
 
@@ -102,10 +107,12 @@ hits <- function(what, block, items, codes, right, hits) {{
 """
 
 END: Final = """
-if (differing == 0) cat("every number that R computes is the report's\\n") else {
+cat(compared, "of {numbers} numbers compared\\n")
+if (compared == 0) quit(status = 1)
+if (differing == 0) cat("every number that R computes is the report's\\n") else {{
   cat("numbers that differ:", differing, "\\n")
   quit(status = 1)
-}
+}}
 """
 
 
@@ -113,12 +120,23 @@ def r_script(study: Study, results: Results) -> str:
     """Return the script."""
     table = f"study-{study.name}_description-responses_data.csv"
     calls = [line for found in results.blocks if found.n for line in _calls(found)]
-    return START.format(table=table, exact=EXACT_UP_TO) + "\n".join(calls) + "\n" + END
+    return (
+        START.format(table=table, exact=EXACT_UP_TO) + "\n".join(calls) + "\n" + END.format(numbers=_numbers(results))
+    )
+
+
+def _numbers(results: Results) -> int:
+    """Return how many statistics, p and ends of intervals the report's tests have."""
+    return sum(row[name] is not None for row in tests(results) for name in ("statistic", "p", "low", "high"))
 
 
 def _calls(found: BlockFound) -> Iterator[str]:
     block = _text(found.id)
     codes = _vector([setting.code for setting in found.settings])
+    if found.replicated_ms:
+        by_delay = _by_delay(found)
+        codes += f", {_vector([by_delay[setting.delay_ms] for setting in found.settings])}"
+    yield from _pairs(found, block, codes)
     for one in found.omnibus:
         if not isinstance(one.outcome, Friedman) or one.outcome.n < 2:
             continue  # R's friedman.test refuses a single participant
@@ -130,13 +148,6 @@ def _calls(found: BlockFound) -> Iterator[str]:
             falling = "TRUE" if "decreasing" in one.outcome.method else "FALSE"
             numbers = f"{falling}, {_number(one.outcome.statistic)}, {_number(one.outcome.p)}"
             yield f"page({_text(one.item)}, wide({block}, {_text(one.item)}, {codes}), {numbers})"
-    for pair in found.pairs:
-        outcome = pair.tested.outcome
-        if outcome.statistic is not None and outcome.p is not None:
-            item = pair.tested.item
-            what = _text(f"{item}, {pair.first} and {pair.second}")
-            numbers = f"{_text(pair.first)}, {_text(pair.second)}, {_number(outcome.statistic)}, {_number(outcome.p)}"
-            yield f"pair({what}, wide({block}, {_text(item)}, {codes}), {numbers})"
     yield from _against(found, block, codes)
     if found.named is not None and found.named.found.statistic is not None:
         right = ", ".join("NA_character_" if label is None else _text(label) for label in found.named.right)
@@ -144,8 +155,26 @@ def _calls(found: BlockFound) -> Iterator[str]:
         yield f"hits({block}, {block}, {labels}, {codes}, c({right}), {_number(found.named.found.statistic)})"
 
 
+def _pairs(found: BlockFound, block: str, codes: str) -> Iterator[str]:
+    """Yield the comparisons of two settings: those of liquids, and of a block that has two settings all of them."""
+    compared = [(pair.first, pair.second, pair.tested) for pair in found.pairs]
+    if len(found.settings) == 2:
+        first, second = (setting.code for setting in found.settings)
+        compared += [(first, second, one) for one in found.omnibus]
+    for first, second, one in compared:
+        if one.outcome.statistic is not None and one.outcome.p is not None:
+            what = _text(f"{one.item}, {first} and {second}")
+            numbers = f"{_text(first)}, {_text(second)}, {_number(one.outcome.statistic)}, {_number(one.outcome.p)}"
+            yield f"pair({what}, wide({block}, {_text(one.item)}, {codes}), {numbers})"
+
+
+def _by_delay(found: BlockFound) -> dict[float | None, str]:
+    """Return the code that stands for each delay."""
+    return {setting.delay_ms: setting.code for setting in found.settings}
+
+
 def _against(found: BlockFound, block: str, codes: str) -> Iterator[str]:
-    by_delay = {setting.delay_ms: setting.code for setting in found.settings}
+    by_delay = _by_delay(found)
     for one in found.against:
         interval = one.found.interval
         if one.found.p is None or one.found.p_different is None or interval is None:

@@ -2,62 +2,92 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
 
-from study_app.analysis.report.meaning import by_delay, meaning, tempting_ms
-from study_app.analysis.report.page import box, bullets, heading, paragraph, picture, table
+from study_app.analysis.failures import Failure, Failures
+from study_app.analysis.report import delay_sections
+from study_app.analysis.report.page import bullets, heading, not_there, paragraph, picture, table
 from study_app.analysis.report.pictures import Picture
 from study_app.analysis.report.words import (
     VERDICTS_MEAN,
-    counted,
     interval,
     lead,
     missing,
-    ms,
     name,
     number,
     p_equals,
     p_value,
+    said_of_presentations,
     settings_noun,
     short,
     statistic,
     test_name,
 )
-from study_app.analysis.results import Against, BlockFound, Pair, Results, Tested
+from study_app.analysis.results import BlockFound, Pair, Results, Tested
 from study_app.analysis.statistics.ordinal import Ordinal
 from study_app.analysis.statistics.paired import Paired
 
-AGAINST = (
-    *("Statement", "Delay", "n", "difference", "interval", "p equivalent", "p without normality"),
-    *("p different, adjusted", "n for 80 %", "Verdict"),
-)
 TESTS = ("Statement", "n", "Statistic", "p", "adjusted p", "smallest p", "Effect", "Interval", "Verdict")
 
 
-def block(found: BlockFound, results: Results, drawn: Sequence[Picture]) -> Iterator[str]:
-    """Yield the section of one block."""
+def block(
+    found: BlockFound, results: Results, drawn: Sequence[Picture], failures: Failures | None = None
+) -> Iterator[str]:
+    """Yield the section of one block; a part that fails is said in its place, and kept in ``failures``."""
     yield heading(2, lead(found))
     if not found.n:
-        yield paragraph("Nobody's answers count yet: there is nothing to test or to draw.")
+        untested = any(one.block == found.id for one in results.failures)
+        yield (
+            bullets(missing(found))
+            if untested
+            else paragraph("Nobody's answers count yet: there is nothing to test or to draw.")
+        )
         return
-    pictures = {one.name.split("-")[0]: one for one in drawn if one.block == found.id}
-    yield from _picture(pictures, found.kind)
-    yield from _overall(found)
-    yield from _tests(f"Do the {settings_noun(found)}s differ, statement by statement?", found, found.omnibus, results)
-    yield from _pairs(found)
-    yield from _recognition(found, pictures)
-    yield from _tests("Do answers follow the delay?", found, found.trends, results)
-    yield from _lowest(found)
-    yield from _against(found)
-    yield from _threshold(found)
-    yield from _meaning(found, results)
-    yield from _picture(pictures, "movement")
-    yield from _again(found)
+    held = Failures() if failures is None else failures
+    for what, make in _parts(found, results, {one.name.split("-")[0]: one for one in drawn if one.block == found.id}):
+        part = held.attempt(what, partial(_made, make), block=found.id)
+        yield from (heading(3, what.capitalize()), not_there(part.why)) if isinstance(part, Failure) else part
+
+
+def _made(make: Callable[[], Iterable[str]]) -> list[str]:
+    return list(make())
+
+
+def _parts(
+    found: BlockFound, results: Results, pictures: Mapping[str, Picture]
+) -> Iterator[tuple[str, Callable[[], Iterable[str]]]]:
+    """Yield what the parts of a block's section are, and how each is made."""
+    differ = f"Do the {settings_noun(found)}s differ, statement by statement?"
+    yield "presentations", lambda: _presentations(found)
+    yield "figure of answers", lambda: _picture(pictures, found.kind)
+    yield "test over all statements", lambda: _overall(found)
+    yield "tests of settings", lambda: _tests(differ, found, found.omnibus, found.names)
+    yield "pairs", lambda: _pairs(found)
+    yield "recognition", lambda: _recognition(found, pictures)
+    yield "trends", lambda: _tests("Do answers follow the delay?", found, found.trends)
+    yield "lowest delay", lambda: delay_sections.lowest(found)
+    yield "comparisons with the shortest delay", lambda: delay_sections.against(found)
+    yield "detection threshold", lambda: delay_sections.threshold(found)
+    yield "figure of the threshold", lambda: _picture(pictures, "threshold")
+    yield "what a delay can mean", lambda: delay_sections.meaning(found, results)
+    yield "figure of movement", lambda: _picture(pictures, "movement")
+    yield "sessions", lambda: _tests("Do sessions differ?", found, found.by_session, _sessions(found))
+    yield "other assumptions", lambda: _again(found)
+    yield "what is not here", lambda: _absent(found)
+
+
+def _presentations(found: BlockFound) -> Iterator[str]:
+    """Say what one answer stands for, where it is more than one presentation."""
+    lines = said_of_presentations(found)
+    if lines:
+        yield paragraph(" ".join(lines))
+
+
+def _absent(found: BlockFound) -> Iterator[str]:
     if found.absent:
         yield heading(3, "What is not here, and why")
         yield bullets(f"{line[:1].upper()}{line[1:]}" for line in missing(found))
-    yield heading(3, "Answers")
-    yield _measures(found)
 
 
 def _picture(pictures: Mapping[str, Picture], kind: str) -> Iterator[str]:
@@ -79,7 +109,12 @@ def _overall(found: BlockFound) -> Iterator[str]:
     )
 
 
-def _tests(title: str, found: BlockFound, tests: Sequence[Tested], results: Results) -> Iterator[str]:
+def _sessions(found: BlockFound) -> list[str]:
+    return [f"session {number}" for number in found.sessions]
+
+
+def _tests(title: str, found: BlockFound, tests: Sequence[Tested], compared: Sequence[str] = ()) -> Iterator[str]:
+    """Yield a table of tests; ``compared`` are the names of what each of them compares."""
     if not tests:
         return
     yield heading(3, title)
@@ -90,16 +125,21 @@ def _tests(title: str, found: BlockFound, tests: Sequence[Tested], results: Resu
     )
     intervals = dict.fromkeys(one.outcome.interval.method for one in tests if one.outcome.interval is not None)
     yield paragraph(
-        f"{test_name(first.outcome)}; effect: {first.outcome.effect_name}. Found by: "
+        f"{test_name(first.outcome)}; effect: {first.outcome.effect_name}{_above(first, compared)}. Found by: "
         f"{'; '.join(dict.fromkeys(one.outcome.method for one in tests if one.outcome.p is not None)) or 'none'}. "
-        f"{'; '.join(families)}. "
-        + (f"Intervals: 95 %, {'; '.join(intervals)}. " if intervals else "")
-        + VERDICTS_MEAN.format(alpha=f"{results.decided.alpha:g}"),
+        f"{'; '.join(families)}. " + (f"Intervals: 95 %, {'; '.join(intervals)}." if intervals else ""),
         "soft",
     )
     reasons = dict.fromkeys(one.outcome.no_interval for one in tests if one.outcome.no_interval)
     if reasons and not intervals:
         yield paragraph(f"Intervals: {'; '.join(reasons)}.", "soft")
+
+
+def _above(one: Tested, compared: Sequence[str]) -> str:
+    """Say which of two an effect above 0 stands for."""
+    if not isinstance(one.outcome, Paired) or len(compared) != 2:
+        return ""
+    return f", above 0 where {compared[0]} was rated higher than {compared[1]}"
 
 
 def _row(found: BlockFound, one: Tested) -> list[str]:
@@ -144,7 +184,8 @@ def _pairs(found: BlockFound) -> Iterator[str]:
     )
     yield paragraph(
         "Wilcoxon's signed ranks, exact, only in statements that differ as a whole; above 0 the first of a pair was "
-        f"rated higher. p adjusted by Holm within each statement. {found.pairs[0].tested.outcome.method}. "
+        f"rated higher. p adjusted by Holm over all {found.pairs[0].tested.members} pairs of this table. "
+        f"{found.pairs[0].tested.outcome.method}. "
         "Intervals: 95 %, Fisher z, which cover about 90 % up to two dozen pairs; none where all pairs that differ "
         "went one way, since −1 and 1 are the ends of the scale, nor below six pairs that differ.",
         "soft",
@@ -202,132 +243,6 @@ def _recognition(found: BlockFound, pictures: Mapping[str, Picture]) -> Iterator
     yield paragraph("Intervals of the shares: Clopper-Pearson, which takes participants one by one.", "soft")
 
 
-def _lowest(found: BlockFound) -> Iterator[str]:
-    if not found.lowest:
-        return
-    yield heading(3, "The lowest delay that shows")
-    yield table(
-        ("Statement", "lowest", "over all statements", "steps down: longest delay, p"),
-        [
-            [
-                short(found, one.item),
-                _at_most(one.steps.lowest_ms),
-                _at_most(one.over_all_ms),
-                "; ".join(f"{ms(step.longest_ms)} {p_value(step.page.p)}" for step in one.steps.steps),
-            ]
-            for one in found.lowest
-        ],
-        words=4,
-    )
-    members = found.lowest[0].members
-    yield paragraph(
-        "Only where a trend is there at all, the longest delay is dropped as long as a trend is left. The order is "
-        "fixed, so that the error rate holds within each statement without correction; over all statements it holds "
-        f"where every step has p of at most alpha / {members}. The result is an upper bound and biased upward: few "
-        "participants find only long delays.",
-        "soft",
-    )
-
-
-def _at_most(delay_ms: float | None) -> str:
-    return "–" if delay_ms is None else f"≤ {ms(delay_ms)}"
-
-
-def _against(found: BlockFound) -> Iterator[str]:
-    if not found.against:
-        return
-    control = ms(found.against[0].control_ms)
-    yield heading(3, f"Each delay against {control}")
-    yield table(
-        AGAINST,
-        [
-            [
-                short(found, one.item),
-                ms(one.delay_ms),
-                str(one.found.n),
-                number(one.found.effect),
-                interval(one.found.interval),
-                p_value(one.found.p),
-                p_value(one.found.p_permutation),
-                p_value(one.p_adjusted),
-                "–" if one.found.n_needed is None else str(one.found.n_needed),
-                one.verdict + _doubt(one),
-            ]
-            for one in found.against
-        ],
-        words=2,
-        last=1,
-    )
-    yield paragraph(" ".join(_about_against(found.against)), "soft")
-
-
-def _doubt(one: Against) -> str:
-    if one.found.checks_agree is False:
-        return " *"
-    return " †" if one.found.verdict == "different" and one.verdict == "inconclusive" else ""
-
-
-def _about_against(against: Sequence[Against]) -> Iterator[str]:
-    """Yield how the comparisons with the shortest delay were made, and what they could not show."""
-    first = against[0].found
-    yield (
-        f"Two one-sided t tests with a bound of ±{first.bound:g}, intervals of {100 - 200 * first.alpha:.0f} %. "
-        "Equivalent: the interval lies within the bound; each comparison stands for itself, so that a single one among "
-        "many is weak. Different: the larger p of a two-sided t test and of exact signed ranks, Holm-adjusted over the "
-        f"{len(against)} comparisons of this table, is at most {first.alpha:g}. Inconclusive: neither. n for 80 %: "
-        "participants who would show equivalence with 80 % power at this spread, if there were no difference; a spread "
-        "estimated from few is itself uncertain."
-    )
-    least = first.smallest_check_p
-    if least is not None:
-        yield f"Without normality the smallest p for equivalence is {p_value(least)}."
-    differing = 0.5 ** (first.n - 1) if first.n else 1.0
-    if differing * len(against) > first.alpha:
-        yield (
-            f"For a difference the signed ranks of {counted(first.n, 'pair')} give {p_value(differing)} at least, so "
-            "that after the correction no comparison here can be called different, however clear it is; a trend over "
-            "all delays can be shown."
-        )
-    disagree = sum(one.found.checks_agree is False for one in against)
-    if disagree:
-        yield f"*: p with and without normality decide differently ({disagree}); equivalent is only what both show."
-    alone = sum(_doubt(one) == " †" for one in against)
-    if alone:
-        yield f"†: a t test alone, not corrected, would call it different ({alone})."
-
-
-def _threshold(found: BlockFound) -> Iterator[str]:
-    threshold = found.threshold
-    if threshold is None:
-        return
-    yield heading(3, "From when on is a delay noticed?")
-    counts = ", ".join(
-        f"{ms(level)} {yes} of {asked}"
-        for level, yes, asked in zip(threshold.levels, threshold.yes, threshold.asked, strict=True)
-    )
-    if threshold.effect is None:
-        yield paragraph(f"No threshold: {threshold.note}. Noticed: {counts}.")
-        return
-    yield paragraph(
-        f"Detection threshold {number(threshold.effect, 0)} ms, 95 % interval {interval(threshold.interval, 0)} ms"
-        f"{f' ({threshold.no_interval})' if threshold.no_interval else ''}; guesses {number(threshold.guess)}, lapses "
-        f"{number(threshold.lapse)}; {threshold.method}; n = {threshold.n}. Noticed: {counts}. "
-        f"{threshold.note[:1].upper()}{threshold.note[1:]}. Agreement is no yes or no: "
-        "who agrees somewhat with “different” may mean little."
-    )
-
-
-def _meaning(found: BlockFound, results: Results) -> Iterator[str]:
-    delay_ms = tempting_ms(found)
-    if delay_ms is None:
-        return
-    yield heading(3, f"What “{ms(delay_ms)}” can and cannot mean")
-    yield box([paragraph(line) for line in meaning(found, results)], "care")
-    if found.against:
-        head = ("Delay", "equivalent in", "different in", "inconclusive in", "what can be said")
-        yield table(head, by_delay(found), words=len(head))
-
-
 def _again(found: BlockFound) -> Iterator[str]:
     again = (*found.mixed, *found.incomplete)
     if not again:
@@ -371,6 +286,21 @@ def _effects(found: BlockFound, one: Tested) -> tuple[str, str]:
             "; ".join(interval(coefficient.interval) for coefficient in outcome.coefficients),
         )
     return number(outcome.effect), interval(outcome.interval)
+
+
+def verdicts_mean(results: Results) -> Iterator[str]:
+    """Yield what the words of verdicts mean, once for all tables."""
+    yield heading(2, "What the words of verdicts mean")
+    yield paragraph(VERDICTS_MEAN.format(alpha=f"{results.decided.alpha:g}"))
+
+
+def answers(results: Results) -> Iterator[str]:
+    """Yield the counts of all answers, block by block."""
+    yield heading(2, "Answers, counted")
+    for found in results.blocks:
+        if found.measures:
+            yield heading(3, lead(found))
+            yield _measures(found)
 
 
 def _measures(found: BlockFound) -> str:

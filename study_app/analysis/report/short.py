@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from study_app.analysis.report.words import (
+    all_of,
     counted,
+    higher,
     interval,
     lead,
     listed,
@@ -105,10 +107,10 @@ def _mixed_up(found: BlockFound, results: Results) -> Iterator[str]:
 
 
 def _of_equivalence(found: BlockFound) -> Iterator[str]:
-    undecided = [one for one in found.against if one.verdict == "inconclusive"]
+    undecided = [one for one in found.against if one.verdict in ("inconclusive", "out of reach")]
     if undecided:
         yield (
-            f"{lead(found)}: inconclusive: {len(undecided)} of {len(found.against)} comparisons with "
+            f"{lead(found)}: inconclusive or out of reach: {len(undecided)} of {len(found.against)} comparisons with "
             f"{ms(undecided[0].control_ms)}, which show neither a difference nor that it stays within the bound."
         )
 
@@ -118,7 +120,7 @@ def _of_block(found: BlockFound, alpha: float) -> Iterator[str]:
     overall = found.overall
     if overall is not None and overall.p is not None:
         yield (
-            f"{lead(found)}: over all {counted(len(found.items), 'statement')} together, one test "
+            f"{lead(found)}: one test over {all_of(len(found.items), 'statement')} "
             f"{'tells' if overall.p <= alpha else 'does not tell'} the {noun}s apart ({p_equals(overall.p)}, "
             f"n = {overall.n})."
         )
@@ -150,7 +152,7 @@ def _shown(found: BlockFound, tests: tuple[Tested, ...]) -> str:
 
 def _with_p(found: BlockFound, one: Tested) -> str:
     p = f"adjusted {p_equals(one.p_adjusted)}" if one.p_adjusted is not None else ""
-    return f"“{short(found, one.item)}” ({p})"
+    return f"“{short(found, one.item)}” ({higher(found, one.outcome)}{p})"
 
 
 def _recognised(found: BlockFound) -> Iterator[str]:
@@ -180,14 +182,13 @@ def _delays(found: BlockFound) -> Iterator[str]:
     elif found.trends:
         yield f"{lead(found)}: {_nothing(found.trends, 'in no statement a trend over the delay')}."
     lowest = [
-        f"“{short(found, one.item)}” {ms(one.steps.lowest_ms)}"
-        for one in found.lowest
-        if one.steps.lowest_ms is not None
+        f"“{short(found, one.item)}” {ms(one.over_all_ms)}" for one in found.lowest if one.over_all_ms is not None
     ]
     if lowest:
         yield (
-            f"{lead(found)}: the lowest delay at which the answers of {_used(found)} show a trend: "
-            f"{listed(lowest)}. Each is an upper bound: shorter delays may be noticed too."
+            f"{lead(found)}: the lowest delay at which the answers of {_used(found)} show a trend, "
+            f"corrected for {all_of(found.lowest[0].members, 'statement')}: {listed(lowest)}. Each is an upper bound: "
+            "shorter delays may be noticed too."
         )
     threshold = found.threshold
     if threshold is not None and threshold.effect is not None:

@@ -7,7 +7,9 @@ from typing import Final
 
 from study_app.analysis.questions import Block
 from study_app.analysis.results import BlockFound
+from study_app.analysis.statistics.equivalence import Equivalence
 from study_app.analysis.statistics.outcome import Interval, Outcome
+from study_app.analysis.statistics.paired import Paired
 
 _SMALL: Final = "no one two three four five six seven eight nine ten eleven twelve"
 NUMBERS: Final = tuple(_SMALL.split())
@@ -24,6 +26,13 @@ def counted(number: int, noun: str) -> str:
     """Return "three statements", "1 statement"."""
     told = NUMBERS[number] if 1 < number < len(NUMBERS) else str(number)
     return f"{told} {noun}" + ("" if number == 1 else "s")
+
+
+def all_of(number: int, noun: str) -> str:
+    """Return "all three statements", "both statements", "the one statement"."""
+    if number < 3:
+        return f"the one {noun}" if number == 1 else f"both {noun}s"
+    return f"all {counted(number, noun)}"
 
 
 def number(value: float | None, digits: int = 2) -> str:
@@ -53,6 +62,19 @@ def p_equals(p: float) -> str:
 def interval(of: Interval | None, digits: int = 2) -> str:
     """Return an interval in brackets; a dash where there is none."""
     return "–" if of is None else f"[{number(of.low, digits)}, {number(of.high, digits)}]"
+
+
+def percent(share: float) -> str:
+    """Return a share in percent, with as many decimals as it takes: 90 %, 99.9 %."""
+    return f"{round(100 * share, 6):g} %"
+
+
+def beyond(of: Equivalence) -> str:
+    """Return how many participants differ by more than the bound, and the interval of their share."""
+    if of.beyond is None:
+        return "–"
+    ends = of.beyond.interval
+    return f"{of.beyond.count} of {of.beyond.n} [{100 * ends.low:.0f}, {100 * ends.high:.0f}] %"
 
 
 def listed(words: Sequence[str]) -> str:
@@ -96,6 +118,36 @@ def statistic(outcome: Outcome) -> str:
         outcome.statistic_name, outcome.statistic_name
     )
     return f"{told} {number(outcome.statistic)}"
+
+
+def said_of_presentations(found: BlockFound) -> tuple[str, ...]:
+    """Return how many presentations an answer stands for, and what became of sessions; empty for one of each."""
+    fewest, most = found.presentations
+    lines = []
+    if found.replicated_ms:
+        delays = listed([ms(delay) for delay in found.replicated_ms])
+        lines.append(f"Several conditions present {delays}: they are taken as repeated presentations of one delay.")
+    if most > 1:
+        often = f"{most}" if fewest == most else f"{fewest} to {most}"
+        lines.append(
+            f"A participant answered each statement {often} times for one {settings_noun(found)}: tests of ranks, of "
+            "equivalence and of recognition take the median of these answers; the mixed model and the detection "
+            "threshold take every single one."
+        )
+    if len(found.sessions) > 1:
+        lines.append(
+            f"The answers are of sessions {listed(list(map(str, found.sessions)))}, which are compared with each other "
+            "and are a factor of the mixed model; the other tests pool them."
+        )
+    return tuple(lines)
+
+
+def higher(found: BlockFound, outcome: Outcome) -> str:
+    """Return which of two settings was rated higher; empty where more are compared."""
+    if not isinstance(outcome, Paired) or len(found.names) != 2 or not outcome.effect:
+        return ""
+    first, second = (name(found, setting.code) for setting in found.settings)
+    return f"higher for {first if outcome.effect > 0 else second}, "
 
 
 def test_name(outcome: Outcome) -> str:

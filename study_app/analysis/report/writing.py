@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -11,10 +11,12 @@ from typing import Any
 from study_app import __version__
 from study_app.analysis.evaluate import Progress, evaluate
 from study_app.analysis.export import export_files
+from study_app.analysis.failures import Failure, Failures
 from study_app.analysis.output import write_files
 from study_app.analysis.report import conduct_section, listing, sections, short
-from study_app.analysis.report.methods import methods
-from study_app.analysis.report.page import box, bullets, heading, page, paragraph, table
+from study_app.analysis.report.first_page import first_page
+from study_app.analysis.report.methods import methods, told_versions
+from study_app.analysis.report.page import box, bullets, folded, heading, not_there, page, paragraph, table
 from study_app.analysis.report.pictures import Picture, pictures
 from study_app.analysis.report.r_script import r_script
 from study_app.analysis.report.words import counted
@@ -34,6 +36,7 @@ def report(
     progress: Callable[[str, float], object] | None = None,
     cancelled: Callable[[], bool] | None = None,
     warn: Callable[[str], object] | None = None,
+    failed: Callable[[str], object] | None = None,
 ) -> tuple[Path, ...]:
     """Write the report of a study's results into the folder ``to``; return the files, ``report.html`` first.
 
@@ -47,6 +50,9 @@ def report(
         Is asked again and again whether to give up.
     warn : callable, optional
         Is told a line of every file that is not as it was recorded, and is used as it is.
+    failed : callable, optional
+        Is told a line of every section that could not be computed: the report says so in its place, and holds
+        everything else.
 
     Raises
     ------
@@ -61,10 +67,14 @@ def report(
     if not study.blocks:
         raise AnalysisError(f"{folder}: the study {study.name!r} asks no statements, so there is nothing to report")
     results = evaluate(study, progress=lambda what, share: going(what, 0.1 + 0.6 * share))
-    drawn = list(_drawn(study, results, going))
+    failures = Failures(results.failures)
+    drawn = list(_drawn(study, results, going, failures))
     going("writing", 0.95)
-    written = write_files(Path(to), _files(study, results, drawn))
+    written = write_files(Path(to), _files(study, results, drawn, failures))
     study.tell_doubts(warn)
+    if failed is not None:
+        for failure in failures.found:
+            failed(f"error: {failure}")
     return written
 
 
@@ -78,47 +88,87 @@ def _going(
         progress(what, share)
 
 
-def _drawn(study: Study, results: Results, going: Progress) -> Iterator[Picture]:
-    for number, picture in enumerate(pictures(study, results), start=1):
+def _drawn(study: Study, results: Results, going: Progress, failures: Failures) -> Iterator[Picture]:
+    for number, picture in enumerate(pictures(study, results, failures=failures), start=1):
         going(f"drawing: {picture.name}", 0.7 + 0.2 * min(1.0, number / 4))
         yield picture
 
 
-def _files(study: Study, results: Results, drawn: Sequence[Picture]) -> dict[str, bytes]:
+def _files(study: Study, results: Results, drawn: Sequence[Picture], failures: Failures) -> dict[str, bytes]:
+    """Return every file that can be made; report.json comes last, since it holds the failures of the others."""
     told = {
-        "findings": short.findings(results),
-        "limits": short.limits(study, results),
-        "methods": methods(study, results),
+        what: _or_why(failures, f"texts: {what}", make, one_line=what == "methods")
+        for what, make in (
+            ("findings", lambda: short.findings(results)),
+            ("limits", lambda: short.limits(study, results)),
+            ("methods", lambda: methods(study, results)),
+        )
     }
-    files = {
-        "report.html": _page(study, results, drawn, told).encode(),
-        "report.json": listing.document(study, results, told),
-        "report.R": r_script(study, results).encode(),
-        "methods.txt": f"{told['methods']}\n".encode(),
-        "tests.csv": listing.tests_csv(results),
-        "motion.csv": listing.motion_csv(results),
-    }
+    files: dict[str, bytes] = {}
+    for name, make in (
+        ("report.R", lambda: r_script(study, results).encode()),
+        ("methods.txt", f"{told['methods']}\n".encode),
+        ("tests.csv", lambda: listing.tests_csv(results)),
+        ("motion.csv", lambda: listing.motion_csv(results)),
+    ):
+        content = failures.attempt(name, make)
+        files |= {} if isinstance(content, Failure) else {name: content}
     for one in drawn:
         files |= {f"{one.name}.{form}": content for form, content in one.files.items()}
         files[f"{one.name}.txt"] = f"{one.caption}\n".encode()
-    return files | export_files(study)
+    exported = failures.attempt("exported tables", lambda: export_files(study))
+    files |= {} if isinstance(exported, Failure) else exported
+    page_ = _page(study, results, drawn, told, failures).encode()
+    return {"report.html": page_, "report.json": listing.document(study, results, told, failures), **files}
 
 
-def _page(study: Study, results: Results, drawn: Sequence[Picture], told: Mapping[str, Any]) -> str:
-    body = [*_head(study), *_short(told)]
-    for found in results.blocks:
-        body += sections.block(found, results, drawn)
-    body += conduct_section.motion(results)
-    body += conduct_section.conduct(study, results)
-    body += [heading(2, "Methods, to paste"), box([paragraph(str(told["methods"]))])]
-    body += _again(study, results)
-    return page(f"{study.title}: report", body)
+def _or_why(failures: Failures, what: str, make: Callable[[], Any], *, one_line: bool) -> Any:
+    """Return what ``make`` returns, or why it is not there: a sentence, or a tuple of one."""
+    found = failures.attempt(what, make)
+    if not isinstance(found, Failure):
+        return found
+    return f"Not there: {found.why}." if one_line else (f"Not there: {found.why}.",)
+
+
+def _page(study: Study, results: Results, drawn: Sequence[Picture], told: Mapping[str, Any], failures: Failures) -> str:
+    sections_: list[tuple[str, Callable[[], Iterable[str]]]] = [
+        ("In short", lambda: _short(told)),
+        *((found.title, partial(sections.block, found, results, drawn, failures)) for found in results.blocks),
+        ("What the words mean", lambda: sections.verdicts_mean(results)),
+        ("Motion and force", lambda: conduct_section.motion(results)),
+        ("How it was run", lambda: conduct_section.conduct(study, results)),
+        ("Methods, to paste", lambda: (heading(2, "Methods, to paste"), box([paragraph(str(told["methods"]))]))),
+        ("Reproducing this report", lambda: _again(study, results)),
+        ("Answers, counted", lambda: sections.answers(results)),
+    ]
+    first = failures.attempt("first page", lambda: first_page(results, told["limits"], failures))
+    body = [not_there(first.why) if isinstance(first, Failure) else first]
+    for title, make in sections_:
+        found = failures.attempt(f"section “{title}”", partial(_made, make))
+        body += folded([heading(2, title), not_there(found.why)] if isinstance(found, Failure) else found)
+    return page(f"{study.title}: report", [*_head(study), *_failed(failures), *body])
+
+
+def _made(make: Callable[[], Iterable[str]]) -> list[str]:
+    return list(make())
+
+
+def _failed(failures: Failures) -> Iterator[str]:
+    """Say above everything else what is missing."""
+    if failures.found:
+        yield box(
+            [
+                paragraph("Parts of this report could not be computed; everything else is there:"),
+                bullets(map(str, failures.found)),
+            ],
+            "care",
+        )
 
 
 def _head(study: Study) -> Iterator[str]:
     yield heading(1, study.title)
     people = counted(study.n, "participant")
-    yield paragraph(f"Study {study.name}, version {study.version}. {people[:1].upper()}{people[1:]}.", "soft")
+    yield paragraph(f"Study {study.name}, {told_versions(study)}. {people[:1].upper()}{people[1:]}.", "soft")
     marks = []
     if study.simulated:
         marks.append('<span class="mark">SIMULATED participants, no people</span>')
@@ -131,17 +181,15 @@ def _head(study: Study) -> Iterator[str]:
 
 
 def _short(told: Mapping[str, Any]) -> Iterator[str]:
-    yield heading(2, "In short")
+    """Yield every finding in a sentence, with its p."""
+    yield heading(2, "In short: every finding in a sentence")
     found = told["findings"]
-    yield box([bullets(found)]) if found else paragraph("No answers count yet: there are no findings.")
-    if told["limits"]:
-        yield heading(3, "What this study cannot show")
-        yield box([bullets(told["limits"])], "care")
+    yield bullets(found) if found else paragraph("No answers count yet: there are no findings.")
 
 
 def _again(study: Study, results: Results) -> Iterator[str]:
     """Yield what it takes to get the same numbers again."""
-    yield heading(2, "To repeat it")
+    yield heading(2, "Reproducing this report")
     decided = results.decided
     bound = decided.equivalence_bound
     rows = [

@@ -1,39 +1,23 @@
-"""How far raters agree on what they rate, and how far statements measure one thing.
+"""How far two ways of naming agree.
 
-Kendall & Babington Smith (1939), Ann. Math. Stat. 10, 275–287. Cronbach (1951), Psychometrika 16, 297–334; interval:
-Feldt (1965), Psychometrika 30, 357–370. Cohen (1960), Educ. Psychol. Meas. 20, 37–46; its standard error: Fleiss,
-Cohen & Everitt (1969), Psychol. Bull. 72, 323–327.
+Cohen (1960), Educ. Psychol. Meas. 20, 37–46; its standard error: Fleiss, Cohen & Everitt (1969), Psychol. Bull. 72,
+323–327.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.stats import f as f_distribution
 from scipy.stats import norm
 
-from study_app.analysis.statistics.friedman import Friedman, friedman
-from study_app.analysis.statistics.outcome import FEW, TOO_FEW, Array, Interval, checked, complete
+from study_app.analysis.statistics.outcome import Array, Interval, checked
 from study_app.errors import AnalysisError
 
 SURE: Final = 0.95
-
-
-@dataclass(frozen=True, slots=True)
-class Alpha:
-    """Cronbach's alpha over ``items`` statements; None with ``note`` where it does not exist."""
-
-    n: int
-    dropped: int
-    items: int
-    alpha: float | None
-    interval: Interval | None
-    no_interval: str
-    note: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,34 +33,6 @@ class Kappa:
     expected: float | None
     interval: Interval | None
     note: str
-
-
-def kendall_w(ratings: ArrayLike) -> Friedman:
-    """Return Kendall's W (the ``effect``) and its test for (raters, rated) ratings, corrected for ties.
-
-    It is Friedman's test with raters for participants. Raters who miss a rating are dropped.
-    """
-    return replace(friedman(ratings), test="Kendall's W of raters")
-
-
-def cronbach_alpha(values: ArrayLike) -> Alpha:
-    """Return Cronbach's alpha of (participants, items) answers, all keyed in the same direction.
-
-    Participants who miss a statement are dropped.
-    """
-    rows, dropped = complete(values, at_least=2, why=" (statements) for their internal consistency")
-    n, items = rows.shape
-    whole = float(rows.sum(axis=1).var(ddof=1)) if n > 1 else 0.0
-    if whole == 0.0:
-        reason = "no variation between participants" if n > 1 else f"{n} participants answered all statements"
-        return Alpha(n, dropped, items, None, None, reason, reason)
-    alpha = items / (items - 1) * (1 - float(rows.var(axis=0, ddof=1).sum()) / whole)
-    if n < FEW:
-        return Alpha(n, dropped, items, alpha, None, TOO_FEW, "")
-    df = n - 1, (n - 1) * (items - 1)
-    low = 1 - (1 - alpha) * float(f_distribution.ppf((1 + SURE) / 2, *df))
-    high = 1 - (1 - alpha) * float(f_distribution.ppf((1 - SURE) / 2, *df))
-    return Alpha(n, dropped, items, alpha, Interval(low, high, SURE, "Feldt"), "", "")
 
 
 def kappa(table: ArrayLike) -> Kappa:

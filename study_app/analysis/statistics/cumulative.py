@@ -30,14 +30,12 @@ LOG_SD: Final = (-5.0, 3.0)
 class Answers:
     """Answers sorted by participant: ``level`` (n,) from 0, each level used; ``design`` (n, columns); ``starts``.
 
-    ``starts`` are the places of each participant's first answer; None for a model without participants. ``offset`` (n,)
-    is added to what the design predicts, for profiles.
+    ``starts`` are the places of each participant's first answer; None for a model without participants.
     """
 
     level: Whole
     design: Array
     starts: Whole | None
-    offset: Array | None = None
 
     @property
     def cuts(self) -> int:
@@ -82,7 +80,7 @@ def fit(answers: Answers, nodes: int = NODES) -> Model:
     )
     natural = _natural(result.x, cuts, answers.starts is not None)
     if answers.starts is not None and result.x[-1] <= LOG_SD[0] + 1e-3:
-        plain = fit(Answers(answers.level, answers.design, None, answers.offset), nodes)
+        plain = fit(Answers(answers.level, answers.design, None), nodes)
         return Model(plain.thresholds, plain.effects, 0.0, plain.log_likelihood, plain.covariance)
     natural, covariance = _curvature(natural, answers, nodes)
     sd = float(natural[-1]) if answers.starts is not None else 0.0
@@ -103,7 +101,7 @@ def log_likelihood(values: Array, answers: Answers, nodes: int = NODES) -> tuple
     """
     cuts = answers.cuts
     cut, effects = values[:cuts], values[cuts : cuts + answers.design.shape[1]]
-    eta = answers.design @ effects + (0.0 if answers.offset is None else answers.offset)
+    eta = answers.design @ effects
     if answers.starts is None:
         parts = _cells(cut, eta[:, None], answers.level)
         return float(parts[0].sum()), _gathered(parts, np.ones((len(eta), 1)), answers, None)

@@ -13,34 +13,46 @@ from typing import Any, Final, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.stats import t as t_distribution
+from scipy.stats import binomtest, ttest_1samp
 
+from study_app.analysis.statistics.bootstrap_t import p_within, resamples_for
 from study_app.analysis.statistics.outcome import DRAWS, Array, Interval, Outcome, checked, told
 from study_app.analysis.statistics.paired import Alternative, signed, signed_p
 from study_app.errors import AnalysisError
 
-Verdict: TypeAlias = Literal["equivalent", "different", "inconclusive"]
+Verdict: TypeAlias = Literal["equivalent", "different", "inconclusive", "out of reach"]
 
 ALL_SIGNS_UP_TO: Final = 14
 """Up to so many participants all signs are gone through; beyond that they are drawn."""
 
-POWER: Final = 0.80
-"""``n_needed`` participants show equivalence with this probability, were the true difference 0."""
+SAME: Final = 1e-9
+"""Differences that spread less than this are equal."""
 
-MANY: Final = 10**9
-"""With so many participants t is normal."""
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Beyond:
+    """How many of ``n`` participants differ by more than the bound: their ``share``, Clopper-Pearson interval."""
+
+    count: int
+    n: int
+    share: float
+    interval: Interval
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Equivalence(Outcome):
     """Two one-sided t tests against ± ``bound``; ``p`` is the larger of ``p_lower`` and ``p_upper``.
 
-    ``verdict`` is "equivalent" if p ≤ alpha, else "different" if the t test against 0 is significant (``p_different``),
-    else "inconclusive". ``p_permutation`` (signs of the shifted differences) and ``p_ranks`` (signed ranks, which bound
-    the pseudo-median) are the same question without normality; ``checks_agree`` tells whether both give the same
-    answer as p, and ``smallest_check_p`` is the smallest that these two can be. ``n_needed`` is how many participants
-    would give 80 % power, at this spread, were the true difference 0; never so few that these two could not agree.
-    ``p_different_ranks`` is that of signed ranks, two-sided, for a difference from 0.
+    Three more tests ask the same without normality: ``p_permutation`` (signs of the shifted differences), ``p_ranks``
+    (signed ranks, which bound the pseudo-median), both for differences that lie symmetrically, and ``p_bootstrap``
+    (bootstrap-t), for those that lean to one side. Where all differences are equal there is no t, and the signs and
+    ranks alone decide: ``p`` is the larger of theirs.
+
+    ``verdict`` is "equivalent" where every p is at most alpha; else "different" where the larger p of a t test against
+    0 (``p_different``) and of signed ranks (``p_different_ranks``) is; else "out of reach" where no answers of so many
+    participants could have been either, else "inconclusive". ``smallest_check_p`` is the smallest p that signs and
+    ranks can give. ``beyond`` tells how many single participants differ by more than the bound: equivalent means say
+    nothing about them.
     """
 
     bound: float
@@ -55,10 +67,32 @@ class Equivalence(Outcome):
     p_upper: float | None = None
     p_permutation: float | None = None
     p_ranks: float | None = None
+    p_bootstrap: float | None = None
     smallest_check_p: float | None = None
     checks_agree: bool | None = None
     sd: float | None = None
+    beyond: Beyond | None = None
     n_needed: int | None = None
+
+    @property
+    def equal(self) -> bool:
+        """Whether every test for equivalence shows it."""
+        asked = (self.p, self.p_permutation, self.p_ranks, self.p_bootstrap)
+        return self.p is not None and all(p is None or p <= self.alpha for p in asked)
+
+    @property
+    def p_difference(self) -> float | None:
+        """P that the mean differs from 0: the larger of the t test's and the signed ranks', of those there are."""
+        return max((p for p in (self.p_different, self.p_different_ranks) if p is not None), default=None)
+
+    def judged(self, p_adjusted: float | None, members: int) -> Equivalence:
+        """Return this with the verdict that holds among ``members`` comparisons, whose p is ``p_adjusted`` here."""
+        if self.equal:
+            return replace(self, verdict="equivalent")
+        if p_adjusted is not None and p_adjusted <= self.alpha:
+            return replace(self, verdict="different")
+        hopeless = min(0.5**self.n, 2 * members * 0.5**self.n) > self.alpha
+        return replace(self, verdict="out of reach" if hopeless else "inconclusive")
 
 
 def tost(
@@ -73,7 +107,7 @@ def tost(
     bound : float
         In points of the scale, set before the study.
     checks : bool
-        Whether to ask without normality too; planning, which asks thousands of times, does not.
+        Whether to ask without normality too, which takes long for many hundreds of participants.
 
     Raises
     ------
@@ -84,63 +118,26 @@ def tost(
         raise AnalysisError(f"a bound of equivalence of {bound} means nothing; give one above 0 in points of the scale")
     array = checked(differences, "participants")
     kept = array[~np.isnan(array)]
-    found = _without_spread(kept, len(array) - len(kept), bound, alpha)
-    if not found.sd:
+    found = _described(kept, len(array) - len(kept), bound, alpha)
+    if not len(kept):
         return found
-    found = replace(found, no_interval="", **_by_t(kept, found.sd, bound, alpha))
-    return replace(found, **_without_normality(kept, bound, alpha, seed, found)) if checks else found
+    if found.sd is not None and found.sd > SAME:
+        found = replace(found, no_interval="", **_by_t(kept, found.sd, bound, alpha))
+        found = replace(found, **_without_normality(kept, bound, seed, alpha)) if checks else found
+    elif len(kept) > 1:
+        found = replace(found, **_without_spread(kept, bound, seed))
+    if found.p_ranks is not None and found.t is not None:
+        asked = (found.p_permutation, found.p_ranks, found.p_bootstrap)
+        by_t = found.p is not None and found.p <= alpha
+        found = replace(found, checks_agree=all((p is None or p <= alpha) == by_t for p in asked))
+    found = found.judged(found.p_difference, 1)
+    return replace(found, note=_note(found)) if found.p is not None else found
 
 
-def _by_t(kept: Array, sd: float, bound: float, alpha: float) -> dict[str, Any]:
-    """Return what the t tests say."""
-    n, mean, error = len(kept), float(kept.mean()), sd / math.sqrt(len(kept))
-    t_lower, t_upper = (mean + bound) / error, (mean - bound) / error
-    p_lower, p_upper = float(t_distribution.sf(t_lower, n - 1)), float(t_distribution.cdf(t_upper, n - 1))
-    p, p_different = max(p_lower, p_upper), float(2 * t_distribution.sf(abs(mean / error), n - 1))
-    reach = float(t_distribution.ppf(1 - alpha, n - 1)) * error
-    return {
-        "statistic": min(t_lower, -t_upper),
-        "p": p,
-        "method": f"t({n - 1}), bound ±{bound:g} points",
-        "interval": Interval(mean - reach, mean + reach, 1 - 2 * alpha, "t"),
-        "note": _note(p, p_different, alpha),
-        "verdict": "equivalent" if p <= alpha else "different" if p_different <= alpha else "inconclusive",
-        "t": mean / error,
-        "t_lower": t_lower,
-        "t_upper": t_upper,
-        "p_different": p_different,
-        "p_lower": p_lower,
-        "p_upper": p_upper,
-        "smallest_check_p": None,
-        "n_needed": _needed(sd / bound, alpha),
-    }
-
-
-def _without_normality(kept: Array, bound: float, alpha: float, seed: int, by_t: Equivalence) -> dict[str, Any]:
-    """Return what changing signs and signed ranks say to the same questions."""
-    permuted = max(_signs(kept + bound, seed), _signs(bound - kept, seed))
-    ranked = max(_ranks(kept + bound), _ranks(bound - kept))
-    return {
-        "p_permutation": permuted,
-        "p_ranks": ranked,
-        "p_different_ranks": _ranks(kept, "two-sided"),
-        "smallest_check_p": _smallest(len(kept)),
-        "checks_agree": all((p <= alpha) == (by_t.verdict == "equivalent") for p in (permuted, ranked)),
-    }
-
-
-def _note(p: float, p_different: float, alpha: float) -> str:
-    if p <= alpha:
-        return "different from 0, but within the bound" if p_different <= alpha else ""
-    if p_different <= alpha:
-        return "the difference is shown, and it is not shown to stay within the bound"
-    return "neither a difference nor equivalence is shown"
-
-
-def _without_spread(kept: Array, dropped: int, bound: float, alpha: float) -> Equivalence:
-    """Return what can be said of fewer than two participants or of equal differences: no spread, no test."""
+def _described(kept: Array, dropped: int, bound: float, alpha: float) -> Equivalence:
+    """Return what can be said before any test."""
     n = len(kept)
-    reason = f"all {n} differences are equal: no spread to judge by" if n > 1 else f"{told(n)}: no spread"
+    reason = f"all {n} differences are equal: no spread for an interval" if n > 1 else f"{told(n)}: no spread"
     return Equivalence(
         test="equivalence, two one-sided t tests",
         n=n,
@@ -156,28 +153,73 @@ def _without_spread(kept: Array, dropped: int, bound: float, alpha: float) -> Eq
         note=reason,
         bound=bound,
         alpha=alpha,
-        verdict="inconclusive",
+        verdict="inconclusive" if 0.5**n <= alpha else "out of reach",
         smallest_check_p=_smallest(n) if n else None,
         sd=float(kept.std(ddof=1)) if n > 1 else None,
+        beyond=_beyond(kept, bound) if n else None,
     )
 
 
-def _needed(spread: float, alpha: float) -> int:
-    """Return how many participants show equivalence with 80 % power at a ``spread`` in bounds, the difference being 0.
-
-    n ≥ ((t(1 − alpha) + t(1 − (1 − power) / 2)) · spread)² with n − 1 degrees of freedom (Chow, Shao & Wang 2008,
-    Sample Size Calculations in Clinical Research, 3.1.3), and no fewer than the signs of n differences can show.
-    """
-    n = max(2, math.ceil(-math.log2(alpha)), math.ceil((_distance(MANY, alpha) * spread) ** 2))
-    while math.sqrt(n) < _distance(n, alpha) * spread:
-        n += 1
-    return n
+def _beyond(kept: Array, bound: float) -> Beyond:
+    count, n = int((np.abs(kept) > bound + SAME).sum()), len(kept)
+    ends = binomtest(count, n).proportion_ci(0.95, method="exact")
+    interval = Interval(float(ends.low), float(ends.high), 0.95, "Clopper-Pearson")
+    return Beyond(count=count, n=n, share=count / n, interval=interval)
 
 
-@lru_cache(maxsize=4096)
-def _distance(n: int, alpha: float) -> float:
-    """Return how many standard errors away the bound must be for n participants to show equivalence."""
-    return float(t_distribution.ppf([1 - alpha, (1 + POWER) / 2], n - 1).sum())
+def _by_t(kept: Array, sd: float, bound: float, alpha: float) -> dict[str, Any]:
+    """Return what the t tests say."""
+    lower = ttest_1samp(kept, -bound, alternative="greater")
+    upper = ttest_1samp(kept, bound, alternative="less")
+    different = ttest_1samp(kept, 0.0)
+    ends = different.confidence_interval(1 - 2 * alpha)
+    return {
+        "statistic": float(min(lower.statistic, -upper.statistic)),
+        "p": float(max(lower.pvalue, upper.pvalue)),
+        "method": f"t({len(kept) - 1}), bound ±{bound:g} points",
+        "interval": Interval(float(ends.low), float(ends.high), 1 - 2 * alpha, "t"),
+        "t": float(different.statistic),
+        "t_lower": float(lower.statistic),
+        "t_upper": float(upper.statistic),
+        "p_different": float(different.pvalue),
+        "p_lower": float(lower.pvalue),
+        "p_upper": float(upper.pvalue),
+        "smallest_check_p": None,
+    }
+
+
+def _without_normality(kept: Array, bound: float, seed: int, alpha: float) -> dict[str, Any]:
+    """Return what changing signs, signed ranks and the bootstrap say to the same questions."""
+    return {
+        "p_permutation": max(_signs(kept + bound, seed), _signs(bound - kept, seed)),
+        "p_ranks": max(_ranks(kept + bound), _ranks(bound - kept)),
+        "p_bootstrap": float(p_within(kept[None], bound, seed, resamples_for(alpha))[0]),
+        "p_different_ranks": _ranks(kept, "two-sided"),
+        "smallest_check_p": _smallest(len(kept)),
+    }
+
+
+def _without_spread(kept: Array, bound: float, seed: int) -> dict[str, Any]:
+    """Return what the tests that need no spread say where all differences are equal."""
+    permuted = max(_signs(kept + bound, seed), _signs(bound - kept, seed))
+    ranked = max(_ranks(kept + bound), _ranks(bound - kept))
+    return {
+        "p": max(permuted, ranked),
+        "method": f"signs and signed ranks, bound ±{bound:g} points: all differences are equal",
+        "p_permutation": permuted,
+        "p_ranks": ranked,
+        "p_different_ranks": _ranks(kept, "two-sided"),
+    }
+
+
+def _note(found: Equivalence) -> str:
+    p = found.p_difference
+    differs = p is not None and p <= found.alpha
+    if found.verdict == "equivalent":
+        return "different from 0, but within the bound" if differs else ""
+    if found.verdict == "different":
+        return "the difference is shown, and it is not shown to stay within the bound"
+    return "neither a difference nor equivalence is shown"
 
 
 def _smallest(n: int) -> float:
@@ -192,13 +234,17 @@ def _ranks(shifted: Array, alternative: Alternative = "greater") -> float:
     return 1.0 if p is None else p
 
 
+@lru_cache(maxsize=4)
+def _all_signs(n: int) -> Array:
+    return np.asarray(1.0 - 2.0 * (np.arange(2**n)[:, None] >> np.arange(n) & 1), dtype=np.float64)
+
+
 def _signs(shifted: Array, seed: int) -> float:
     """Return the one-sided p that the mean of ``shifted`` (n,) is above 0, by changing signs."""
     n, found = len(shifted), shifted.sum()
     rounding = 1e-9 * np.abs(shifted).sum()
     if n <= ALL_SIGNS_UP_TO:
-        signs = 1.0 - 2.0 * (np.arange(2**n)[:, None] >> np.arange(n) & 1)
-        return float((signs @ shifted >= found - rounding).mean())
+        return float((_all_signs(n) @ shifted >= found - rounding).mean())
     rng = np.random.default_rng(seed)
     sums = np.zeros(DRAWS)
     for value in shifted:

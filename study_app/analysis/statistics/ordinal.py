@@ -11,7 +11,6 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import brentq
 from scipy.stats import chi2 as chi_square
 from scipy.stats import norm
 
@@ -44,7 +43,8 @@ class Ordinal(Outcome):
     ``effect`` is the coefficient where there is one column; otherwise they are in ``coefficients``, each against the
     first setting. ``levels`` are the levels that were chosen at all, ``thresholds`` lie between them
     (``threshold_errors``: theirs). ``sd`` is the spread of the participants' intercepts in log odds (None: a model
-    without). ``answers`` were given and ``missing`` were not.
+    without). ``answers`` were given, and ``missing`` settings
+    of participants were not answered.
     """
 
     df: int
@@ -60,14 +60,22 @@ class Ordinal(Outcome):
 
 
 def ordinal(
-    values: ArrayLike, columns: ArrayLike | None = None, *, intercepts: bool = True, nodes: int = NODES
+    values: ArrayLike,
+    columns: ArrayLike | None = None,
+    *,
+    sessions: ArrayLike | None = None,
+    intercepts: bool = True,
+    nodes: int = NODES,
 ) -> Ordinal:
     """Test whether settings move answers up or down.
 
     Parameters
     ----------
-    values : (participants, settings) array
+    values : (participants, settings) or (participants, settings, presentations) array
         NaN where an answer is missing; the others of that participant are used.
+    sessions : array of the shape of ``values``, optional
+        In which session each answer was given: a factor beside the settings, which is not tested. It is left out where
+        all answers are of one, or where sessions cannot be told apart from settings.
     columns : (settings, columns) array, optional
         What is tested: 0 and 1 for factors, numbers for amounts (a delay in units of 100 ms). Without, every setting is
         compared with the first.
@@ -80,53 +88,23 @@ def ordinal(
     AnalysisError
         The columns do not fit the settings.
     """
-    array = checked(values, "participants, settings")
+    array = np.asarray(values, dtype=np.float64)
+    array = checked(array[..., None] if array.ndim == 2 else array, "participants, settings, presentations")
     design = _design(array.shape[1], columns)
-    used = np.asarray(~np.isnan(array).all(axis=1))
+    used = np.asarray(~np.isnan(array).all(axis=(1, 2)))
     rows = array[used]
     levels = np.unique(rows[~np.isnan(rows)])
     reason = _impossible(rows, levels, intercepts)
     if reason:
         return _outcome(rows, used, levels, design.shape[1], intercepts, None, 0.0, reason, nodes)
     answers = _answers(rows, levels, design, intercepts)
-    whole = fit(answers, nodes)
-    without = fit(Answers(answers.level, answers.design[:, :0], answers.starts), nodes)
+    factor = _factor(None if sessions is None else np.asarray(sessions).reshape(array.shape)[used], rows, answers)
+    whole = fit(Answers(answers.level, np.hstack([answers.design, factor]), answers.starts), nodes)
+    without = fit(Answers(answers.level, factor, answers.starts), nodes)
     ratio = max(0.0, 2 * (whole.log_likelihood - without.log_likelihood))
     bad = whole.errors is None or bool((np.abs(whole.effects) > FAR).any() or (whole.errors > FAR).any())
-    return _outcome(rows, used, levels, design.shape[1], intercepts, whole, ratio, SEPARATED if bad else "", nodes)
-
-
-def profile_interval(
-    values: ArrayLike, columns: ArrayLike, column: int, *, intercepts: bool = True, nodes: int = NODES
-) -> Interval | None:
-    """Return the 95 % profile-likelihood interval of one column's coefficient, None where the likelihood stays flat.
-
-    About twenty models are fitted: slow, and better than Wald's where participants are few.
-    """
-    array = checked(values, "participants, settings")
-    rows = array[~np.isnan(array).all(axis=1)]
-    levels = np.unique(rows[~np.isnan(rows)])
-    answers = _answers(rows, levels, _design(array.shape[1], columns), intercepts)
-    best = fit(answers, nodes)
-    if best.errors is None:
-        return None
-    others = np.delete(answers.design, column, axis=1)
-    place, error = float(best.effects[column]), float(best.errors[answers.cuts + column])
-    drop = float(chi_square.ppf(SURE, 1)) / 2
-
-    def above(value: float) -> float:
-        held = fit(Answers(answers.level, others, answers.starts, answers.design[:, column] * value), nodes)
-        return held.log_likelihood - best.log_likelihood + drop
-
-    ends = []
-    for side in (-1.0, 1.0):
-        reach = 3 * error
-        while above(place + side * reach) > 0:
-            reach *= 2
-            if reach > 3 * FAR:
-                return None
-        ends.append(float(brentq(above, place, place + side * reach, xtol=1e-5)))
-    return Interval(ends[0], ends[1], SURE, "profile likelihood")
+    note = SEPARATED if bad else ""
+    return _outcome(rows, used, levels, design.shape[1], intercepts, whole, ratio, note, nodes, factor.shape[1])
 
 
 def _design(settings: int, columns: ArrayLike | None) -> Array:
@@ -149,7 +127,7 @@ def _impossible(rows: Array, levels: Array, intercepts: bool) -> str:
         return "no variation: all answers are equal"
     if intercepts and len(rows) < FEW:
         return TOO_FEW
-    if np.isnan(rows).all(axis=0).any():
+    if np.isnan(rows).all(axis=(0, 2)).any():
         return "a setting was not answered by anybody"
     return ""
 
@@ -157,10 +135,18 @@ def _impossible(rows: Array, levels: Array, intercepts: bool) -> str:
 def _answers(rows: Array, levels: Array, design: Array, intercepts: bool) -> Answers:
     """Return the given answers in a row, participant by participant, with levels that were not chosen left out."""
     there = ~np.isnan(rows)
-    people, settings = np.nonzero(there)
+    people, settings, _ = np.nonzero(there)
     level: Whole = np.searchsorted(levels, rows[there]).astype(np.int64)
     starts = np.flatnonzero(np.diff(people, prepend=-1)) if intercepts else None
     return Answers(level, design[settings], starts)
+
+
+def _factor(sessions: Array | None, rows: Array, answers: Answers) -> Array:
+    """Return a column (answers, sessions − 1) for each session but the first, none where they add nothing."""
+    given = np.zeros(len(answers.level)) if sessions is None else sessions[~np.isnan(rows)]
+    found = np.asarray(given[:, None] == np.unique(given)[1:], dtype=np.float64)
+    together = np.column_stack([np.ones(len(given)), answers.design, found])
+    return found if np.linalg.matrix_rank(together) == together.shape[1] else found[:, :0]
 
 
 def _outcome(
@@ -173,11 +159,12 @@ def _outcome(
     ratio: float,
     note: str,
     nodes: int,
+    sessions: int = 0,
 ) -> Ordinal:
     found = None if note else model
-    coefficients = () if found is None else _coefficients(found)
+    coefficients = () if found is None else _coefficients(found)[:columns]
     single = coefficients[0] if len(coefficients) == 1 else None
-    parameters = columns + max(0, len(levels) - 1) + intercepts
+    parameters = columns + sessions + max(0, len(levels) - 1) + intercepts
     errors = None if found is None else found.errors
     return Ordinal(
         test="cumulative logit" + (" mixed model" if intercepts else " model"),
@@ -188,6 +175,7 @@ def _outcome(
         p=None if found is None else float(chi_square.sf(ratio, columns)),
         smallest_p=None,
         method=f"random intercepts, adaptive Gauss-Hermite quadrature, {nodes} nodes"
+        + ("; sessions as a factor" if sessions else "")
         if intercepts
         else "no intercepts",
         effect_name="log odds of a higher answer",
@@ -204,7 +192,7 @@ def _outcome(
         aic=None if found is None else 2 * parameters - 2 * found.log_likelihood,
         levels=tuple(float(level) for level in levels),
         answers=int((~np.isnan(rows)).sum()),
-        missing=int(np.isnan(rows).sum()),
+        missing=int(np.isnan(rows).all(axis=2).sum()),
     )
 
 

@@ -20,7 +20,6 @@ Alternative: TypeAlias = Literal["two-sided", "greater", "less"]
 EXACT_UP_TO: Final = 200
 """Up to so many pairs p is exact; beyond that normal, corrected for ties."""
 
-ALPHA: Final = 0.05
 INTERVAL_FROM: Final = 6
 """Below so many pairs with a difference no test can be significant, and no interval is shown."""
 
@@ -43,7 +42,14 @@ class Paired(Outcome):
     median_difference: float | None
 
 
-def paired(x: ArrayLike, y: ArrayLike, *, zeros: Zeros = "wilcox", alternative: Alternative = "two-sided") -> Paired:
+def paired(
+    x: ArrayLike,
+    y: ArrayLike,
+    *,
+    zeros: Zeros = "wilcox",
+    alternative: Alternative = "two-sided",
+    alpha: float = 0.05,
+) -> Paired:
     """Compare answers of the same participants under two settings.
 
     Parameters
@@ -54,6 +60,8 @@ def paired(x: ArrayLike, y: ArrayLike, *, zeros: Zeros = "wilcox", alternative: 
         What becomes of equal pairs. Wilcoxon's rule is what R and JASP do.
     alternative : str
         "greater": x lies above y.
+    alpha : float
+        What p is compared with: the note says where so few pairs cannot reach it.
 
     Raises
     ------
@@ -85,21 +93,11 @@ def paired(x: ArrayLike, y: ArrayLike, *, zeros: Zeros = "wilcox", alternative: 
         effect=effect,
         interval=interval,
         no_interval=reason,
-        note=_note(n, len(ranks), smallest, effect),
+        note=_note(n, len(ranks), smallest, effect, alpha),
         zeros=int((differences == 0.0).sum()),
         superiority=float(np.sign(differences).mean()) if n else None,
         median_difference=float(np.median(differences)) if n else None,
     )
-
-
-def cliffs_delta(x: ArrayLike, y: ArrayLike) -> float | None:
-    """Return P(x > y) − P(x < y) over all pairs of two independent groups (Cliff 1993); None if one is empty.
-
-    It is also the rank-biserial correlation of the Mann-Whitney test. NaN is left out.
-    """
-    first, second = checked(x, "participants of one group"), checked(y, "participants of the other")
-    signs = np.sign(first[~np.isnan(first), None] - second[None, ~np.isnan(second)])
-    return float(signs.mean()) if signs.size else None
 
 
 def signed(differences: Array, zeros: Zeros = "wilcox") -> tuple[Whole, Array]:
@@ -150,13 +148,11 @@ def _fisher(effect: float | None, n: int) -> tuple[Interval | None, str]:
     return Interval(low, high, 0.95, "Fisher z, approximate: covers about 90 % up to two dozen pairs"), ""
 
 
-def _note(n: int, different: int, smallest: float | None, effect: float | None) -> str:
+def _note(n: int, different: int, smallest: float | None, effect: float | None, alpha: float) -> str:
     if n == 0:
         return "no participant answered under both settings"
     if smallest is None:
         return f"all {n} pairs are equal"
-    if smallest > ALPHA:
-        return (
-            f"cannot reach p < .05: the smallest p that {different} pairs with a difference can give is {smallest:.4g}"
-        )
+    if smallest > alpha:
+        return f"cannot reach p ≤ {alpha:g}: {different} pairs that differ can give {smallest:.4g} at least"
     return f"all {different} pairs that differ went one way" if effect is not None and abs(effect) == 1.0 else ""

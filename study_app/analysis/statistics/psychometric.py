@@ -2,12 +2,14 @@
 
 Ψ(x) = γ + (1 − γ − λ) F((x − threshold) / width); the width reaches from F = 5 % to 95 %, γ is the rate of guesses and
 λ that of lapses. Wichmann & Hill (2001), Percept. Psychophys. 63, 1293–1313; Schütt et al. (2016), Vision Res. 122,
-105–123.
+105–123. The maximum of the likelihood is searched on a grid over all four parameters and refined from its best nodes,
+so that it does not depend on starting values.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 from typing import Final, Literal, TypeAlias
 
 import numpy as np
@@ -20,15 +22,33 @@ Shape: TypeAlias = Literal["logistic", "normal"]
 Bounds: TypeAlias = tuple[float, float]
 
 GUESSES: Final[Bounds] = (0.0, 0.5)
-LAPSES: Final[Bounds] = (0.0, 0.06)
-"""Where a free rate may lie (lapses: Wichmann & Hill)."""
+LAPSES: Final[Bounds] = (0.0, 0.5)
+"""Where a free rate may lie. People who never agree are lapses of the pooled answers, and there may be many of them."""
 
 NEAR: Final = 1e-4
 """What is so near to a bound lies on it."""
 
+TINY: Final = 1e-12
+"""The smallest and, from 1, the largest share that a curve expects."""
+
 LOGISTIC: Final = 2 * float(np.log(19.0))
 NORMAL: Final = 2 * float(ndtri(0.95))
 """From 5 % to 95 % of the standard distributions."""
+
+PLACES: Final = 61
+"""Thresholds of the grid, from one span below the lowest level to one span above the highest."""
+
+WIDTHS: Final = 12
+RATES: Final = (0.0, 0.02, 0.06, 0.12, 0.2, 0.3, 0.4, 0.5)
+"""Widths of the grid (their logarithms evenly spaced), and its rates of guesses and lapses."""
+
+STEPS: Final = np.array(list(product((0.0, -1.0, 1.0), repeat=3)))
+FIRST_STEP: Final = np.array([0.3, 0.03, 0.03])
+ROUNDS: Final = 40
+"""A node moves to its best neighbour (log width, guesses, lapses), or halves its steps, so many times."""
+
+POLISHED: Final = 3
+"""The best curve is refined from so many nodes of the profile."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +67,7 @@ class Counts:
     @property
     def saturated(self) -> float:
         """The log-likelihood of a model that fits every share exactly."""
-        return _log_likelihood(self, self.yes / self.asked)
+        return float(_log_likelihoods(self, self.yes / self.asked))
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +81,18 @@ class Curve:
     log_likelihood: float
 
 
+@dataclass(frozen=True, slots=True)
+class Profile:
+    """The best curves at fixed ``thresholds`` (places,), their ``log_likelihoods`` and ``others`` (places, 3).
+
+    ``others`` are the logarithm of the width in spans, the guesses and the lapses.
+    """
+
+    thresholds: Array
+    log_likelihoods: Array
+    others: Array
+
+
 def share(x: Array, curve: Curve, shape: Shape) -> Array:
     """Return the share of yes answers that a fitted ``curve`` expects at ``x``."""
     z = (x - curve.threshold) / curve.width
@@ -69,34 +101,49 @@ def share(x: Array, curve: Curve, shape: Shape) -> Array:
     return found
 
 
-def fit(
-    counts: Counts,
-    shape: Shape,
-    guess: Bounds,
-    lapse: Bounds,
-    *,
-    threshold: float | None = None,
-    near: Curve | None = None,
-) -> Curve:
-    """Return the curve of maximum likelihood, with guesses and lapses within bounds (equal ends: fixed).
+def places(counts: Counts) -> Array:
+    """Return the thresholds of the grid."""
+    return np.linspace(counts.levels.min() - counts.span, counts.levels.max() + counts.span, PLACES)
 
-    ``threshold`` holds the threshold fixed, for profiles; ``near`` is a curve to begin from.
+
+def profile(counts: Counts, shape: Shape, guess: Bounds, lapse: Bounds, thresholds: Array) -> Profile:
+    """Return the curves of maximum likelihood at ``thresholds`` (places,), with rates within bounds.
+
+    Equal bounds hold a rate fixed.
     """
+    low, high = _log_widths(counts)
+    nodes = np.array(list(product(np.linspace(low, high, WIDTHS), _rates(guess), _rates(lapse))))
+    values = _at(counts, shape, thresholds[:, None], nodes[None])
+    best = values.argmax(axis=1)
+    found, reached = nodes[best], values[np.arange(len(best)), best]
+    lows, highs = np.array([low, guess[0], lapse[0]]), np.array([high, guess[1], lapse[1]])
+    step = np.tile(np.minimum(FIRST_STEP, highs - lows), (len(thresholds), 1))
+    rows = np.arange(len(thresholds))
+    for _ in range(ROUNDS):
+        near = np.clip(found[:, None] + step[:, None] * STEPS, lows, highs)
+        values = _at(counts, shape, thresholds[:, None], near)
+        best = values.argmax(axis=1)
+        found, reached = near[rows, best], values[rows, best]
+        step[best == 0] /= 2
+    return Profile(thresholds, reached, found)
+
+
+def fit(counts: Counts, shape: Shape, guess: Bounds, lapse: Bounds, begun: Profile | None = None) -> Curve:
+    """Return the curve of maximum likelihood; ``begun`` is the profile over the grid, where it is known already."""
+    start = profile(counts, shape, guess, lapse, places(counts)) if begun is None else begun
     low, span = float(counts.levels.min()), counts.span
-    middle = (-1.0, 2.0) if threshold is None else ((threshold - low) / span,) * 2
-    bounds = [middle, _log_widths(counts), guess, lapse]
-    lows, highs = ([bound[end] for bound in bounds] for end in (0, 1))
+    bounds = [(-1.0, 2.0), _log_widths(counts), guess, lapse]
     results = [
         minimize(
             _objective,
-            np.clip(start, lows, highs),
+            [(start.thresholds[place] - low) / span, *start.others[place]],
             (counts, shape, low, span),
             MINIMISER,
             jac=True,
             bounds=bounds,
             options={"ftol": 1e-11, "gtol": 1e-7, "maxfun": 500},
         )
-        for start in _starts(counts, guess, lapse, near, low)
+        for place in np.argsort(-start.log_likelihoods, kind="stable")[:POLISHED]
     ]
     best = min(results, key=lambda result: float(result.fun))
     place, log_width, guessed, lapsed = (float(value) for value in best.x)
@@ -114,8 +161,6 @@ def at_bounds(counts: Counts, curve: Curve, guess: Bounds, lapse: Bounds) -> tup
         told.append("the curve is as steep as the fit allows: the levels lie too far apart to tell how steep it is")
     if curve.width > wide * (1 - NEAR):
         told.append("the curve is as flat as the fit allows")
-    if not counts.levels.min() <= curve.threshold <= counts.levels.max():
-        told.append("the threshold lies outside the levels that were asked about")
     return tuple(told)
 
 
@@ -125,14 +170,18 @@ def _log_widths(counts: Counts) -> Bounds:
     return float(np.log(gap / counts.span / 10)), float(np.log(10.0))
 
 
-def _starts(counts: Counts, guess: Bounds, lapse: Bounds, near: Curve | None, low: float) -> list[list[float]]:
-    if near is not None:
-        place, width = (near.threshold - low) / counts.span, np.log(near.width / counts.span)
-        return [[place, width, near.guess, near.lapse], [place, 0.0, guess[0], lapse[0]]]
-    shares = np.maximum.accumulate(counts.yes / counts.asked)
-    crossed = float(np.interp((shares[0] + shares[-1]) / 2, shares, counts.levels))
-    place = (crossed - low) / counts.span
-    return [[place, np.log(width), min(guess[1], guess[0] + 0.02), lapse[0]] for width in (0.15, 0.5, 1.5)]
+def _rates(bounds: Bounds) -> tuple[float, ...]:
+    """Return the rates of the grid within bounds."""
+    return tuple(dict.fromkeys((bounds[0], *(rate for rate in RATES if bounds[0] < rate < bounds[1]), bounds[1])))
+
+
+def _at(counts: Counts, shape: Shape, thresholds: Array, others: Array) -> Array:
+    """Return the log-likelihoods (…) at ``thresholds`` (…) and ``others`` (…, 3)."""
+    factor = LOGISTIC if shape == "logistic" else NORMAL
+    scale = factor / (np.exp(others[..., 0]) * counts.span)
+    z = (counts.levels - thresholds[..., None]) * scale[..., None]
+    grown = expit(z) if shape == "logistic" else ndtr(z)
+    return _log_likelihoods(counts, others[..., 1, None] + (1 - others[..., 1] - others[..., 2])[..., None] * grown)
 
 
 def _objective(values: Array, counts: Counts, shape: Shape, low: float, span: float) -> tuple[float, Array]:
@@ -143,7 +192,7 @@ def _objective(values: Array, counts: Counts, shape: Shape, low: float, span: fl
     grown, slope = (
         (expit(z), expit(z) * expit(-z)) if shape == "logistic" else (ndtr(z), np.exp(-(z**2) / 2) / np.sqrt(2 * np.pi))
     )
-    expected = np.clip(guess + (1 - guess - lapse) * grown, 1e-12, 1 - 1e-12)
+    expected = np.clip(guess + (1 - guess - lapse) * grown, TINY, 1 - TINY)
     pull = counts.yes / expected - (counts.asked - counts.yes) / (1 - expected)
     steep = pull * (1 - guess - lapse) * slope
     gradient = np.array(
@@ -154,9 +203,11 @@ def _objective(values: Array, counts: Counts, shape: Shape, low: float, span: fl
             -(pull * grown).sum(),
         ]
     )
-    return -_log_likelihood(counts, expected), -gradient
+    return -float(_log_likelihoods(counts, expected)), -gradient
 
 
-def _log_likelihood(counts: Counts, expected: Array) -> float:
-    kept = np.clip(expected, 1e-12, 1 - 1e-12)
-    return float((counts.yes * np.log(kept) + (counts.asked - counts.yes) * np.log1p(-kept)).sum())
+def _log_likelihoods(counts: Counts, expected: Array) -> Array:
+    """Return the log-likelihoods (…) of expected shares (…, levels)."""
+    kept = np.clip(expected, TINY, 1 - TINY)
+    values: Array = np.log(kept) @ counts.yes + np.log1p(-kept) @ (counts.asked - counts.yes)
+    return values

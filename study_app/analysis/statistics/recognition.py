@@ -63,13 +63,6 @@ class Recognition(Outcome):
     unanswered: int
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Matching(Outcome):
-    """Hits in all where every name was given out once, against ``expected`` hits by chance."""
-
-    expected: float
-
-
 def named(ratings: ArrayLike) -> Whole:
     """Return which label each participant named for each setting.
 
@@ -136,43 +129,6 @@ def recognition(names: ArrayLike, truth: Sequence[int | None], labels: int, *, s
         decided=int((given >= 0).sum()),
         undecided=int((given == UNDECIDED).sum()),
         unanswered=int((given == UNANSWERED).sum()),
-    )
-
-
-def matching(hits: ArrayLike, settings: int) -> Matching:
-    """Test hits where every participant gave each of ``settings`` names to one setting.
-
-    Parameters
-    ----------
-    hits : (participants,) array
-        Right names of each participant; NaN where there are none.
-
-    Raises
-    ------
-    AnalysisError
-        A number of hits cannot occur, such as all but one.
-    """
-    array = checked(hits, "participants")
-    kept = array[~np.isnan(array)]
-    if not 2 <= settings <= MOST or not set(kept) <= {*range(settings - 1), settings}:
-        raise AnalysisError(f"hits {sorted(set(kept))} cannot come from giving out {settings} names once each")
-    one = of_values(sum(place == name for place, name in enumerate(order)) for order in permutations(range(settings)))
-    chance = total([one] * len(kept))
-    n, found = len(kept), int(kept.sum())
-    return Matching(
-        test="recognition by matching",
-        n=n,
-        dropped=len(array) - n,
-        statistic_name="hits",
-        statistic=float(found) if n else None,
-        p=chance.at_least(found) if n else None,
-        smallest_p=chance.highest if n else None,
-        method="exact matching distribution, one-sided",
-        effect_name="hits above chance, of what could be above it",
-        effect=(found - n) / (n * (settings - 1)) if n else None,
-        no_interval="no interval: the names of one participant depend on each other",
-        note="" if n else "no participant gave out the names",
-        expected=chance.mean,
     )
 
 

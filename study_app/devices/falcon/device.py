@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
@@ -13,22 +14,25 @@ from study_app.devices.base import Device
 from study_app.devices.falcon import boot, calibration
 from study_app.devices.falcon.bulk import BulkCalls
 from study_app.devices.falcon.diagnosis import OPEN, Facts, sentence
-from study_app.devices.falcon.exchange import COUNTERS, exchange_functions, new_exchange
+from study_app.devices.falcon.exchange import COUNTERS, LEAST_MASS_KG, exchange_functions, new_exchange
 from study_app.devices.falcon.failures import ProgramMissing, usb_failure
 from study_app.devices.falcon.firmware import check
 from study_app.devices.falcon.geometry import DEFAULT_GEOMETRY, WORKSPACE_M, geometry_named
 from study_app.devices.falcon.guard import Guard, quiet
 from study_app.devices.falcon.homing import PATIENCE_S, home
-from study_app.devices.falcon.kinematics import REACHED, inverse, new_mechanism
+from study_app.devices.falcon.kinematics import REACHED, count_at, inverse, new_mechanism
 from study_app.devices.falcon.transport import Transport, open_transport
 from study_app.devices.falcon.wire import ERROR_NO_DEVICE
 from study_app.errors import DeviceError, DeviceLost
-from study_app.haptics.layout import READING, records
+from study_app.haptics.dynamics import Dynamics
+from study_app.haptics.layout import new_command, new_reading
 
 FORCE_LIMIT_N: Final = 8.0
 
 _FARTHEST = 1700  # counts, a little more than is known to be used
 _CLOSED = BulkCalls(0, 0)
+_LEAVE_S = 0.5  # a read or a write takes a few milliseconds at most
+_BETWEEN_S = 0.001
 
 
 class FalconDevice(Device):
@@ -75,8 +79,10 @@ class FalconDevice(Device):
         self._calibration: calibration.Calibration | None = None
         self._guard_died = False
         self._found: dict[str, Any] = {}
-        self._reading = records(READING, 1)
+        self._reading, self._command = new_reading(), new_command()
+        self._round_trip_s: float | None = None
         mechanism = new_mechanism(self._geometry, calibration.UNCALIBRATED_UNITS_PER_NM)
+        self._count_m = count_at(mechanism, self._geometry.centre_m)
         self._check_reach(mechanism)
         self._memory = new_exchange(_CLOSED, mechanism, self._geometry)
         self._falcon = self._memory[0]
@@ -111,24 +117,37 @@ class FalconDevice(Device):
             raise
 
     def close(self) -> None:
-        """Send zero torque several times and let go of it; a second call does nothing."""
+        """Send zero torque several times and let go of it; a second call does nothing.
+
+        While a servo's loop hangs in its bridge it stays open and guarded, so that the loop ends the force when it
+        returns, and calls nothing that is gone; a call after that closes it.
+        """
+        used, gone = bool(self._falcon.handle), bool(self._falcon.lost)
+        self._falcon.lost = 1
+        if not self._is_left():
+            self._falcon.lost = int(gone)
+            return
         transport, self._transport = self._transport, None
         guard, self._guard = self._guard, None
-        used, gone = bool(self._falcon.handle), bool(self._falcon.lost)
         pushing = gone and bool(self._falcon.units.any())
-        self._falcon.lost = 1
         self._falcon.handle, self._falcon.transfer = _CLOSED
         if transport is None:
             return
         quieted = not used
         try:
             quieted = quieted or quiet(transport) > 0
+            self._falcon.sent_n = 0.0 if quieted else self._falcon.sent_n
         finally:  # an interrupt ends neither its being let go of nor its guard's duty
             try:
                 transport.close()
             finally:
                 if guard is not None:
                     (guard.leave if pushing else guard.stand_down if quieted or gone else guard.release)()
+
+    @property
+    def dynamics(self) -> Dynamics:
+        """The round trip that was measured when it was opened, an encoder's count at the grip, and its least mass."""
+        return Dynamics(self._round_trip_s, self._count_m, LEAST_MASS_KG)
 
     @property
     def counters(self) -> dict[str, int]:
@@ -157,8 +176,17 @@ class FalconDevice(Device):
             "geometry": self._geometry.name,
             "calibration": "none" if used is None else used.describe(),
             "units_per_nm": float(self._falcon.mechanism.units_per_nm),
+            "dynamics": self.dynamics.describe(),
+            "delay_ticks": int(self._falcon.delay),
             **self._found,
         }
+
+    def _is_left(self) -> bool:
+        """Wait a moment for whoever reads or writes in another thread; return whether nobody does any more."""
+        patience = time.monotonic() + _LEAVE_S
+        while self._falcon.inside and time.monotonic() < patience:
+            time.sleep(_BETWEEN_S)
+        return not self._falcon.inside
 
     def _open_bridge(self) -> Transport:
         return open_transport(self.bridge)
@@ -203,6 +231,7 @@ class FalconDevice(Device):
         boot.set_event_character(transport, on=True)
         hastened_s = boot.measure_round_trip(transport)
         better = hastened_s < plain_s
+        self._round_trip_s = min(plain_s, hastened_s)
         if not better:
             boot.set_event_character(transport, on=False)
         return {
@@ -216,6 +245,7 @@ class FalconDevice(Device):
         self._geometry = self._published if used is None else geometry_named(used.geometry)
         gain = calibration.UNCALIBRATED_UNITS_PER_NM if used is None else used.units_per_nm
         self._falcon.mechanism = new_mechanism(self._geometry, gain, 0.0 if used is None else used.arm_offset_rad)
+        self._count_m = count_at(self._falcon.mechanism, self._geometry.centre_m)
 
     def _home(self, transport: Transport) -> None:
         mechanism = self._falcon.mechanism.copy()
@@ -242,7 +272,7 @@ class FalconDevice(Device):
         assert transport is not None  # noqa: S101 - it is being opened
         now_ns = round(1e9 * transport.now_s())
         self.read.ctypes(self.context, now_ns, int(self._reading.ctypes.data))
-        self.write.ctypes(self.context, 0.0, 0.0, 0.0)
+        self.write.ctypes(self.context, int(self._command.ctypes.data))
         self.check()
         if self._falcon.lost:
             raise usb_failure(ERROR_NO_DEVICE, "homing it")

@@ -8,26 +8,19 @@ then half a second from none to all. Which replies are believed: see ``replies``
 
 from __future__ import annotations
 
-import math
 from functools import cache
 from typing import Any, Final
 
 import numpy as np
+from numba import types
+from numba.extending import intrinsic
 
 from study_app.devices.falcon.bulk import BULK, BulkCalls
 from study_app.devices.falcon.geometry import OUT_STROKE_M, Geometry
-from study_app.devices.falcon.kinematics import (
-    MECHANISM,
-    REACHED,
-    START_M,
-    angles,
-    forward,
-    jacobian,
-    motor_units,
-    torques,
-)
+from study_app.devices.falcon.kinematics import MECHANISM, REACHED, START_M, angles, forward
 from study_app.devices.falcon.packets import PARSER, STATUS, feed, pack, strip
-from study_app.devices.falcon.replies import believe, settle, trust
+from study_app.devices.falcon.replies import believe, give_up_measurement, settle, trust
+from study_app.devices.falcon.sending import may_wait, push
 from study_app.devices.falcon.wire import (
     ENDPOINT_IN,
     ENDPOINT_OUT,
@@ -49,15 +42,20 @@ from study_app.haptics.cfunctions import (
     WRITE,
     c_function,
     call_at,
+    fence,
     record_at,
 )
 from study_app.haptics.compiled import kernel
-from study_app.haptics.layout import READING, records
+from study_app.haptics.layout import COMMAND, READING, records
+from study_app.haptics.limits import SLEW_S, slew_limit_n
+from study_app.haptics.vector import copy
 
+LEAST_MASS_KG: Final = 0.1
+"""The least mass at the grip in any direction [kg]: arms and platform of a device of this size weigh about as much.
+Nobody published a measured value; the limits of the loop are held for 30 to 250 g."""
 RAMP_S: Final = 0.5
-MOST_STEP_N: Final = 0.47
-"""The force at the grip steps by no more within a turn, however many turns the motors were not told anything new: the
-servo's 0.5 N, less what motion within a turn makes of torques."""
+SMOOTHING_S: Final = 2e-3
+"""Time constant of the grip's velocity, which tells a braking force from one that drives."""
 LONGEST_GAP_NS: Final = 20_000_000
 """A reply that waited longer for the loop to look is too old to be given."""
 _BEYOND = 2  # so many positions in a row show an out-stroke: one may be of a packet whose homed bits were garbled
@@ -73,7 +71,8 @@ FALCON = np.dtype(
         ("mechanism", MECHANISM),
         ("centre_m", np.float64),  # z of the hand's origin in the Falcon's frame
         ("started", np.int64),  # 1 after the first turn
-        ("lost", np.int64),  # 1: the bridge is gone
+        ("lost", np.int64),  # 1: the bridge is gone, or not open
+        ("inside", np.int64),  # 1 while a read or write runs, which may call the bridge
         # the stream
         ("data", np.uint8, (_DATA,)),
         ("packet", np.uint8, (PACKET,)),
@@ -85,8 +84,14 @@ FALCON = np.dtype(
         ("theta", np.float64, (3,)),  # of the last pose
         ("position_m", np.float64, (3,)),
         ("rates", np.float64, (3, 3)),
+        ("posed_ns", np.int64),  # time of the last pose; 0: none since the stream began anew
+        ("previous_m", np.float64, (3,)),  # the pose before
+        ("velocity_mps", np.float64, (3,)),
+        ("tick_s", np.float64),  # how long the last one was
+        ("slew_n_per_s", np.float64),  # how fast a force grows that does not brake the grip
         ("force_n", np.float64, (3,)),  # as it passed the gate
         ("held_n", np.float64, (3,)),  # what the motors push with, as told before
+        ("sent_n", np.float64, (3,)),  # and as told last, where the grip was then
         ("torque_nm", np.float64, (3,)),
         ("units", np.int64, (3,)),  # what the motors were last told
         # the motion of the arms, to tell garbled encoders
@@ -109,8 +114,12 @@ FALCON = np.dtype(
         # who owes whom
         ("asked", np.int64),  # packets sent since the last look
         ("owed", np.int64),  # replies that did not come so far
-        ("testing", np.int64),  # turn of the test for late replies; 0: none
-        ("retest", np.int64),  # turns until the next one
+        ("delay", np.int64),  # reads after which a packet's reply comes, as measured
+        ("measured", np.int64),  # what a measurement found that waits for another one to say the same
+        ("testing", np.int64),  # packets left out so far to measure it; 0: no measurement
+        ("astray", np.int64),  # reads in a row after which more or less was owed than the delay explains
+        ("unsure", np.int64),  # 1: the delay has to be measured
+        ("retest", np.int64),  # turns until it may be
         # counters
         ("turns", np.int64),
         ("fresh", np.int64),  # turns that gave a position
@@ -147,7 +156,20 @@ COUNTERS: Final = (
 
 _falcon_at = record_at(FALCON)
 _reading_at = record_at(READING)
+_command_at = record_at(COMMAND)
 _transfer = call_at(BULK)
+
+
+def _full_fence(_typing_context: Any) -> Any:
+    def generate(context: Any, builder: Any, _signature: Any, _arguments: Any) -> Any:
+        builder.fence("seq_cst")
+        return context.get_dummy_value()
+
+    return types.none(), generate
+
+
+_order_stores_and_loads: Any = intrinsic(_full_fence)
+"""For compiled code: other threads see what was written before it before anything after it is read."""
 
 
 def _offset(field: str) -> int:
@@ -156,6 +178,7 @@ def _offset(field: str) -> int:
     return int(fields[field][1])
 
 
+_READING_BYTES = READING.itemsize
 _DATA_AT, _PACKET_AT, _TRANSFERRED_AT = _offset("data"), _offset("packet"), _offset("transferred")
 
 
@@ -167,6 +190,8 @@ def new_exchange(calls: BulkCalls, mechanism: Any, geometry: Geometry) -> Any:
     falcon.mechanism = mechanism
     falcon.centre_m = geometry.centre_m
     falcon.position_m = START_M
+    falcon.delay = 1
+    falcon.slew_n_per_s = slew_limit_n(SLEW_S, LEAST_MASS_KG) / SLEW_S
     return memory
 
 
@@ -178,10 +203,47 @@ def exchange_functions() -> tuple[Any, Any]:
 
 def _read(context: int, now_ns: int, reading: int) -> int:
     falcon = _falcon_at(context)
-    if falcon.lost != 0:  # or not open: then there is no function to call
+    if not _enter(falcon):
         return READ_LOST
+    answer = _take_reply(falcon, context, now_ns, reading)
+    _leave(falcon)
+    return answer
+
+
+def _write(context: int, command: int) -> int:
+    falcon, asked = _falcon_at(context), _command_at(command)
+    answer = READ_LOST
+    if _enter(falcon):
+        copy(asked.force_n, falcon.force_n)
+        answer = _send_force(falcon, context)
+        _leave(falcon)
+    copy(falcon.sent_n, asked.sent_n)
+    return answer
+
+
+@kernel
+def _enter(falcon: Any) -> bool:
+    """Return whether the bridge may be called until `_leave`; who closes it sets ``lost``, then reads ``inside``."""
+    falcon.inside = 1
+    _order_stores_and_loads()
+    if falcon.lost != 0:
+        falcon.inside = 0
+        return False
+    return True
+
+
+@kernel
+def _leave(falcon: Any) -> None:
+    fence()
+    falcon.inside = 0
+
+
+@kernel
+def _take_reply(falcon: Any, context: int, now_ns: int, reading: int) -> int:
+    """Receive what the Falcon answered; put a new position into the record at ``reading``."""
     elapsed_ns = now_ns - falcon.now_ns
     falcon.now_ns = now_ns
+    falcon.tick_s = elapsed_ns * 1e-9
     falcon.turns += 1
     falcon.apart += 1
     packets = _receive(falcon, context)
@@ -189,6 +251,8 @@ def _read(context: int, now_ns: int, reading: int) -> int:
         return READ_LOST
     gap = falcon.started == 0 or elapsed_ns <= 0 or elapsed_ns > LONGEST_GAP_NS
     falcon.started = 1
+    if gap:
+        falcon.posed_ns = 0
     punctual = settle(falcon, packets, gap)
     if packets == 0:
         falcon.missing += 1
@@ -199,63 +263,32 @@ def _read(context: int, now_ns: int, reading: int) -> int:
     if not (believe(falcon) and trust(falcon) and _locate(falcon)):
         falcon.refused += 1
         return READ_NOTHING_NEW
+    _follow(falcon)
     _open_gate(falcon, elapsed_ns * 1e-9)
     out = _reading_at(reading)
     for axis in range(3):
         out.position_m[axis] = falcon.position_m[axis]
     out.position_m[2] -= falcon.centre_m
     out.buttons = falcon.buttons
+    if out.size_bytes >= _READING_BYTES:
+        out.delay_ticks = falcon.delay
     falcon.fresh += 1
     return READ_NEW
 
 
-def _write(context: int, fx: float, fy: float, fz: float) -> int:
-    falcon = _falcon_at(context)
-    if falcon.lost != 0:
-        return READ_LOST
-    none = fx == 0.0 and fy == 0.0 and fz == 0.0
-    pushing = falcon.units[0] != 0 or falcon.units[1] != 0 or falcon.units[2] != 0
-    if falcon.testing != 0 and not (none and pushing):
-        return 0
-    falcon.force_n[0], falcon.force_n[1], falcon.force_n[2] = fx, fy, fz
-    told = falcon.units[0], falcon.units[1], falcon.units[2]
+@kernel
+def _send_force(falcon: Any, context: int) -> int:
+    """Send ``force_n`` or, to measure the delay, leave the motors as they are; ``sent_n`` is then what they got."""
+    before = falcon.units[0], falcon.units[1], falcon.units[2]
     push(falcon)
+    waits = falcon.testing > 0 and may_wait(falcon)
+    if falcon.testing > 0 and not waits:
+        give_up_measurement(falcon)
     pack(falcon.units, _lights(falcon), falcon.packet)
-    if not _send(falcon, context):
-        falcon.units[0], falcon.units[1], falcon.units[2] = told
+    if waits or not _send(falcon, context):
+        falcon.units[0], falcon.units[1], falcon.units[2] = before
+        copy(falcon.held_n, falcon.sent_n)
     return READ_LOST if falcon.lost != 0 else 0
-
-
-@kernel
-def push(falcon: Any) -> None:
-    """Turn ``force_n``, as much of it as passes the gate, into ``units`` for the motors."""
-    for axis in range(3):
-        falcon.force_n[axis] *= falcon.share
-    none = falcon.force_n[0] == 0.0 and falcon.force_n[1] == 0.0 and falcon.force_n[2] == 0.0
-    if none or falcon.homed == 0 or falcon.unguarded != 0:
-        for i in range(3):
-            falcon.units[i] = 0
-        return
-    jacobian(falcon.mechanism, falcon.theta, falcon.position_m, falcon.rates)
-    _limit_step(falcon)
-    torques(falcon.rates, falcon.force_n, falcon.torque_nm)
-    falcon.shortened += motor_units(falcon.mechanism, falcon.torque_nm, falcon.units)
-
-
-@kernel
-def _limit_step(falcon: Any) -> None:
-    """Shorten the step from what the motors push with at present, where the grip is now."""
-    square = 0.0
-    for axis in range(3):
-        held_n = 0.0
-        for i in range(3):
-            held_n -= falcon.units[i] / falcon.mechanism.units_per_nm * falcon.rates[i, axis]
-        falcon.held_n[axis] = held_n
-        square += (falcon.force_n[axis] - held_n) ** 2
-    if square > MOST_STEP_N * MOST_STEP_N:
-        share = MOST_STEP_N / math.sqrt(square)
-        for axis in range(3):
-            falcon.force_n[axis] = falcon.held_n[axis] + share * (falcon.force_n[axis] - falcon.held_n[axis])
 
 
 @kernel
@@ -306,6 +339,20 @@ def _locate(falcon: Any) -> bool:
     for i in range(3):
         falcon.theta[i] = falcon.seen_rad[i]
     return True
+
+
+@kernel
+def _follow(falcon: Any) -> None:
+    """Take the new pose into the grip's velocity."""
+    interval_s = (falcon.now_ns - falcon.posed_ns) * 1e-9
+    known, weight = falcon.posed_ns != 0, interval_s / (interval_s + SMOOTHING_S)
+    for axis in range(3):
+        moved_mps = (falcon.position_m[axis] - falcon.previous_m[axis]) / interval_s
+        falcon.velocity_mps[axis] += weight * (moved_mps - falcon.velocity_mps[axis])
+        if not known:
+            falcon.velocity_mps[axis] = 0.0
+        falcon.previous_m[axis] = falcon.position_m[axis]
+    falcon.posed_ns = falcon.now_ns
 
 
 @kernel

@@ -145,6 +145,14 @@ def jacobian(mechanism: Any, theta: Any, position_m: Any, rates: Any) -> None:
         rates[i, 2] = -along_z / turn
 
 
+def count_at(mechanism: Any, z_m: float) -> float:
+    """Return the longest way of the grip that one count of the encoders stands for, on the axis at ``z_m`` [m]."""
+    theta, rates, position_m = np.zeros(3), np.zeros((3, 3)), np.array([0.0, 0.0, z_m])
+    inverse(mechanism, position_m, theta)
+    jacobian(mechanism, theta, position_m, rates)
+    return float(np.linalg.norm(np.linalg.inv(rates), 2) * mechanism.rad_per_count)
+
+
 @kernel
 def torques(rates: Any, force_n: Any, torque_nm: Any) -> None:
     """Write into ``torque_nm`` (3,) [N m] the arm torques that push with ``force_n`` (3,) [N]: ``J^T tau = F``.

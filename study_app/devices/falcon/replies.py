@@ -1,8 +1,12 @@
-"""Which replies of a Falcon count: those that were asked for in the turn before, and that a hand can have made.
+"""How late the replies of a Falcon are, and which of them count: recent ones that a hand can have made.
 
-A reply cannot be matched to its packet, so replies that are always late look like punctual ones after a loss. When more
-than ``MOST_OWED`` are owed, nothing but an end of force is sent for two turns: what still comes then was late, and late
-positions are not given; else the owed ones are written off as lost.
+A reply cannot be matched to its packet, so replies that are always late look like punctual ones after a loss. So the
+delay is measured: when for ``SLOWER_READS`` reads more is owed than the delay explains, or for ``FASTER_READS`` less,
+nothing is sent until a read brings no reply; so many reads later than their packets the replies come. What is then
+still owed is lost. A longer delay is believed at once, a shorter one when two measurements in a row say so, for a lost
+reply looks like a shorter one. Where the force changes too fast for a measurement, the delay is believed to be what the
+owed replies explain. Positions later than ``MOST_DELAY`` are not given, nor those of a time when more than
+``MOST_OWED`` replies are owed beyond the delay.
 
 There is no check sum, so a byte that was garbled into another that may stand there passes the parser. What a hand does
 not do, a leap of an arm away from its motion, therefore needs a second reply that says so; likewise buttons, the end of
@@ -14,10 +18,14 @@ from __future__ import annotations
 from typing import Any, Final
 
 from study_app.haptics.compiled import kernel
+from study_app.haptics.dynamics import MOST_DELAY
 
 MOST_OWED: Final = 4
-TEST_TURNS: Final = 2
-RETEST_TURNS: Final = 20
+SLOWER_READS: Final = 8
+FASTER_READS: Final = 200
+GIVEN_UP_READS: Final = 32
+RETEST_TURNS: Final = 30
+"""So long at least the motors are told something new in every turn, after a measurement."""
 ALL_HOMED: Final = 0b111
 BELIEVED: Final = 3
 """So many packets in a row must say that an arm is no longer homed: one may have been garbled."""
@@ -29,39 +37,83 @@ DOUBTS: Final = 2  # so many replies in a row may be doubted
 
 @kernel
 def settle(falcon: Any, packets: int, gap: bool) -> bool:
-    """Keep account of what is owed; return whether what came was asked for in the turn before."""
+    """Keep account of what is owed and of the delay; return whether what came is recent enough to be given."""
     owed = falcon.owed + falcon.asked - packets
     falcon.asked = 0
     falcon.surplus += max(-owed, 0)
     falcon.owed = max(owed, 0)
+    falcon.retest = max(falcon.retest - 1, 0)
+    if owed < 0:
+        falcon.unsure = 1
     if gap:
+        falcon.testing = 0
         _write_off(falcon)
         falcon.tracked = 0
         return False
     if falcon.testing > 0:
-        if packets == 0 and falcon.testing >= TEST_TURNS:
-            _write_off(falcon)
-        elif falcon.testing > TEST_TURNS:
-            falcon.testing = 0
-            falcon.retest = RETEST_TURNS
-        else:
-            falcon.testing += 1
-        return False
-    if falcon.owed <= MOST_OWED:
-        return True
-    if falcon.retest > 0:
-        falcon.retest -= 1
-    elif packets > 0:  # silence tells nothing about what is on its way
+        _measure_delay(falcon, packets)
+    elif packets > 0:  # silence says nothing about what is on its way
+        _look_for_change(falcon)
+    return bool(falcon.delay <= MOST_DELAY and _few_owed(falcon))
+
+
+@kernel
+def _look_for_change(falcon: Any) -> None:
+    """Begin a measurement where more, or for a long time less, is owed than the delay explains."""
+    more, less = falcon.owed > falcon.delay - 1, falcon.owed < falcon.delay - 1
+    falcon.astray = falcon.astray + 1 if more or less else max(falcon.astray - 1, 0)
+    due = falcon.unsure != 0 or falcon.delay > MOST_DELAY or falcon.astray >= (SLOWER_READS if more else FASTER_READS)
+    if (due and falcon.retest == 0) or (not _few_owed(falcon) and falcon.delay <= MOST_DELAY):
         falcon.testing = 1
-    return False
+    if more and falcon.astray >= GIVEN_UP_READS:  # the force changes too much for a measurement
+        _believe_delay(falcon, falcon.owed + 1)
+
+
+@kernel
+def _few_owed(falcon: Any) -> bool:
+    """Return whether so few replies are owed beyond the delay that what comes is recent, whatever became of them."""
+    return bool(falcon.owed < falcon.delay + MOST_OWED)
+
+
+@kernel
+def _measure_delay(falcon: Any, packets: int) -> None:
+    """Wait for a read without a reply: nothing that was sent before the measurement is on its way any more."""
+    found = falcon.testing
+    if packets > 0 and found <= MOST_DELAY:
+        falcon.testing += 1
+        return
+    falcon.testing = 0
+    if packets == 0:
+        _write_off(falcon)
+    if found >= falcon.delay or found == falcon.measured:
+        _believe_delay(falcon, found)
+    else:  # a reply lost may look like that: once more
+        falcon.measured = found
+        falcon.unsure = 1
+        falcon.retest = MOST_DELAY
+
+
+@kernel
+def give_up_measurement(falcon: Any) -> None:
+    """Send after all, and for some turns whatever comes; believe what of the delay has shown so far."""
+    falcon.delay = max(falcon.delay, falcon.testing)
+    falcon.testing = 0
+    falcon.retest = MOST_DELAY
+
+
+@kernel
+def _believe_delay(falcon: Any, found: int) -> None:
+    falcon.delay = found
+    falcon.measured = 0
+    falcon.unsure = 0
+    falcon.astray = 0
+    falcon.retest = RETEST_TURNS
 
 
 @kernel
 def _write_off(falcon: Any) -> None:
     falcon.written_off += falcon.owed
     falcon.owed = 0
-    falcon.testing = 0
-    falcon.retest = 0
 
 
 @kernel

@@ -18,7 +18,7 @@ from study_app.devices.falcon.failures import usb_failure
 from study_app.devices.falcon.wire import ERROR_NO_DEVICE
 from study_app.errors import DeviceError
 from study_app.haptics.cfunctions import READ_LOST, READ_NEW
-from study_app.haptics.layout import READING, records
+from study_app.haptics.layout import new_command, new_reading
 
 PLACES_M: Final = (
     (0.0, 0.0, 0.0),
@@ -70,7 +70,7 @@ class Grip:
         self._device = device
         self._virtual = virtual
         self._now_ns = 0 if virtual else time.monotonic_ns()
-        self._reading = records(READING, 1)
+        self._reading, self._command = new_reading(), new_command()
         self._place_m = np.zeros(3)
         self._velocity_mps = np.zeros(3)
         self._target_m: Any = None
@@ -103,8 +103,8 @@ class Grip:
             self._see(self._reading[0].position_m, elapsed_s)
         else:
             self._blind += 1
-        x_n, y_n, z_n = self._force_n()
-        device.write.ctypes(device.context, float(x_n), float(y_n), float(z_n))
+        self._command[0].force_n = self._command[0].sent_n = self._force_n()
+        device.write.ctypes(device.context, int(self._command.ctypes.data))
 
     def _see(self, place_m: Any, elapsed_s: float) -> None:
         moved = (place_m - self._place_m) / elapsed_s

@@ -15,7 +15,7 @@ from study_app.evaluation.identify.parameters import Parameter
 from study_app.evaluation.output import make_folder
 from study_app.haptics import motion
 from study_app.haptics.offline import Table
-from study_app.protocol.scene_text import scene_text
+from study_app.protocol.scene_text import for_new_file, scene_text
 from study_app.store.atomic import write_file
 
 COLUMNS: Final = tuple(f"{kind}_{axis}_n" for kind in ("measured", "fitted", "residual") for axis in "xyz")
@@ -68,14 +68,17 @@ def residuals(found: Fit) -> Table:
 
 
 def preset(found: Fit, source: Path) -> str:
-    """Return the fitted scene as a scene file, each fitted number with its interval beside it."""
+    """Return the fitted scene as a scene file, each fitted number with its interval beside it.
+
+    The fit takes velocities from the measured motion, never from an estimator; the file names that of new files.
+    """
     digest = hashlib.sha256(source.read_bytes()).hexdigest()
     said = (
         f"Fitted to {source.name} (SHA-256 {digest[:16]}…), {found.summary()}.",
         *(f"Warning: {warning}." for warning in found.warnings),
     )
     notes = {_place(it, found): f"{100 * CONFIDENCE:g} %: {found.told(it)[1]}" for it in found.parameters}
-    return scene_text(found.scene, said=said, notes=notes)
+    return scene_text(for_new_file(found.scene), said=said, notes=notes)
 
 
 def _place(it: Parameter, found: Fit) -> tuple[str, ...]:

@@ -1,7 +1,7 @@
 """Every sample of a servo looked at once: what was promised of it, and what was counted on the way.
 
 Promised: no force beyond the limit or that is no number; none while it is stopped; between two forces sent at most
-0.5 N, unless a force stop, a fault or the energy account let go at once; no reading believed that is no place; a
+1.5 N, unless a force stop, a fault or the energy account let go at once; no reading believed that is no place; a
 deadline every period, but for those passed over; every turn in telemetry, or counted as dropped.
 """
 
@@ -26,13 +26,13 @@ from study_app.haptics.layout import (
     STATUS_STALE_FAULT,
     records,
 )
-from study_app.haptics.safety import SLEW_N
 
 TOLERANCE_N: Final = 1e-9
 
 COUNTS = np.dtype(
     [
         ("limit_n", np.float64),  # of the force
+        ("slew_n", np.float64),  # of its change from tick to tick
         ("period_ns", np.int64),
         # where it is
         ("follows", np.int64),  # 1: the next sample comes a period after the last one, of the same run
@@ -54,7 +54,7 @@ COUNTS = np.dtype(
         ("buttons", np.int64),  # readings with the stop button down
         ("long_turns", np.int64),  # turns that took a period or more
         ("most_n", np.float64),
-        ("steepest_n", np.float64),  # greatest change between two forces, where 0.5 N is promised
+        ("steepest_n", np.float64),  # greatest change between two forces, where a limit is promised
         ("let_go_n", np.float64),  # where a stop or a fault let go
         ("paid_n", np.float64),  # where the energy account took what was owed
         ("latest_s", np.float64),  # how late a turn began at most
@@ -77,14 +77,16 @@ class Audit:
     Parameters
     ----------
     limit_n : the greatest force that may be sent [N]
+    slew_n : the most that it may change from tick to tick [N]
     period_ns : of the servo
     reach_m : how far the device's handle gets from the middle at most [m]
     """
 
-    def __init__(self, limit_n: float, period_ns: int, reach_m: float) -> None:
+    def __init__(self, limit_n: float, slew_n: float, period_ns: int, reach_m: float) -> None:
         self._memory = records(COUNTS, 1)
         self.counts = self._memory[0]
-        self.counts.limit_n, self.counts.period_ns, self.counts.first_tick = limit_n, period_ns, -1
+        self.counts.limit_n, self.counts.slew_n = limit_n, slew_n
+        self.counts.period_ns, self.counts.first_tick = period_ns, -1
         self._displaced_m = (reach_m + GLITCH_M) / 2
 
     def take(self, samples: Any) -> None:
@@ -176,7 +178,7 @@ def _look_at_force(counts: Any, sample: Any) -> None:
         counts.paid_n = max(counts.paid_n, change_n)
         return
     counts.steepest_n = max(counts.steepest_n, change_n)
-    if change_n > SLEW_N + TOLERANCE_N:
+    if change_n > counts.slew_n + TOLERANCE_N:
         counts.steps += 1
         _break_promise(counts, sample)
 

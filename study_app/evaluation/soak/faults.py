@@ -25,8 +25,9 @@ from study_app.haptics.cfunctions import (
 )
 from study_app.haptics.clock import VIRTUAL, Clock
 from study_app.haptics.compiled import kernel
-from study_app.haptics.layout import BUTTON_STOP, READING, records
+from study_app.haptics.layout import BUTTON_STOP, COMMAND, READING, records
 from study_app.haptics.pace import random
+from study_app.haptics.vector import copy, norm
 
 NON_FINITE, GLITCH, SILENCE, JUMP, BUTTON, LOST, LOST_AT_WRITE = range(7)
 KINDS: Final = ("non_finite", "glitch", "silence", "clock_jump", "stop_button", "lost", "lost_at_write")
@@ -70,6 +71,7 @@ FAULTS = np.dtype(
 
 _faults_at = record_at(FAULTS)
 _reading_at = record_at(READING)
+_command_at = record_at(COMMAND)
 _virtual_at = record_at(VIRTUAL)
 _inner_read, _inner_write = call_at(READ), call_at(WRITE)
 
@@ -87,6 +89,7 @@ class FaultyDevice:
     def __init__(self, inner: Driver, clock: Clock, seed: int) -> None:
         self.name = inner.name
         self.force_limit_n = inner.force_limit_n
+        self.dynamics = inner.dynamics
         self.jumps = not clock.runs
         self._kept = (inner, clock)
         self._memory = records(FAULTS, 1)
@@ -196,18 +199,16 @@ def _read(context: int, now_ns: int, reading: int) -> int:
     return answer
 
 
-def _write(context: int, fx: float, fy: float, fz: float) -> int:
-    faults = _faults_at(context)
+def _write(context: int, command: int) -> int:
+    faults, force_n = _faults_at(context), _command_at(command).force_n
     faults.writes += 1
-    size_n = math.sqrt(fx * fx + fy * fy + fz * fz)
+    size_n = norm(force_n)
     if math.isfinite(size_n):
         faults.most_n = max(faults.most_n, size_n)
     else:
         faults.not_finite += 1
-    faults.last_n[0] = fx
-    faults.last_n[1] = fy
-    faults.last_n[2] = fz
-    answer: int = _inner_write(faults.write, faults.device, fx, fy, fz)
+    copy(force_n, faults.last_n)
+    answer: int = _inner_write(faults.write, faults.device, command)
     if faults.losing != 0:
         faults.losing = 0
         return READ_LOST

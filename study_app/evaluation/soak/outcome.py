@@ -101,7 +101,10 @@ class Soaked:
         yield f"{spoilt} forces of the liquids that are no numbers", spoilt > 0
         yield f"{device.not_finite} forces were written that are no numbers", device.not_finite > 0
         yield f"a force of {device.most_n:.3g} N was written", device.most_n > counts.limit_n + TOLERANCE_N
-        yield f"{counts.steps} steps of up to {counts.steepest_n:.3g} N, not 0.5 N{first}", counts.steps > 0
+        yield (
+            f"{counts.steps} steps of up to {counts.steepest_n:.3g} N, not {counts.slew_n:g} N{first}",
+            counts.steps > 0,
+        )
         yield f"{counts.unstopped} forces other than zero while stopped{first}", counts.unstopped > 0
         yield f"{counts.believed} readings believed that are no place{first}", counts.believed > 0
         yield f"the clock is off its ticks by up to {counts.drift_ns} ns{first}", counts.drift_ns > 0

@@ -43,6 +43,7 @@ from study_app.evaluation.soak.restless import RestlessHand
 from study_app.haptics.clock import SystemClock, VirtualClock
 from study_app.haptics.gate import resolve
 from study_app.haptics.layout import SAMPLE, records
+from study_app.haptics.limits import slew_limit_n
 from study_app.haptics.motion import Floats
 from study_app.haptics.pack import elements_needed
 from study_app.haptics.scene import Scene
@@ -123,7 +124,8 @@ class Soak:
         self._longest_wake = max(elements_needed(scene) for scene in self._scenes.values())
         self.servo = Servo(self.device, clock=clock, rate_hz=self._rate_hz, elements=self._longest_wake)
         limit_n = min(hand.force_limit_n, max(scene.force_limit_n for scene in self._scenes.values()))
-        self.audit = Audit(limit_n, round(1e9 / self._rate_hz), max(hand.workspace_m))
+        slew_n = slew_limit_n(1 / self._rate_hz, hand.dynamics.mass_kg)
+        self.audit = Audit(limit_n, slew_n, round(1e9 / self._rate_hz), max(hand.workspace_m))
         self.drift = Drift()
         self._reader = self.servo.telemetry.reader()
         self._due, self._rests = _Due(), Rests()

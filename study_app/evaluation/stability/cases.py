@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 import difflib
-import itertools
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from functools import cache
-from random import Random
 from typing import Any, Final
 
 from study_app.errors import StudyError
-from study_app.haptics.scene import Ewma, Foaw, Line, Liquid, Raw, Scene, Velocity
+from study_app.haptics.scene import Ewma, Foaw, Kalman, Line, Liquid, Raw, Scene, Velocity
 from study_app.protocol.load import load
 
 REACHES: Final = "reaches"
 CIRCLES: Final = "circles"
 STROKE: Final = "stroke"
-MOTIONS: Final = (REACHES, CIRCLES, STROKE)
+SINE: Final = "sine"
+MOTIONS: Final = (REACHES, CIRCLES, STROKE, SINE)
+
+FIRST: Final = "handle"
+SECOND: Final = "arm"
+PLANTS: Final = (FIRST, SECOND)
+FALCON: Final = "falcon"
 
 THROWN: Final = "thrown"
 LETS_GO: Final = "lets-go"
@@ -52,18 +56,38 @@ RANGES: Final[Mapping[str, tuple[float, float]]] = {
     "noise_um": (0.0, 1000.0),
     "jitter": (0.0, 0.5),
     "missed": (0.0, 0.5),
+    "way_mm": (4.0, 200.0),
+    "release_s": (0.3, 2.0),
+    "believed": (-1, 4),
+    "slows_to": (-1, 4),
+    "lost": (0.0, 0.5),
+    "duplicated": (0.0, 0.5),
+    "burst_ms": (0.0, 40.0),
 }
 """What a case may be made of; the sweep's own choices lie within."""
 
-ESTIMATORS: Final[Mapping[str, Velocity]] = {"ewma": Ewma(), "line": Line(), "foaw": Foaw(), "raw": Raw()}
+ESTIMATORS: Final[Mapping[str, Velocity]] = {
+    "ewma": Ewma(),
+    "kalman": Kalman(),
+    "line": Line(),
+    "foaw": Foaw(),
+    "raw": Raw(),
+}
 
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One closed loop. ``delay`` is in ticks, ``jitter`` in periods, ``missed`` a share of turns; sizes as named.
+    """One closed loop. ``delay`` is in ticks, ``jitter`` in periods, ``missed`` a share of ticks; sizes as named.
 
-    ``hand`` is a grip of `GRIPS`: "thrown" is let go from the start, "lets-go" after 0.6 s. ``speed_mps`` is the
-    greatest speed of the hand along its ``motion``.
+    ``hand`` is a grip of `GRIPS`: "thrown" is let go from the start, "lets-go" after ``release_s``. ``speed_mps`` is
+    the greatest speed of the hand along its ``motion``, ``way_mm`` the length of a reach, the diameter of a circle and
+    twice the amplitude of a sine.
+
+    ``plant`` is the device and hand of ``haptics.plant``, the second one, of `arm`, or "falcon": the driver and its
+    emulator (`driven`), whose delay, encoders and samples are their own. ``believed`` is the delay that
+    the loop believes (-1: the true one), ``slows_to`` that of the device from 0.5 s on (-1: the same). ``lost`` is a
+    share of ticks without a new sample, ``duplicated`` one of samples that repeat the position before; for the last
+    ``burst_ms`` of every 300 ms there is no new sample.
     """
 
     liquid: str = "water"
@@ -81,6 +105,24 @@ class Case:
     noise_um: float = 0.0
     jitter: float = 0.0
     missed: float = 0.0
+    way_mm: float = 60.0
+    release_s: float = 0.6
+    plant: str = FIRST
+    believed: int = -1
+    slows_to: int = -1
+    lost: float = 0.0
+    duplicated: float = 0.0
+    burst_ms: float = 0.0
+
+    @property
+    def believed_delay(self) -> int:
+        """The delay [ticks] that the loop believes at the start."""
+        return self.delay if self.believed < 0 else self.believed
+
+    @property
+    def misjudged(self) -> bool:
+        """Whether the loop believes another delay than the device has, at some time."""
+        return self.believed_delay != self.delay or self.slows_to > self.delay
 
     def __str__(self) -> str:
         return " ".join(f"{field.name}={_word(getattr(self, field.name))}" for field in fields(self))
@@ -115,7 +157,13 @@ def parse(line: str) -> Case:
     for name, (low, high) in RANGES.items():
         if not low <= getattr(case, name) <= high:
             raise StudyError(f"{name}={getattr(case, name):g} must lie between {low:g} and {high:g}")
-    for name, permitted in (("liquid", liquids()), ("hand", GRIPS), ("motion", MOTIONS), ("estimator", ESTIMATORS)):
+    for name, permitted in (
+        ("liquid", liquids()),
+        ("hand", GRIPS),
+        ("motion", MOTIONS),
+        ("estimator", ESTIMATORS),
+        ("plant", (*PLANTS, FALCON)),
+    ):
         if getattr(case, name) not in permitted:
             raise StudyError(f"{name}={getattr(case, name)} is none of {', '.join(permitted)}")
     return case
@@ -137,45 +185,6 @@ def scene_of(case: Case) -> Scene:
     """Return what the case presents."""
     changed = {"scale": case.scale, "rate_hz": case.rate_hz, "velocity": ESTIMATORS[case.estimator]}
     return Scene.model_validate(liquids()[case.liquid].model_copy(update=changed).model_dump())
-
-
-def sweep(seed: str = "stability") -> tuple[Case, ...]:
-    """Return the cases of the sweep: each liquid at each scale, rate, delay and grip; the rest from a fixed seed."""
-    return tuple(_sweep(seed))
-
-
-def _sweep(seed: str) -> Iterator[Case]:
-    draw = Random(seed)  # noqa: S311 - the same cases in every run
-    grid = itertools.product(liquids(), (1.0, 3.0, 10.0, 20.0, 40.0), (250.0, 500.0, 1000.0, 2000.0), range(5), GRIPS)
-    for liquid, scale, rate_hz, delay, hand in grid:
-        yield Case(
-            liquid=liquid,
-            scale=scale,
-            rate_hz=rate_hz,
-            delay=delay,
-            hand=hand,
-            estimator=_one(draw, ("ewma", "ewma", "ewma", "line", "foaw", "raw")),
-            motion=_one(draw, MOTIONS),
-            speed_mps=_one(draw, (0.1, 0.3, 0.6, 1.0)),
-            mass_kg=_one(draw, (0.1, 0.25, 0.6)),
-            viscous_nspm=_one(draw, (0.0, 0.5)),
-            coulomb_n=_one(draw, (0.0, 0.3)),
-            quantum_um=_one(draw, (20.0, 38.0, 60.0)),
-            noise_um=_one(draw, (0.0, 30.0)),
-            jitter=_one(draw, (0.0, 0.2)),
-            missed=_one(draw, (0.0, 0.02)),
-        )
-
-
-def some(cases: tuple[Case, ...], count: int | None) -> tuple[Case, ...]:
-    """Return ``count`` of the cases, spread over all of them: the same in every run."""
-    if count is None or count >= len(cases):
-        return cases
-    return tuple(Random(count).sample(cases, count))  # noqa: S311 - no secret
-
-
-def _one(draw: Random, choices: tuple[Any, ...]) -> Any:
-    return choices[int(draw.random() * len(choices))]
 
 
 def _word(value: object) -> str:

@@ -3,7 +3,7 @@
 Each liquid of the shipped studies at its own scale and with its own estimator, moved by a middling hand (0.55 kg,
 135 N/m, 6.5 N·s/m) along reaches, circles and strokes of 0.1 to 1 m/s, through several loops. The target is that of the
 choice of effects: 5 % or 0.05 N, whichever is more, taken of the mean square root over a motion. Single turns may be
-further off: a wake that breaks or a hand that turns back may ask for more than 0.5 N from one turn to the next.
+further off: a wake that breaks or a hand that turns back may ask for more than 1.5 N from one tick to the next.
 """
 
 from __future__ import annotations
@@ -14,12 +14,13 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from study_app.evaluation.stability.cases import MOTIONS, Case, liquids
-from study_app.evaluation.stability.verdict import FORCE_LIMIT_N, trace_of
+from study_app.evaluation.stability.bench import FORCE_LIMIT_N, trace_of
+from study_app.evaluation.stability.cases import CIRCLES, REACHES, STROKE, Case, liquids
 
 LOOPS: Final = ((1000.0, 0), (1000.0, 1), (1000.0, 2), (1000.0, 4), (2000.0, 1), (500.0, 1), (250.0, 1))
 """Ticks a second and ticks of delay; the first two are those of a study."""
 STUDY_LOOPS: Final = LOOPS[:2]
+MOTIONS: Final = (REACHES, CIRCLES, STROKE)
 LIMITED: Final = ("physical_tar", "dense")
 """No free handle bears what these ask for, 192 N·s/m and more: they feel as thick as the loop allows."""
 SPEEDS_MPS: Final = (0.1, 0.3, 0.6, 1.0)

@@ -11,7 +11,7 @@ from study_app.haptics.compiled import kernel
 
 
 @kernel
-def lowest_balance(trace: Any, delay: int) -> tuple[float, float, float]:
+def lowest_balance(trace: Any) -> tuple[float, float, float]:
     """Return the lowest balance of hand and liquid [J], the strongest force [N] and the longest step [m].
 
     From turn to turn the hand does the work -f·Δp on the liquid, with the force that acts on the handle, buoyancy and
@@ -23,7 +23,8 @@ def lowest_balance(trace: Any, delay: int) -> tuple[float, float, float]:
         work_j = squares_n2 = squares_m2 = 0.0
         before = trace[k - 1]
         for axis in range(3):
-            lift_n = trace[k - 1 - delay].lift_n[axis] if k - 1 >= delay else 0.0
+            sent = k - 1 - before.delay
+            lift_n = trace[sent].lift_n[axis] if sent >= 0 else 0.0
             force_n = before.acting_n[axis] - lift_n
             step_m = trace[k].position_m[axis] - before.position_m[axis]
             step_m -= trace[k].drift_mps[axis] * (trace[k].t_s - before.t_s)
@@ -35,6 +36,17 @@ def lowest_balance(trace: Any, delay: int) -> tuple[float, float, float]:
         strongest_n = max(strongest_n, math.sqrt(squares_n2))
         longest_m = max(longest_m, math.sqrt(squares_m2))
     return lowest_j, strongest_n, longest_m
+
+
+@kernel
+def given_out_j(trace: Any) -> float:
+    """Return the most that the force that acts gave to the handle, beyond what it took from it before [J]."""
+    energy_j = most_j = 0.0
+    for k in range(1, trace.shape[0]):
+        for axis in range(3):
+            energy_j += trace[k - 1].acting_n[axis] * (trace[k].position_m[axis] - trace[k - 1].position_m[axis])
+        most_j = max(most_j, energy_j)
+    return most_j
 
 
 @kernel

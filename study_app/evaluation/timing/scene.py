@@ -9,6 +9,7 @@ import numpy as np
 
 from study_app.evaluation.cost import hand
 from study_app.haptics.cfunctions import READ, READ_NEW, WRITE, c_function, record_at
+from study_app.haptics.dynamics import UNKNOWN
 from study_app.haptics.layout import READING, records
 from study_app.haptics.scene import Cylinder, Drag, Liquid, Scene, Vortex, Wake
 
@@ -47,6 +48,7 @@ class PlayedHand:
 
     name = "played"
     force_limit_n = 8.0
+    dynamics = UNKNOWN
 
     def __init__(self) -> None:
         self._places_m = np.ascontiguousarray(hand(), np.float64)
@@ -73,5 +75,5 @@ def _read(context: int, _now_ns: int, reading: int) -> int:
     return READ_NEW
 
 
-def _write(_context: int, _fx: float, _fy: float, _fz: float) -> int:
+def _write(_context: int, _command: int) -> int:
     return 0

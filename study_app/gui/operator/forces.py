@@ -26,11 +26,15 @@ FORCE, SIZE, WAKE = slice(0, 3), 3, 4
 
 @dataclass(frozen=True, slots=True)
 class ForceFigures:
-    """Of the trial under way, or the last: the force's share of its limit (now, most), and ticks by limiter."""
+    """Of the trial under way, or the last: the force's share of its limit (now, most), and ticks by limiter.
+
+    ``withheld`` is the share of the force so far that passivity controller, slew limit and device withheld.
+    """
 
     share: float
     most: float
     limiters: tuple[tuple[str, int], ...]
+    withheld: float = 0.0
 
 
 class Forces:
@@ -50,6 +54,7 @@ class Forces:
         self._scene = 0
         self._now_n = self._most_n = 0.0
         self._limited = np.zeros(len(LIMITERS), np.int64)
+        self._sums_n = np.zeros(2)  # permitted, withheld
 
     def take(self, samples: Any) -> None:
         """Take new samples, in order (a recarray of ``layout.SAMPLE``)."""
@@ -60,7 +65,7 @@ class Forces:
         rows[:, SIZE] = np.sqrt(np.einsum("ij,ij->i", rows[:, FORCE], rows[:, FORCE]))
         rows[:, WAKE] = np.sqrt(np.einsum("ij,ij->i", samples["wake_mps"], samples["wake_mps"]))
         self._keep(samples["time_ns"] // STEP_NS, rows)
-        self._count(samples["scene"], samples["limiters"], rows[:, SIZE])
+        self._count(samples, rows[:, SIZE])
 
     def trace(self, now_ns: int) -> tuple[Floats, Floats, Floats]:
         """Return times before now [s] (n,), oldest first, forces [N] (n, 4: x, y, z, size) and wake speeds [m/s]."""
@@ -76,7 +81,9 @@ class Forces:
         counted = tuple(
             (WORDS[bit].lower(), int(count)) for bit, count in zip(LIMITERS, self._limited, strict=True) if count
         )
-        return ForceFigures(self._now_n / self.limit_n, self._most_n / self.limit_n, counted)
+        permitted_n, withheld_n = self._sums_n
+        withheld = float(withheld_n / permitted_n) if permitted_n > 0 else 0.0
+        return ForceFigures(self._now_n / self.limit_n, self._most_n / self.limit_n, counted, withheld)
 
     def _keep(self, steps: NDArray[np.int64], rows: Floats) -> None:
         firsts = np.concatenate(([0], np.flatnonzero(np.diff(steps)) + 1))
@@ -90,8 +97,9 @@ class Forces:
             elif strongest[SIZE] > self._rows[newest, SIZE]:
                 self._rows[newest] = strongest
 
-    def _count(self, scenes: Any, limiters: Any, sizes_n: Floats) -> None:
-        """Count limiters and the strongest force of the newest scene that is none of rest."""
+    def _count(self, samples: Any, sizes_n: Floats) -> None:
+        """Count limiters, forces and the strongest one of the newest scene that is none of rest."""
+        scenes = samples["scene"]
         self._now_n = float(sizes_n[-1])
         felt = scenes[scenes != 0]
         if len(felt) == 0:
@@ -99,8 +107,10 @@ class Forces:
         if felt[-1] != self._scene:
             self._scene, self._most_n = int(felt[-1]), 0.0
             self._limited[:] = 0
+            self._sums_n[:] = 0
         here = scenes == self._scene
         self._most_n = max(self._most_n, float(sizes_n[here].max()))
-        acted = limiters[here]
+        self._sums_n += samples["permitted_n"][here].sum(), samples["withheld_n"][here].sum()
+        acted = samples["limiters"][here]
         if acted.any():
             self._limited += np.count_nonzero(acted[:, None] & np.array(LIMITERS), axis=0)

@@ -132,7 +132,9 @@ def _trial_ended(progress: SessionProgress, at_s: float, fields: Mapping[str, An
     progress = replace(progress, trial_lasted_s=lasted)
     if fields["outcome"] not in {"complete", "timeout"}:
         return progress
-    beyond = beyond_limits(fields, progress.protocol.limits.model_dump())
+    protocol = progress.protocol
+    hidden = {"withheld_percent"} if protocol.study.blinding == "double" else set()  # it would tell a condition
+    beyond = beyond_limits(fields, protocol.limits.model_dump(exclude=hidden))
     return replace(progress, trials_done={**progress.trials_done, fields["trial"]: beyond})
 
 

@@ -22,7 +22,9 @@ MEASURES = {
     "lateness_p99_ms": "servo lateness, p99,",
     "worst_gap_ms": "longest gap of the servo",
     "delay_error_p95_ms": "delay error, p95,",
+    "first_frame_gap_ms": "time to the first frame",
     "worst_frame_gap_ms": "longest gap between frames",
+    "withheld_share": "force withheld",
 }
 """What is judged in a trial, as the operator's window calls it."""
 
@@ -330,23 +332,32 @@ def _beyond(session: Session, progress: SessionProgress) -> tuple[str, ...]:
     labels = {trial.number: trial.label(session.protocol, session.language) for trial in progress.schedule.trials}
     return tuple(
         f"{labels[number]} out of limits: "
-        + "; ".join(f"{MEASURES[measure]} {value:.3g} ms, limit {limit:g} ms" for measure, value, limit in beyond)
+        + "; ".join(
+            f"{MEASURES[measure]} {value:.3g} {_unit(measure)}, limit {limit:g} {_unit(measure)}"
+            for measure, value, limit in beyond
+        )
         for number, beyond in reversed(tuple(progress.trials_done.items()))
         if beyond
     )
 
 
+def _unit(measure: str) -> str:
+    return "%" if measure == "withheld_share" else "ms"
+
+
 def _force_rows(session: Session, forces: ForceFigures | None) -> tuple[tuple[str, str], ...]:
-    """Return share of the limit and limiters, or that they are hidden; as many rows in either case."""
+    """Return share of the limit, limiters and force withheld, or that they are hidden; as many rows in either case."""
     share, limiters = f"Force, share of {session.protocol.device.force_limit_n:g} N", "Limiters acted"
+    withheld = f"Force withheld, limit {session.protocol.limits.withheld_percent:g}{THIN_SPACE}%"
     if session.protocol.study.blinding == "double":
-        return (share, "hidden"), (limiters, "hidden")
+        return (share, "hidden"), (limiters, "hidden"), (withheld, "hidden")
     if forces is None:
-        return (share, "–"), (limiters, "–")
+        return (share, "–"), (limiters, "–"), (withheld, "–")
     most_first = sorted(forces.limiters, key=lambda counted: -counted[1])
     return (
         (share, f"{forces.share:.0%}, most {forces.most:.0%}".replace("%", f"{THIN_SPACE}%")),
         (limiters, ", ".join(f"{name} {grouped(ticks)}" for name, ticks in most_first) or "none"),
+        (withheld, f"{forces.withheld:.1%}".replace("%", f"{THIN_SPACE}%")),
     )
 
 

@@ -1,4 +1,4 @@
-"""A journal that the operator's window looks over the shoulder of: what is on disk counts as progress, nothing else."""
+"""A journal that reports its lines to the operator's window: what was written counts as progress, nothing else."""
 
 from __future__ import annotations
 
@@ -27,10 +27,14 @@ class WatchedJournal:
         self._store = store
         self._clock = clock
 
-    def append(self, event: str, *, t_s: float | None = None, **fields: Any) -> None:
+    def append(self, event: str, *, t_s: float | None = None, waits: bool = True, **fields: Any) -> None:
         """Put an event into the journal (StoreError: nothing has changed)."""
-        self._store.append(event, t_s=t_s, **fields)
+        self._store.append(event, t_s=t_s, waits=waits, **fields)
         self.progress = self.progress.after(event, self._clock() if t_s is None else t_s, fields)
+
+    def check_flushed(self) -> None:
+        """Raise StoreError if lines that nobody waited for could not be flushed."""
+        self._store.check_flushed()
 
     def write_tables(self) -> None:
         """Bring the tables up to date."""

@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from study_app.analysis.statistics.agreement import cronbach_alpha, kappa, kendall_w
+from study_app.analysis.statistics.agreement import kappa
+from study_app.analysis.statistics.friedman import friedman
 from study_app.errors import AnalysisError
 
 # R package irr, "anxiety": three raters, twenty people.
@@ -9,16 +10,15 @@ ANXIETY = ["33345523522615221243", "36462424332333221334", "21443216111233113322
 
 
 def test_published_agreement_of_three_raters() -> None:
-    result = kendall_w([[int(digit) for digit in row] for row in ANXIETY])
+    result = friedman([[int(digit) for digit in row] for row in ANXIETY])
     assert result.effect == pytest.approx(0.5396568760, abs=1e-10)
     assert (result.statistic, result.df) == (pytest.approx(30.7604419, abs=1e-7), 19)
     assert result.p_chi2 == pytest.approx(0.0428835, abs=1e-7)
-    assert result.test == "Kendall's W of raters"
 
 
 def test_raters_who_agree_or_contradict_each_other() -> None:
-    assert kendall_w([[1, 2, 3, 4]] * 3).effect == pytest.approx(1.0)
-    assert kendall_w([[1, 2, 3], [3, 2, 1]]).effect == pytest.approx(0.0)
+    assert friedman([[1, 2, 3, 4]] * 3).effect == pytest.approx(1.0)
+    assert friedman([[1, 2, 3], [3, 2, 1]]).effect == pytest.approx(0.0)
 
 
 def test_published_kappa() -> None:
@@ -40,27 +40,3 @@ def test_kappa_of_nothing_and_of_one_name_is_none() -> None:
 def test_what_is_no_table_of_counts_is_refused(table: list[list[float]]) -> None:
     with pytest.raises(AnalysisError, match="square table of counts"):
         kappa(table)
-
-
-def test_alpha_by_its_other_formula() -> None:
-    # Standardised parallel items: alpha = k r / (1 + (k - 1) r).
-    rng = np.random.default_rng(0)
-    base = rng.normal(size=(40, 3))
-    scores = np.linalg.qr(base - base.mean(axis=0))[0]
-    mixing = np.linalg.cholesky(np.full((3, 3), 0.4) + 0.6 * np.eye(3)).T
-    result = cronbach_alpha(scores @ mixing)
-    assert result.alpha == pytest.approx(3 * 0.4 / (1 + 2 * 0.4))
-    assert result.interval is not None
-    assert result.interval.low < 2 / 3 < result.interval.high
-
-
-def test_alpha_drops_says_so_and_gives_no_interval_to_few() -> None:
-    rows = [[1, 2, 2], [3, 3, 4], [5, 6, 6], [np.nan, 1, 1]]
-    result = cronbach_alpha(rows)
-    assert (result.n, result.dropped, result.items) == (3, 1, 3)
-    assert result.alpha is not None
-    assert "below 10" in result.no_interval
-    assert cronbach_alpha([[4, 4], [4, 4]]).note == "no variation between participants"
-    assert cronbach_alpha([[1, 2]]).alpha is None
-    with pytest.raises(AnalysisError, match="at least 2 are needed \\(statements\\)"):
-        cronbach_alpha([[1], [2]])

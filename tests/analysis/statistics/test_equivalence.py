@@ -3,11 +3,10 @@ from itertools import product
 
 import numpy as np
 import pytest
-from scipy.stats import mannwhitneyu, wilcoxon
-from scipy.stats import t as t_distribution
+from scipy.stats import binom, wilcoxon
 
 from study_app.analysis.statistics.equivalence import tost
-from study_app.analysis.statistics.paired import cliffs_delta
+from study_app.analysis.statistics.equivalence_power import participants_needed
 from study_app.errors import AnalysisError
 
 # Hours of sleep gained by ten patients with two drugs (Student 1908; R, sleep).
@@ -29,22 +28,6 @@ def test_published_sleep_data() -> None:
     assert result.verdict == "different"
 
 
-@pytest.mark.parametrize(
-    ("shift", "alternative", "w", "p"),
-    [(0.0, "two-sided", 25.5, 0.069328), (0.5, "greater", 34.0, 0.893853), (-0.5, "less", 20.0, 0.012874)],
-)
-def test_published_sleep_data_as_two_independent_groups_by_ranks(
-    shift: float, alternative: str, w: float, p: float
-) -> None:
-    # No study here has independent groups: W follows from our delta of two groups, its approximate p is scipy's.
-    delta = cliffs_delta(FIRST + shift, SECOND)
-    assert delta is not None
-    assert (delta + 1) / 2 * len(FIRST) * len(SECOND) == pytest.approx(w)
-    theirs = mannwhitneyu(FIRST + shift, SECOND, alternative=alternative, method="asymptotic", use_continuity=True)
-    assert (theirs.statistic, theirs.pvalue) == (pytest.approx(w), pytest.approx(p, abs=5e-7))
-    assert cliffs_delta(FIRST, SECOND) == pytest.approx(-0.49)
-
-
 @pytest.mark.parametrize("seed", range(6))
 def test_the_verdict_is_that_of_the_interval(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -52,34 +35,90 @@ def test_the_verdict_is_that_of_the_interval(seed: int) -> None:
     result = tost(differences, 0.5)
     assert result.interval is not None
     inside = result.interval.low > -0.5 and result.interval.high < 0.5
-    assert (result.verdict == "equivalent") == inside
+    assert (result.p is not None and result.p <= 0.05) == inside
     assert result.interval.low + result.interval.high == pytest.approx(2 * differences.mean())
 
 
-def test_few_people_who_differ_little_are_inconclusive_and_told_how_many_it_takes() -> None:
+def test_few_people_who_differ_little_are_inconclusive() -> None:
     result = tost([1, -1, 0, 2, -1], 1.0)
     assert result.verdict == "inconclusive"
     assert result.note == "neither a difference nor equivalence is shown"
-    assert result.sd is not None
-    assert result.n_needed is not None
-    assert result.n_needed > math.ceil(8.6 * result.sd**2)
-    # The rule of thumb for many, 8.6 (spread / bound)²: 48 where differences spread by 2.36 points and the bound is 1.
-    rng = np.random.default_rng(0)
-    spread = rng.normal(size=100)
-    spread = (spread - spread.mean()) / spread.std(ddof=1) * 2.36
-    assert tost(spread, 1.0).n_needed in (48, 49, 50)
 
 
-@pytest.mark.parametrize("spread", [0.3, 0.5, 0.9, 1.2, 2.0])
-def test_so_many_participants_have_the_power_that_is_told(spread: float) -> None:
-    # The rule of thumb would tell 2 participants for a spread of half a point, whom no answers could suffice.
-    needed = tost(np.array([1.0, -1.0] * 5) * spread * math.sqrt(0.9), 1.0).n_needed
+@pytest.mark.parametrize(
+    ("differences", "verdict"),
+    [
+        ([2.0] * 12, "different"),
+        ([0.0] * 12, "equivalent"),
+        ([1.0] * 12, "different"),  # on the bound: not within it
+        ([0.0] * 5, "equivalent"),
+        ([-2.0] * 6, "different"),
+        ([2.0] * 5, "inconclusive"),
+        ([0.0] * 4, "out of reach"),
+        ([2.0], "out of reach"),
+    ],
+)
+def test_equal_differences_are_judged_by_the_tests_that_need_no_spread(differences: list[float], verdict: str) -> None:
+    assert tost(differences, 1.0).verdict == verdict
+
+
+@pytest.mark.parametrize("n", [12, 24])
+@pytest.mark.parametrize("others", [(0,), (-1, 0, 1)])
+def test_where_a_few_notice_strongly_equivalence_is_seldom_shown(n: int, others: tuple[int, ...]) -> None:
+    # One in five answers five points higher: the mean lies on the bound.
+    rng = np.random.default_rng(n)
+    shown = held = 0
+    for _ in range(400):
+        strong = rng.random(n) < 0.2
+        found = tost(np.where(strong, 5.0, rng.choice(others, n)), 1.0)
+        if strong.any():
+            shown, held = shown + (found.verdict == "equivalent"), held + 1
+        assert found.beyond is not None
+        assert found.beyond.count == strong.sum()
+    assert shown <= binom.ppf(0.999, held, 0.05)
+
+
+def test_people_beyond_the_bound_are_counted_whatever_the_mean() -> None:
+    found = tost([0.0] * 22 + [5.0, -5.0], 2.0)
+    assert found.beyond is not None
+    assert (found.beyond.count, found.beyond.n) == (2, 24)
+    assert (found.beyond.interval.low, found.beyond.interval.high) == pytest.approx((0.0103, 0.2700), abs=1e-4)
+
+
+@pytest.mark.parametrize(("spread", "step"), [(0.5, 1.0), (1.0, 1.0), (1.5, 0.5), (0.7, 0.0)])
+def test_so_many_participants_as_are_told_give_the_verdict_in_80_percent(spread: float, step: float) -> None:
+    rng = np.random.default_rng(8)
+    seen = spread * rng.normal(size=60)
+    seen = np.rint(seen / step) * step if step else seen
+    needed = participants_needed(seen, 1.0, 0.05)
     assert needed is not None
-    assert needed >= 5
-    drawn = np.random.default_rng(needed).normal(0, spread, (20_000, needed))
-    error = drawn.std(axis=1, ddof=1) / math.sqrt(needed)
-    shown = np.abs(drawn.mean(axis=1)) + t_distribution.ppf(0.95, needed - 1) * error < 1
-    assert shown.mean() > 0.78
+
+    def power_of(n: int) -> float:
+        """Return how often studies of n, drawn as the differences spread, are called equivalent by ``tost``."""
+        drawn = rng.normal(size=(300, n))
+        drawn *= normal_before_rounding(float(seen.std(ddof=1)), step)
+        drawn = np.rint(drawn / step) * step if step else drawn
+        return float(np.mean([tost(one, 1.0).verdict == "equivalent" for one in drawn]))
+
+    assert power_of(needed) > 0.8 - 0.03 - 3 * math.sqrt(0.8 * 0.2 / 300)
+    assert needed == 5 or power_of(needed - 1) < 0.8 + 0.03 + 3 * math.sqrt(0.8 * 0.2 / 300)
+
+
+def normal_before_rounding(sd: float, step: float) -> float:
+    """Return the spread of the normal numbers whose multiples of ``step`` spread by ``sd``, by trying."""
+    numbers = np.random.default_rng(0).normal(size=20_000)
+    tried = np.linspace(0.05, 2 * sd + step, 400)
+    spreads = [np.std(np.rint(one * numbers / step) * step if step else one * numbers) for one in tried]
+    return float(tried[np.searchsorted(spreads, sd)])
+
+
+def test_a_small_alpha_can_be_reached() -> None:
+    differences = np.random.default_rng(2).integers(-1, 2, 40)
+    assert tost(differences, 1.0, alpha=0.0002).verdict == "equivalent"
+
+
+def test_more_participants_than_are_looked_for_are_not_told() -> None:
+    assert participants_needed(np.array([5.0, -5.0] * 10), 0.5, 0.05) is None
 
 
 def test_a_small_but_certain_difference_can_be_equivalent() -> None:
@@ -118,13 +157,10 @@ def test_many_people_have_drawn_signs_that_can_be_repeated() -> None:
     assert result.p_permutation == pytest.approx(result.p, abs=0.004)
 
 
-def test_equal_differences_are_told_and_not_divided_by() -> None:
-    result = tost([0.0] * 5, 1.0)
-    assert (result.verdict, result.p, result.effect) == ("inconclusive", None, 0.0)
-    assert "no spread" in result.note
+def test_without_differences_nothing_is_tested() -> None:
     nobody = tost([np.nan, np.nan], 1.0)
-    assert (nobody.n, nobody.dropped, nobody.effect) == (0, 2, None)
-    assert tost([1.0], 1.0).verdict == "inconclusive"
+    assert (nobody.n, nobody.dropped, nobody.effect, nobody.p) == (0, 2, None, None)
+    assert nobody.note == "0 participants: no spread"
 
 
 def test_missing_differences_are_dropped() -> None:

@@ -3,7 +3,7 @@ import pytest
 from scipy.stats import chi2
 
 from study_app.analysis.statistics.cumulative import Answers, fit, log_likelihood
-from study_app.analysis.statistics.ordinal import ordinal, profile_interval
+from study_app.analysis.statistics.ordinal import ordinal
 from study_app.errors import AnalysisError
 
 # Bitterness of wine (Randall 1989; R, ordinal): nine judges; bottles 1-4 cold, 5-8 warm; 3, 4, 7, 8 with contact.
@@ -44,13 +44,6 @@ def test_published_likelihood_ratio_of_contact() -> None:
     # The test of the function: both columns against none, by the two ratios one after the other.
     assert both.statistic == pytest.approx(11.043 + (cold.statistic or 0.0), abs=5e-4)
     assert both.df == 2
-
-
-def test_published_profile_intervals() -> None:
-    for column, expected in ((0, (1.5098, 3.5952)), (1, (0.6158, 2.4924))):
-        interval = profile_interval(WINE, BOTTLES, column, intercepts=False)
-        assert interval is not None
-        assert (interval.low, interval.high) == pytest.approx(expected, abs=6e-5)
 
 
 def test_published_quadrature_with_judges() -> None:
@@ -187,3 +180,33 @@ def test_answers_without_an_estimate_are_told(values: np.ndarray, note: str) -> 
 def test_columns_that_do_not_tell_settings_apart_are_refused(columns: list[list[float]]) -> None:
     with pytest.raises(AnalysisError, match="do not tell 3 settings apart"):
         ordinal(made_up(12), columns)
+
+
+def test_single_answers_of_several_presentations_are_those_of_as_many_columns() -> None:
+    """The wine's two bottles of each kind are presentations of one setting."""
+    rng = np.random.default_rng(4)
+    values = np.vstack([WINE, rng.integers(1, 6, (3, 8))]).astype(float)
+    flat = ordinal(values, BOTTLES)
+    paired = ordinal(values.reshape(12, 4, 2), BOTTLES[::2])
+    assert paired.p == pytest.approx(flat.p)
+    assert [one.estimate for one in paired.coefficients] == pytest.approx([one.estimate for one in flat.coefficients])
+    assert (paired.answers, paired.missing) == (96, 0)
+    assert all(float(level).is_integer() for level in paired.levels)
+
+
+def test_sessions_are_a_factor_that_takes_their_difference_from_the_settings() -> None:
+    """Everybody answers higher in the second session, in which the last setting came more often."""
+    rng = np.random.default_rng(6)
+    sessions = np.ones((16, 2, 4))
+    sessions[:, 0, 3], sessions[:, 1, 1:] = 2, 2
+    latent = 3 + rng.normal(0, 0.5, (16, 1, 1)) + rng.normal(0, 0.7, sessions.shape) + 1.5 * (sessions - 1)
+    values = np.clip(np.rint(latent), 1, 7)
+    pooled, apart = ordinal(values), ordinal(values, sessions=sessions)
+    assert pooled.p is not None
+    assert apart.p is not None
+    assert pooled.p < 0.01 < apart.p
+    assert len(apart.coefficients) == 1
+    assert "sessions as a factor" in apart.method
+    # Each setting in a session of its own: they cannot be told apart.
+    own = np.ones(values.shape) + np.arange(2)[:, None]
+    assert ordinal(values, sessions=own).p == pytest.approx(pooled.p)

@@ -157,12 +157,12 @@ def test_pings_that_were_ignored_are_said_again(count):
     assert emulator.running
 
 
-@pytest.mark.parametrize("variant", ["leading_zero", "glued", "echo_prefix", "status_noise"])
-@pytest.mark.parametrize("other", ["leading_zero", "glued", "echo_prefix"])
+@pytest.mark.parametrize("variant", ["leading-zero", "glued=1", "echo-prefix=1", "status-noise"])
+@pytest.mark.parametrize("other", ["leading-zero", "glued=1", "echo-prefix=1"])
 def test_every_way_a_falcon_was_seen_to_answer_will_do(variant, other):
     emulator, transport = falcon()
-    emulator.faults.on(variant)
-    emulator.faults.on(other)
+    emulator.take(variant)
+    emulator.take(other)
     boot(transport, stream(), attempts=1)
     assert emulator.running
 

@@ -22,9 +22,9 @@ def stream(blocks=(300, 7, 1), key=wire.BOOT_KEY):
     return words(key, *[0] * 8, 0x003F, 0x8002) + body + words(0)
 
 
-def armed(**options):
+def armed(emulator=None):
     """Return a Falcon that was reset by DTR at 9600 baud."""
-    emulator = still(**options)
+    emulator = emulator if emulator is not None else still()
     emulator.control(wire.REQUEST_LATENCY, wire.LATENCY_BOOT_MS)
     emulator.control(wire.REQUEST_BAUD, wire.BAUD_9600)
     for request in (wire.RTS_LOW, wire.DTR_LOW, wire.DTR_HIGH):
@@ -117,19 +117,32 @@ def test_a_ping_is_found_among_other_bytes_and_may_be_ignored_at_first():
     assert said(emulator, b"\xff\x0a" + wire.PING) == wire.PONG
 
 
-@pytest.mark.parametrize(("fault", "pong"), [("leading_zero", b"\0" + wire.PONG), ("glued", wire.PONG + b"\x00\x0d")])
+@pytest.mark.parametrize(("fault", "pong"), [("leading-zero", b"\0" + wire.PONG), ("glued=1", wire.PONG + b"\x00\x0d")])
 def test_answers_to_a_ping_come_in_variants(fault, pong):
     emulator = armed()
-    emulator.faults.on(fault)
+    emulator.take(fault)
     assert said(emulator, wire.PING) == pong
 
 
 def test_the_echo_of_a_may_have_a_byte_before_it():
     emulator = armed()
-    emulator.faults.on("echo_prefix")
+    emulator.faults.once("echo_prefix")
     said(emulator, wire.PING)
     emulator.control(wire.REQUEST_BAUD, wire.BAUD_142857)
     assert said(emulator, wire.AUTOBAUD) == b"\x13A"
+
+
+def test_bytes_before_and_behind_answers_come_by_chance():
+    emulator = still()
+    emulator.take("glued=0.5")
+    emulator.take("echo-prefix=0.5")
+    for _ in range(60):
+        armed(emulator)
+        said(emulator, wire.PING)
+        emulator.control(wire.REQUEST_BAUD, wire.BAUD_142857)
+        said(emulator, wire.AUTOBAUD)
+    assert 15 < emulator.faults.happened("glued") < 45
+    assert 15 < emulator.faults.happened("echo_prefix") < 45
 
 
 def test_a_byte_may_be_echoed_wrongly():

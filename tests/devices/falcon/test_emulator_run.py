@@ -63,6 +63,20 @@ def test_torques_beyond_the_range_are_counted_and_cut_off():
     assert emulator.force_n[2] == pytest.approx(most, rel=1e-3)
 
 
+@pytest.mark.parametrize("torques", [(-4095, -4095, -4095), (4095, 4095, 4095), (-4095, 4095, 0), (0, 4095, -4095)])
+@pytest.mark.parametrize("place", [(0.0, 0.0, 0.0), (0.03, -0.02, 0.02)])
+def test_the_motors_saturate_at_the_force_of_a_real_one_and_keep_its_direction(torques, place):
+    emulator = at_work()
+    emulator.hold(*place)
+    emulator.pause(0.5)
+    exchanged(emulator, tuple(torque // 10 for torque in torques))
+    weak_n = np.array(emulator.force_n)
+    exchanged(emulator, torques)
+    strong_n = np.array(emulator.force_n)
+    assert 9.0 <= np.linalg.norm(strong_n) <= 10.0 + 1e-9
+    assert strong_n / np.linalg.norm(strong_n) == pytest.approx(weak_n / np.linalg.norm(weak_n), abs=0.01)
+
+
 def test_what_is_no_packet_is_not_answered_and_the_next_one_is():
     emulator = at_work()
     wrong = packet((5, 5, 5))

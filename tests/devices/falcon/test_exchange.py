@@ -1,20 +1,13 @@
 import numba
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 if numba.config.DISABLE_JIT:
     pytest.skip("the exchange is made of C functions", allow_module_level=True)
 
-from study_app.devices.falcon.exchange import COUNTERS, RAMP_S
-from study_app.devices.falcon.kinematics import REACHED, inverse
+from study_app.devices.falcon.exchange import RAMP_S
 from study_app.devices.falcon.packets import FLAGS_AT
-from study_app.devices.falcon.replies import MOST_OWED
 from study_app.devices.falcon.wire import (
-    ERROR_IO,
-    ERROR_NO_DEVICE,
-    ERROR_OVERFLOW,
     ERROR_TIMEOUT,
     FLAG_BLUE,
     FLAG_GREEN,
@@ -24,44 +17,25 @@ from study_app.devices.falcon.wire import (
     ZERO,
     quiet_packet,
 )
-from study_app.haptics.cfunctions import READ_LOST, READ_NEW, READ_NOTHING_NEW
+from study_app.haptics.cfunctions import READ_NEW, READ_NOTHING_NEW
 from tests.devices.falcon.turns import (
     CENTRE_M,
-    GEOMETRY,
+    GROWTH_N,
     MODEM_STATUS,
     MS,
     OUT_M,
-    UNITS_PER_NM,
+    PUSH_N,
+    SOMEWHERE_M,
     Turns,
     counts_at,
+    force_of,
     reply,
 )
-
-PUSH_N = (1.0, -0.5, 2.0)
-SOMEWHERE_M = (0.02, -0.01, 0.015)
 
 
 @pytest.fixture
 def turns():
     return Turns()
-
-
-def force_of(turns, place_m):
-    """Return the force that the last torques make at a place, by virtual work and differences."""
-    mechanism = turns.falcon.mechanism
-
-    def theta_at(place):
-        theta = np.zeros(3)
-        assert inverse(mechanism, np.add(place, [0, 0, GEOMETRY.centre_m]), theta) == REACHED
-        return theta
-
-    torque_nm = -np.array(turns.torques) / UNITS_PER_NM
-    return np.array(
-        [
-            torque_nm @ (theta_at(np.add(place_m, step)) - theta_at(np.subtract(place_m, step))) / 2e-6
-            for step in np.eye(3) * 1e-6
-        ]
-    )
 
 
 class TestAPosition:
@@ -223,17 +197,65 @@ class TestTheGate:
         assert turns.falcon.share == 1.0
         assert turns.torques != [0, 0, 0]
 
-    def test_the_force_steps_by_less_than_half_a_newton_whatever_is_asked_for(self, turns):
+    def test_a_force_grows_by_no_more_than_the_servos_slew_limit_and_falls_at_once(self, turns):
         turns.open_gate()
-        before = np.zeros(3)
-        for turn in range(60):
-            turns.turn(reply(), force_n=(5.0, 0.0, 0.0) if turn < 30 else (-5.0, 1.0, 3.0))
-            given = force_of(turns, CENTRE_M)
-            assert np.linalg.norm(given - before) < 0.48
-            before = given
-        assert given == pytest.approx([-5.0, 1.0, 3.0], abs=0.01)
-        turns.turn(reply())  # but no force is no force at once
+        before = 0.0
+        for _ in range(12):
+            turns.turn(reply(), force_n=(5.0, 0.0, 0.0))
+            size = np.linalg.norm(force_of(turns, CENTRE_M))
+            assert size - before < GROWTH_N + 0.01
+            before = size
+        assert force_of(turns, CENTRE_M) == pytest.approx([5.0, 0.0, 0.0], abs=0.01)
+        turns.turn(reply(), force_n=(1.0, 0.0, 0.0))
+        assert force_of(turns, CENTRE_M) == pytest.approx([1.0, 0.0, 0.0], abs=0.01)
+        turns.turn(reply())
         assert turns.torques == [0, 0, 0]
+
+    def test_a_force_that_turns_round_falls_at_once_and_grows_by_steps(self, turns):
+        turns.open_gate()
+        for _ in range(12):
+            turns.turn(reply(), force_n=(5.0, 0.0, 0.0))
+        for ticks in (1, 2, 3):
+            turns.turn(reply(), force_n=(-5.0, 0.0, 0.0))
+            assert force_of(turns, CENTRE_M) == pytest.approx([-ticks * GROWTH_N, 0.0, 0.0], abs=0.02)
+
+    @pytest.mark.parametrize("along", [1.0, -1.0])
+    def test_a_force_that_brakes_the_grip_arrives_within_the_tick_and_one_that_drives_it_does_not(self, turns, along):
+        turns.open_gate()
+        places = np.arange(40) * 0.3e-3  # 0.3 m/s
+        for place in places:
+            turns.turn(reply((along * place, 0.0, 0.0)), force_n=(0.0, 0.5, 0.0))
+        turns.turn(reply((along * 12e-3, 0.0, 0.0)), force_n=(4.0, 0.5, 0.0))
+        given = force_of(turns, (along * 12e-3, 0.0, 0.0))
+        assert given == pytest.approx([GROWTH_N if along > 0 else 4.0, 0.5, 0.0], abs=0.05)
+
+    def test_the_command_says_what_the_motors_got(self, turns):
+        turns.open_gate()
+        for _ in range(3):
+            turns.turn(reply(SOMEWHERE_M), force_n=PUSH_N)  # still growing
+            assert turns.command[0].sent_n == pytest.approx(force_of(turns, turns.position_m), abs=1e-6)
+        for _ in range(200):
+            turns.turn(reply(SOMEWHERE_M), force_n=tuple(20 * np.array(PUSH_N)))
+        assert turns.falcon.shortened > 0
+        assert turns.command[0].sent_n == pytest.approx(force_of(turns, turns.position_m), abs=1e-6)
+
+    def test_the_command_says_what_the_gate_lets_through(self, turns):
+        turns.turn(force_n=PUSH_N)
+        assert not turns.command[0].sent_n.any()
+        turns.pull_out()
+        for _ in range(100):
+            turns.turn(reply(), force_n=PUSH_N)
+        assert 0.1 < turns.falcon.share < 0.3
+        assert turns.command[0].sent_n == pytest.approx(turns.falcon.share * np.array(PUSH_N), abs=5e-3)
+
+    def test_the_command_says_what_the_motors_hold_when_a_packet_does_not_go_out(self, turns):
+        turns.open_gate()
+        turns.turn(reply(), force_n=(0.3, 0.0, 0.0))
+        turns.bridge.write_answer = ERROR_TIMEOUT
+        turns.turn(reply(), force_n=(0.6, 0.0, 0.0))
+        assert turns.command[0].sent_n == pytest.approx([0.3, 0.0, 0.0], abs=5e-3)
+        turns.turn(reply())
+        assert turns.command[0].sent_n == pytest.approx([0.3, 0.0, 0.0], abs=5e-3)
 
     def test_more_than_the_motors_give_keeps_its_direction(self, turns):
         turns.open_gate()
@@ -263,137 +285,3 @@ class TestTheGate:
         for _ in range(3):
             flags = flags_after(reply(homed=0))
         assert flags == FLAG_HOMING | FLAG_RED
-
-
-class TestLostAndLate:
-    def test_an_unplugged_bridge_is_lost_for_good(self, turns):
-        turns.turn()
-        turns.bridge.queue.append(ERROR_NO_DEVICE)
-        assert turns.turn() == (READ_LOST, READ_LOST)
-        sent = len(turns.bridge.sent)
-        assert turns.turn(reply()) == (READ_LOST, READ_LOST)
-        assert len(turns.bridge.sent) == sent
-
-    def test_a_bridge_that_is_gone_when_written_to_is_lost(self, turns):
-        turns.turn()
-        turns.bridge.write_answer = ERROR_NO_DEVICE
-        assert turns.turn(reply()) == (READ_NEW, READ_LOST)
-        assert turns.turn(reply())[0] == READ_LOST
-
-    @pytest.mark.parametrize("code", [ERROR_IO, ERROR_OVERFLOW])
-    def test_other_errors_are_counted_and_lived_with(self, turns, code):
-        turns.turn()
-        turns.bridge.queue.append(code)
-        turns.bridge.write_answer = code
-        assert turns.turn() == (READ_NOTHING_NEW, 0)
-        turns.bridge.write_answer = 0
-        turns.turn()
-        assert turns.turn(reply())[0] == READ_NEW
-        assert (turns.falcon.read_errors, turns.falcon.write_errors) == (1, 1)
-
-    def test_a_time_out_on_the_way_out_is_no_request(self, turns):
-        turns.bridge.write_answer = ERROR_TIMEOUT
-        turns.turn()
-        assert (turns.falcon.requests, turns.falcon.write_errors) == (0, 1)
-
-    def test_a_force_that_did_not_go_out_is_no_force_the_motors_push_with(self, turns):
-        turns.open_gate()
-        turns.turn(reply(), force_n=(0.3, 0.0, 0.0))
-        held = turns.falcon.units.tolist()
-        turns.bridge.write_answer = ERROR_TIMEOUT
-        for _ in range(20):
-            turns.turn(reply(), force_n=(5.0, 0.0, 0.0))
-            assert turns.falcon.units.tolist() == held
-        turns.bridge.write_answer = 0
-        turns.turn(reply(), force_n=(5.0, 0.0, 0.0))
-        assert np.linalg.norm(force_of(turns, CENTRE_M)) < 0.3 + 0.48
-
-    def test_an_end_of_force_is_tried_again_until_it_goes_out(self, turns):
-        turns.open_gate()
-        while not turns.falcon.testing:
-            turns.turn(*[reply()] * int(turns.now_ns // MS % 2), force_n=PUSH_N)
-        turns.bridge.write_answer = ERROR_TIMEOUT
-        turns.turn(reply())
-        assert turns.torques != [0, 0, 0]
-        turns.bridge.write_answer = 0
-        turns.turn(reply())
-        assert turns.falcon.testing
-        assert turns.torques == [0, 0, 0]
-
-    @pytest.mark.parametrize("force_n", [PUSH_N, (0.0, 0.0, 0.0)])
-    def test_losses_are_written_off_after_a_short_test(self, turns, force_n):
-        turns.open_gate()
-        answers = []
-        waiting = 1
-        for turn in range(200):
-            lost = turn % 20 == 0
-            got = [reply()] * (waiting if not lost else 0)
-            before = len(turns.bridge.sent)
-            answers.append(turns.turn(*got, force_n=force_n)[0])
-            waiting = len(turns.bridge.sent) - before
-        silent = [answer != READ_NEW for answer in answers]
-        longest = max(len(run) for run in "".join("x" if s else " " for s in silent).split())
-        assert longest <= 4  # below the 5 ms after which the force would fade
-        assert turns.falcon.written_off >= 10 - MOST_OWED - 1
-        assert turns.falcon.owed <= MOST_OWED
-
-    def test_replies_that_are_always_late_are_not_given(self, turns):
-        turns.open_gate()
-        pipe = [0] * 10  # how many replies come in so many turns
-        fresh = []
-        for _ in range(300):
-            before = len(turns.bridge.sent)
-            got = [reply(SOMEWHERE_M)] * pipe.pop(0)
-            fresh.append(turns.turn(*got, force_n=PUSH_N)[0] == READ_NEW)
-            pipe.append(len(turns.bridge.sent) - before)
-        assert sum(fresh[10:]) == 0
-        for _ in range(60):  # and when the pipe is quick again, it recovers
-            pipe[:] = [sum(pipe)]
-            before = len(turns.bridge.sent)
-            fresh.append(turns.turn(*[reply(SOMEWHERE_M)] * pipe.pop(0), force_n=PUSH_N)[0] == READ_NEW)
-            pipe.append(len(turns.bridge.sent) - before)
-        assert all(fresh[-20:])
-
-    def test_an_end_of_force_is_sent_whatever_is_being_tested(self, turns):
-        turns.open_gate()
-        while not turns.falcon.testing:
-            turns.turn(*[reply()] * int(turns.now_ns // MS % 2), force_n=PUSH_N)
-        assert turns.torques != [0, 0, 0]
-        turns.turn()
-        assert turns.torques == [0, 0, 0]
-
-    def test_a_force_is_never_withheld_for_more_than_two_turns(self, turns):
-        turns.open_gate()
-        withheld = 0
-        for _ in range(200):
-            before = len(turns.bridge.sent)
-            turns.turn(force_n=PUSH_N)
-            withheld = withheld + 1 if len(turns.bridge.sent) == before else 0
-            assert withheld <= 2
-
-    @settings(max_examples=60)
-    @given(
-        st.lists(
-            st.sampled_from(["good", "good", "good", "lost", "cut", "twice", "io", "unhomed", "away", "garbage"]),
-            max_size=120,
-        )
-    )
-    def test_every_turn_and_every_packet_is_accounted_for(self, events):
-        turns = Turns()
-        turns.open_gate()
-        for event in events:
-            if event == "io":
-                turns.bridge.queue.append(ERROR_IO)
-            got = {
-                "good": [reply()],
-                "cut": [reply()[:14]],
-                "twice": [reply(), reply()],
-                "unhomed": [reply(homed=0)],
-                "away": [reply(counts=(4000, -4000, 4000))],
-                "garbage": [b"<AAAA>" * 5],
-            }.get(event, [])
-            turns.turn(*got, force_n=PUSH_N)
-        count = {name: int(turns.falcon[name]) for name in COUNTERS}
-        assert count["turns"] == count["fresh"] + count["missing"] + count["late"] + count["refused"]
-        owed = int(turns.falcon.owed + turns.falcon.asked)
-        assert count["requests"] - count["replies"] == owed + count["written_off"] - count["surplus"]

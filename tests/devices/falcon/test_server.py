@@ -124,6 +124,69 @@ def test_requests_may_come_in_pieces_or_several_at_once(server, emulator, path):
         assert server.until(lambda: emulator.torques == (4, 5, 6), 30)
 
 
+def test_a_packet_goes_out_while_a_transfer_in_is_pending(server, emulator, path):
+    with connected(path) as foreign:
+        foreign.ask(CONTROL, wire.REQUEST_BAUD, wire.BAUD_1500000)
+        foreign.ask(CONTROL, wire.REQUEST_LATENCY, 255)
+        foreign.ask(CONTROL, wire.REQUEST_EVENT_CHARACTER, wire.EVENT_ENABLED | wire.STOP)
+        foreign.ask(IN, 0x81, 0, 64, 1000)
+        began_s = time.monotonic()
+        foreign.socket.sendall(struct.pack("<BBHHH", IN, 0x81, 0, 64, 10_000))
+        foreign.socket.sendall(struct.pack("<BBHHH", OUT, 0x02, 0, 16, 1000) + packet((6, 7, 8)))
+        code, heard = foreign.answer()  # in the order of the requests: what the packet was answered with
+        assert (code, heard[2:3], heard[17:]) == (0, b"<", b">")
+        assert foreign.answer() == (0, b"")
+        assert time.monotonic() - began_s < 0.2, "long before the bridge's timer would have ended the transfer in"
+    assert emulator.torques == (6, 7, 8)
+
+
+def test_a_tagged_request_is_answered_as_soon_as_it_is_done(server, emulator, path):
+    with connected(path) as foreign:
+        foreign.set_up()
+        foreign.ask(CONTROL, wire.REQUEST_LATENCY, 255)
+        foreign.ask(IN, 0x81, 0, 64, 1000)
+        foreign.socket.sendall(struct.pack("<BBHHH", 0x80 | IN, 0x81, 0, 64, 50))
+        foreign.socket.sendall(struct.pack("<BBHHH", 0x80 | OUT, 0x02, 0, 16, 1000) + packet((6, 7, 8)))
+        assert (foreign.receive(1), foreign.answer()) == (b"\x82", (0, b""))
+        assert server.until(lambda: emulator.torques == (6, 7, 8), PATIENCE_S)
+        assert foreign.receive(1) == b"\x83"
+        assert foreign.answer() == (wire.ERROR_TIMEOUT, b"")  # no event character: it would wait for the timer
+
+
+def test_nothing_is_compiled_once_a_client_can_connect(tmp_path):
+    """In a program of its own: the first boot and homing through a socket must not wait for a compiler."""
+    program = """
+import sys
+from study_app.devices.falcon.emulator import arm, boot, face, faults, ftdi, host, run, server
+from study_app.devices.falcon.emulator.server import EmulatorServer
+from study_app.devices import hand
+from study_app.haptics import plant
+from tests.devices.falcon.test_server import Foreign, packet, HOMING, wire, OUT, CONTROL
+modules = (arm, boot, face, faults, ftdi, host, run, hand, plant)
+def compiled():
+    return {(name, len(one.signatures)) for module in modules for name, one in vars(module).items()
+            if hasattr(one, "signatures")}
+emulator = face.Emulator()
+with EmulatorServer(emulator, sys.argv[1]) as served:
+    before = compiled()
+    foreign = Foreign(sys.argv[1])
+    foreign.ask(CONTROL, wire.REQUEST_MODEM, wire.DTR_LOW)
+    foreign.ask(CONTROL, wire.REQUEST_MODEM, wire.DTR_HIGH)
+    foreign.out(wire.PING)
+    foreign.ask(3, 0x81, 0, 64, 100)
+    foreign.set_up()
+    foreign.out(packet((1, 2, 3), HOMING))
+    foreign.ask(3, 0x81, 0, 64, 100)
+    foreign.socket.close()
+    served.until(lambda: served.clients == 0, 30)
+    assert compiled() == before, compiled() - before
+"""
+    finished = subprocess.run(
+        [sys.executable, "-c", program, str(tmp_path / "falcon")], check=False, timeout=300, capture_output=True
+    )
+    assert finished.returncode == 0, finished.stderr.decode()
+
+
 def test_an_answer_does_not_come_before_its_time(server, path):
     with connected(path) as foreign:
         foreign.ask(CONTROL, wire.REQUEST_LATENCY, 200)

@@ -21,13 +21,14 @@ from study_app.haptics.servo import Servo
 PUSHES_AND_DIES = """
 import os, signal, sys, time
 from study_app.devices import open_device
-from study_app.haptics.layout import READING, records
-device, reading = open_device(sys.argv[1]), records(READING, 1)
+from study_app.haptics.layout import new_command, new_reading
+device, reading, command = open_device(sys.argv[1]), new_reading(), new_command()
+command[0].force_n = (0.0, 0.0, 2.0)
 turns = 0
 while abs(device.held[1]).max() < 100 and turns < 20_000:
     turns += 1
     device.read.ctypes(device.context, time.monotonic_ns(), reading.ctypes.data)
-    device.write.ctypes(device.context, 0.0, 0.0, 2.0)
+    device.write.ctypes(device.context, command.ctypes.data)
     device._transport.pause(0.001)
 print(device._guard.watching, flush=True)
 os.kill(os.getpid(), getattr(signal, sys.argv[2]))

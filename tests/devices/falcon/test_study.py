@@ -18,6 +18,7 @@ from study_app.devices.falcon.emulator.face import Emulator
 from study_app.errors import SessionError
 from study_app.haptics.clock import VirtualClock
 from study_app.haptics.layout import STATUS_OK
+from study_app.haptics.limits import slew_limit_n
 from study_app.haptics.servo import Servo
 from study_app.protocol.load import load
 from study_app.session import rehearsal
@@ -40,6 +41,8 @@ MAY_DIFFER = {
     "path_length_m",
     "mean_speed_mps",
     "force_mean_n",
+    "withheld_share",
+    "loop_delay_ticks",
     "force_peak_n",
     "limiter_slope",
     "limiter_energy",
@@ -178,11 +181,12 @@ def test_a_minute_with_faulty_packets_has_no_jump_of_force_and_no_turn_unaccount
         counters = device.counters
         servo.stop()
     samples = np.concatenate(rows)
+    most_n = slew_limit_n(1e-3, device.dynamics.mass_kg)
     assert len(samples) == 60_000
     assert (samples["status"] == STATUS_OK).all()
     for forces_n in (samples["device_force_n"], given_n):  # asked for, and made of it by the emulator's mechanics
         assert np.linalg.norm(forces_n, axis=1).max() > 2.0
-        assert np.linalg.norm(np.diff(forces_n, axis=0), axis=1).max() <= 0.5 + 1e-9
+        assert np.linalg.norm(np.diff(forces_n, axis=0), axis=1).max() <= most_n + 0.02  # the mechanism turns, too
     happened = {fault: device.hand.faults.happened(fault) for fault in ("drop", "truncate", "corrupt", "duplicate")}
     assert min(happened.values()) > 100
     assert counters["turns"] == 60_000
@@ -194,11 +198,11 @@ def test_a_minute_with_faulty_packets_has_no_jump_of_force_and_no_turn_unaccount
 def test_a_cable_pulled_in_a_trial_keeps_the_data_marks_the_trial_and_lets_it_go_on(tmp_path, monkeypatch):
     look, looks = rehearsal.Rehearsal._see, []
 
-    def pull_the_cable(self, senses, hand):
+    def pull_the_cable(self, senses):
         looks.append(self._page.trial)
         if looks.count(2) == 40:
             self._machine.hand.faults.on("unplugged")
-        return look(self, senses, hand)
+        return look(self, senses)
 
     folder = StudyFolder(tmp_path / "demo")
     with monkeypatch.context() as patch:

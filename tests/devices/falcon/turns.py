@@ -6,12 +6,13 @@ from collections import deque
 import numpy as np
 
 from study_app.devices.falcon.bulk import BulkCalls
-from study_app.devices.falcon.exchange import exchange_functions, new_exchange
+from study_app.devices.falcon.exchange import LEAST_MASS_KG, exchange_functions, new_exchange
 from study_app.devices.falcon.geometry import GEOMETRIES
 from study_app.devices.falcon.kinematics import REACHED, inverse, new_mechanism
 from study_app.devices.falcon.packets import FLAGS_AT, NIBBLES, number, pack
 from study_app.devices.falcon.wire import ENDPOINT_IN, ERROR_TIMEOUT, HOMED_SHIFT, PACKET, SUCCESS, ZERO
-from study_app.haptics.layout import READING, records
+from study_app.haptics.layout import new_command, new_reading
+from study_app.haptics.limits import SLEW_S, slew_limit_n
 
 MS = 1_000_000
 GEOMETRY = GEOMETRIES["libnifalcon"]
@@ -19,8 +20,11 @@ UNITS_PER_NM = 6616.0
 MODEM_STATUS = b"\x01\x60"
 CENTRE_M = (0.0, 0.0, 0.0)
 OUT_M = (0.0, 0.0, 0.045)
+PUSH_N = (1.0, -0.5, 2.0)
+GROWTH_N = slew_limit_n(SLEW_S, LEAST_MASS_KG)  # within a tick
+SOMEWHERE_M = (0.02, -0.01, 0.015)
 
-_BULK = ctypes.CFUNCTYPE(
+BULK_CALL = ctypes.CFUNCTYPE(
     ctypes.c_int32,
     ctypes.c_ssize_t,
     ctypes.c_uint8,
@@ -61,7 +65,7 @@ class FakeBridge:
         self.sent = []
         self.write_answer = SUCCESS
         self.reads = 0
-        self._function = _BULK(self._transfer)
+        self._function = BULK_CALL(self._transfer)
         self.calls = BulkCalls(7, ctypes.cast(self._function, ctypes.c_void_p).value)
 
     def _transfer(self, handle, endpoint, data, length, transferred, timeout_ms):
@@ -93,7 +97,7 @@ class Turns:
         self.memory = new_exchange(self.bridge.calls, new_mechanism(GEOMETRY, UNITS_PER_NM), GEOMETRY)
         self.falcon = self.memory[0]
         self.read, self.write = exchange_functions()
-        self.reading = records(READING, 1)
+        self.reading, self.command = new_reading(), new_command()
         self.now_ns = 1000 * MS
 
     def turn(self, *replies, force_n=(0.0, 0.0, 0.0), after_ns=MS):
@@ -102,7 +106,8 @@ class Turns:
         if replies:
             self.bridge.queue.append(MODEM_STATUS + b"".join(replies))
         answer = self.read.ctypes(self.memory.ctypes.data, self.now_ns, self.reading.ctypes.data)
-        return answer, self.write.ctypes(self.memory.ctypes.data, *force_n)
+        self.command[0].force_n = self.command[0].sent_n = force_n
+        return answer, self.write.ctypes(self.memory.ctypes.data, self.command.ctypes.data)
 
     def open_gate(self):
         """Home it, pull the grip out and wait until all force passes."""
@@ -123,3 +128,21 @@ class Turns:
     @property
     def torques(self):
         return torques_in(self.bridge.sent[-1])
+
+
+def force_of(turns, place_m):
+    """Return the force that the last torques make at a place, by virtual work and differences."""
+    mechanism = turns.falcon.mechanism
+
+    def theta_at(place):
+        theta = np.zeros(3)
+        assert inverse(mechanism, np.add(place, [0, 0, GEOMETRY.centre_m]), theta) == REACHED
+        return theta
+
+    torque_nm = -np.array(turns.torques) / UNITS_PER_NM
+    return np.array(
+        [
+            torque_nm @ (theta_at(np.add(place_m, step)) - theta_at(np.subtract(place_m, step))) / 2e-6
+            for step in np.eye(3) * 1e-6
+        ]
+    )

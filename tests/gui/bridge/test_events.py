@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import threading
 from types import SimpleNamespace
 
 import pytest
 from PySide6.QtCore import Qt
 
 from study_app.errors import StoreError
+from study_app.session.events import Continue
 from study_app.session.pages import PausePage, TaskPage, TextPage
 from tests.gui.bridge.world import begin_trial, tick
 
@@ -53,6 +55,29 @@ def test_leaving_out_is_kept_and_noted_and_a_refusal_is_told(make, world):
     ]
     assert bridge.trouble == ""
     assert isinstance(bridge.participant.page, TaskPage)
+
+
+def test_force_and_task_begin_when_the_tank_is_painted_and_not_while_a_page_asks_to_wait(bridge, world, qtbot):
+    painted = threading.Event()
+    bridge.participant.painting = threading.Thread(target=painted.wait, daemon=True)
+    bridge.participant.painting.start()
+    bridge.participant.event.emit(Continue(0.0))
+    for second in range(1, 4):
+        world.samples = tick(world, float(second))
+        bridge._frame()
+    assert bridge.participant.tank is None
+    assert "load" not in world.done
+    assert bridge.runner.task.elapsed_s == 0
+    painted.set()
+    qtbot.waitUntil(lambda: bridge.participant.tank is not None)
+    assert "load" not in world.done
+    bridge._frame()
+    assert world.done[-1] == "load"
+    world.samples = tick(world, 3.0)
+    bridge._frame()
+    world.samples = tick(world, 4.5)
+    bridge._frame()
+    assert bridge.runner.task.elapsed_s == 1.5
 
 
 def test_painted_frames_are_counted_on_the_servos_clock(bridge, world):

@@ -206,6 +206,9 @@ def test_the_servo_sends_no_force_from_the_next_tick_on(
     bridge = make(servo=real.servo, journal=journal, clock=real.seconds)
     bridge.participant.event.emit(Continue(real.seconds()))
     assert isinstance(bridge.participant.page, TaskPage)
+    with qtbot.waitExposed(bridge.participant):
+        pass
+    bridge._frame()  # the first one of the tank, with which the force begins
     assert real.forces_n(800).max() > 0.1
     handle = in_focus(open_(bridge), qtbot)
     QTest.keyPress(handle, ESC)

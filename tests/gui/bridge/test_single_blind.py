@@ -24,9 +24,13 @@ def pushes(world: World, count: int = 400) -> Any:
     samples.fresh = 1
     samples.device_force_n = (1.5, 0.0, np.sqrt(9 - 1.5**2))
     samples.wake_mps = (0.3, 0.0, 0.4)
+    samples.permitted_n, samples.withheld_n = 4.0, 0.25
     samples.limiters = LIMITER_FADE
     samples.limiters[:7] |= LIMITER_NORM
     return samples
+
+
+WITHHELD = "Force withheld, limit 5\u2009%"
 
 
 def rows(bridge: SessionBridge) -> dict[str, str]:
@@ -52,6 +56,7 @@ def test_force_wake_share_and_limiters_are_seen(make: Any, world: World) -> None
     assert card.wake.curve.getData()[1] == pytest.approx(0.5)
     assert rows(bridge)["Force, share of 6 N"] == "50\u2009%, most 50\u2009%"
     assert rows(bridge)["Limiters acted"] == "force 7"
+    assert rows(bridge)[WITHHELD] == "6.2\u2009%"
     assert bridge.operator.header.blind.word == "Single-blind"
 
 
@@ -59,7 +64,7 @@ def test_double_blind_looks_at_no_force(bridge: SessionBridge, world: World) -> 
     looked(bridge, world)
     assert bridge.lookout.forces is None
     assert isinstance(bridge.operator.force, HiddenForceCard)
-    assert rows(bridge)["Force, share of 6 N"] == rows(bridge)["Limiters acted"] == "hidden"
+    assert rows(bridge)["Force, share of 6 N"] == rows(bridge)["Limiters acted"] == rows(bridge)[WITHHELD] == "hidden"
     assert bridge.operator.header.blind.word == "Double-blind"
 
 

@@ -59,7 +59,7 @@ def felt_samples(scene: Scene, hand_m: Any) -> Any:
     safety = new_safety(8.0)
     begin_scene(safety[0])
     trail, places = new_trail(ELEMENTS)
-    take_again(pack(scene, capacity=ELEMENTS), safety[0], samples, trail[0], places)
+    take_again(pack(scene, capacity=ELEMENTS), safety[0], samples, trail[0], places, True)
     return samples
 
 
@@ -93,7 +93,7 @@ def still_view(bench: Workbench | None = None, **fields: Any) -> LabView:
             ErrorRow("Wake, of Σ|e|/S", "4e−15"), ErrorRow("Force, largest", "< 0.001 N"),
             ErrorRow("Lag of the velocity filter", "9 ms"),
         ),
-        "limiters": LimiterCounts().told(8.0),
+        "limiters": LimiterCounts().told(8.0, 1.5),
     }  # fmt: skip
     return LabView(**(shown | fields))
 
@@ -115,7 +115,7 @@ def lab_view(bench: Workbench | None = None, *, cut: int | None = None, **fields
         "tail_a": shadow.tail("A"),
         "tail_b": shadow.tail("B"),
         "now": Now(*(tuple(last[field].tolist()) for field in ("position_m", "device_force_n", "wake_mps"))),
-        "limiters": counts.told(8.0),
+        "limiters": counts.told(8.0, 1.5),
     }
     return still_view(bench, **(moved | fields))
 

@@ -148,8 +148,9 @@ def test_lists_and_switches_wait_for_the_view(place: Any, told: Any, still: LabV
         row.toggle.click()
         assert not row.toggle.isChecked()
     else:
-        row.choice.activated.emit(1)
-        assert row.choice.currentIndex() == 0
+        before = row.choice.currentIndex()
+        row.choice.activated.emit(before + 1)
+        assert row.choice.currentIndex() == before
     assert len(told) == 1
     place.show_view(dataclasses.replace(still, refused=(name, "it needs a viscosity")))
     assert row.why.isVisible()

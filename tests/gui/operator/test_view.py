@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 
+import pytest
+
 from study_app.gui.operator.view import MEASURES, duration_words, grouped, minutes
 from study_app.store.columns import TRIALS, header
 from study_app.store.tables import beyond_limits
@@ -203,6 +205,16 @@ def test_a_trial_out_of_limits_says_which_and_by_how_much_the_newest_first(told)
         "limit 250 ms",
         "Liquid setting 1 out of limits: longest gap of the servo 31.2 ms, limit 20 ms",
     )
+
+
+@pytest.mark.parametrize("blinding", ["double", "single"])
+def test_force_withheld_is_judged_before_an_operator_who_sees_forces_alone(told, blinding):
+    study = told.protocol.study.model_copy(update={"blinding": blinding})
+    told.progress = dataclasses.replace(told.progress, protocol=told.protocol.model_copy(update={"study": study}))
+    told.start(1)
+    told.end(1, withheld_share=0.0712)
+    said = [line.partition(" out of limits: ")[2] for line in told.view().beyond]
+    assert said == ([] if blinding == "double" else ["force withheld 7.12 %, limit 5 %"])
 
 
 def test_every_limit_of_a_trial_has_a_name_for_the_operator(told):

@@ -14,6 +14,7 @@ import numpy as np
 
 from study_app.devices.falcon.geometry import Geometry
 from study_app.haptics.compiled import kernel
+from study_app.haptics.vector import norm
 
 ARMS = np.dtype(
     [
@@ -35,6 +36,13 @@ ARMS = np.dtype(
     align=True,
 )
 
+MOST_FORCE_N = 10.0
+"""The greatest force of the motors at the grip [N]; beyond it all three torques are reduced by one factor.
+
+Novint advertised more than 8.9 N (2 lbf). Full torque units give 9.8 to 10.2 N across the axis with the gain of Martin
+& Hillier 2009, which agrees, but 24.8 N along it, which nobody has reported of a Falcon with its 30 W supply. What
+saturates, each motor or their supply, and at how much, is not published: uncertain by 1 N across, by more along z.
+"""
 LEAST_LEVER_M = 0.012
 """Where the rod gives way by less for a turn of its arm [m/rad] the arm is nearly stretched: there it has its stop. All
 that a Falcon is used for is twice as far from that."""
@@ -140,6 +148,15 @@ def strain(arms: Any, torque: Any, hand_m: Any) -> None:
         arms.force_n[0] += share * (_stretch(arms, i, at, x + d, y, z) - _stretch(arms, i, at, x - d, y, z))
         arms.force_n[1] += share * (_stretch(arms, i, at, x, y + d, z) - _stretch(arms, i, at, x, y - d, z))
         arms.force_n[2] += share * (_stretch(arms, i, at, x, y, z + d) - _stretch(arms, i, at, x, y, z - d))
+
+
+@kernel
+def saturate(arms: Any) -> None:
+    """Reduce ``arms.force_n`` to the most that the motors give."""
+    size_n = norm(arms.force_n)
+    if size_n > MOST_FORCE_N:
+        for axis in range(3):
+            arms.force_n[axis] *= MOST_FORCE_N / size_n
 
 
 @kernel

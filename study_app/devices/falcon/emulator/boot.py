@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 
 from study_app.devices.falcon import wire
-from study_app.devices.falcon.emulator.faults import ECHO, strikes
+from study_app.devices.falcon.emulator.faults import ECHO, ECHO_PREFIX, GLUED, strikes
 from study_app.devices.falcon.emulator.ftdi import answer
 from study_app.haptics.compiled import kernel
 
@@ -36,8 +36,8 @@ _PING = tuple(wire.PING)
 _PONG = tuple(wire.PONG)
 _PONG_NS: Final = 2_000_000
 _ECHO_NS: Final = 10_000
-_ECHO_PREFIX: Final = 0x13
-_GLUED = (0x00, 0x0D)
+_PREFIX: Final = 0x13
+_GLUED_BYTES = (0x00, 0x0D)
 
 
 @kernel
@@ -60,8 +60,8 @@ def load(loader: Any, bridge: Any, faults: Any, value: int, divisor: int, at_ns:
         if divisor == wire.BAUD_9600:
             _hear_ping(loader, bridge, faults, value, at_ns)
         elif divisor == wire.BAUD_142857 and value == wire.AUTOBAUD[0]:
-            if faults.echo_prefix:
-                answer(bridge, _ECHO_PREFIX, at_ns + _ECHO_NS, divisor)
+            if strikes(faults, ECHO_PREFIX):
+                answer(bridge, _PREFIX, at_ns + _ECHO_NS, divisor)
             answer(bridge, value, at_ns + _ECHO_NS, divisor)
             loader.state = LOADING
     elif loader.state == LOADING:
@@ -89,9 +89,9 @@ def _hear_ping(loader: Any, bridge: Any, faults: Any, value: int, at_ns: int) ->
         answer(bridge, 0, at_ns + _PONG_NS, wire.BAUD_9600)
     for k in range(len(_PONG)):
         answer(bridge, _PONG[k], at_ns + _PONG_NS, wire.BAUD_9600)
-    if faults.glued:
-        for k in range(len(_GLUED)):
-            answer(bridge, _GLUED[k], at_ns + _PONG_NS, wire.BAUD_9600)
+    if strikes(faults, GLUED):
+        for k in range(len(_GLUED_BYTES)):
+            answer(bridge, _GLUED_BYTES[k], at_ns + _PONG_NS, wire.BAUD_9600)
     loader.state = PINGED
 
 

@@ -20,11 +20,14 @@ from study_app.devices.falcon.emulator.faults import POWER_OFF, Faults, spelt
 from study_app.devices.falcon.emulator.ftdi import power_up
 from study_app.devices.falcon.emulator.host import (
     EMULATOR,
+    INT,
     bulk,
     control,
     feel,
     let_pass,
     look,
+    next_event_ns,
+    poll,
     run_program,
     settle,
     supply,
@@ -110,6 +113,20 @@ class Emulator(HandOrders):
         code, moved = self._transfer(wire.ENDPOINT_IN, memory, size, timeout_ms)
         return code, memory[:moved].tobytes()
 
+    def poll(self, size: int) -> tuple[int, bytes]:
+        """Go on with a transfer in without waiting; return 0 or a libusb error, and the bytes that came by now.
+
+        ``ERROR_TIMEOUT`` means that it is not over: before ``next_event_ns`` nothing more comes.
+        """
+        memory, moved = np.zeros(max(size, 1), np.uint8), records(INT, 1)[0]
+        code = int(poll(self._state, memory.ctypes.data, size, moved))
+        return code, memory[: moved.value].tobytes()
+
+    @property
+    def next_event_ns(self) -> int:
+        """When a transfer in that is not over may go on [ns]."""
+        return int(next_event_ns(self._state))
+
     def _transfer(self, endpoint: int, memory: Any, length: int, timeout_ms: int) -> tuple[int, int]:
         moved = np.zeros(1, np.int32)
         call = bulk().ctypes
@@ -119,6 +136,17 @@ class Emulator(HandOrders):
     def calls(self) -> BulkCalls:
         """Return the bridge as compiled code sees it; the emulator must outlive it."""
         return BulkCalls(self._address, int(bulk().address))
+
+    def compile(self) -> None:
+        """Compile, or load from the cache, all that it runs later; this is run on another emulator."""
+        spare = Emulator(geometry=self.geometry, running=True)
+        spare.control(wire.REQUEST_LATENCY, wire.LATENCY_RUN_MS)
+        spare.write(wire.quiet_packet(), 1)
+        spare.poll(wire.USB_PACKET)
+        _ = spare.next_event_ns, spare.force_n
+        spare.look()
+        spare.pause(0.0)
+        spare.power(False)
 
     def claimed(self) -> None:
         """Hear that a program has taken the bridge: whoever holds the grip is ready to home it."""

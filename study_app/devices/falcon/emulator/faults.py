@@ -10,10 +10,10 @@ import numpy as np
 from study_app.errors import DeviceError
 from study_app.haptics.compiled import kernel
 
-CHANCES: Final = ("drop", "truncate", "corrupt", "duplicate", "delay", "stall", "echo")
+CHANCES: Final = ("drop", "truncate", "corrupt", "duplicate", "delay", "stall", "echo", "glued", "echo_prefix")
 """A reply lost, cut to 14 bytes, with a wrong byte, sent twice or late; a device that hears nothing for a while; a byte
-of firmware echoed wrongly."""
-DROP, TRUNCATE, CORRUPT, DUPLICATE, DELAY, STALL, ECHO = range(len(CHANCES))
+of firmware echoed wrongly; more bytes behind the answer to a ping, in the same USB packet; 13 41 as the echo of 'A'."""
+DROP, TRUNCATE, CORRUPT, DUPLICATE, DELAY, STALL, ECHO, GLUED, ECHO_PREFIX = range(len(CHANCES))
 
 SWITCHES: Final = (
     "unplugged",  # the bridge is gone
@@ -26,8 +26,6 @@ SWITCHES: Final = (
     "never_homes",  # no arm finds its index
     "forgets",  # the origin of the encoders is lost when the homing flag drops
     "leading_zero",  # a 00 before the answer to a ping
-    "glued",  # more bytes behind it, in the same packet
-    "echo_prefix",  # the echo of 'A' is 13 41
     "status_noise",  # modem status bytes of all kinds
 )
 
@@ -36,7 +34,7 @@ POWER_OFF: Final = "power-off"
 
 FAULTS = np.dtype(
     [
-        ("chance", np.float64, (len(CHANCES),)),  # of each turn
+        ("chance", np.float64, (len(CHANCES),)),  # each time that it can happen
         ("due", np.int64, (len(CHANCES),)),  # so many times, before chance is asked
         ("happened", np.int64, (len(CHANCES),)),
         ("delay_ns", np.int64),
@@ -86,7 +84,7 @@ class Faults:
         state.delay_ns, state.stall_ns = 3_000_000, 20_000_000
 
     def chance(self, name: str, chance: float) -> None:
-        """Let it happen with this probability a turn; 0: no more."""
+        """Let it happen with this probability each time that it can; 0: never."""
         if not 0.0 <= chance <= 1.0:
             raise DeviceError(f"the chance of fault '{name}' must be 0 to 1, not {chance}")
         self._state.chance[_place(name)] = chance
@@ -136,19 +134,19 @@ class Faults:
         try:
             chance = float(value)
         except ValueError:
-            known = ", ".join((*(f"{known}=CHANCE" for known in CHANCES), *map(spelt, SWITCHES), POWER_OFF))
+            known = ", ".join((*(f"{spelt(known)}=CHANCE" for known in CHANCES), *map(spelt, SWITCHES), POWER_OFF))
             raise DeviceError(f"fault '{word}' is not known; choose of: {known}") from None
         self.chance(name, chance)
 
 
 def spelt(name: str) -> str:
-    """Return a switch's name as a command line gives it and messages say it."""
+    """Return a fault's name as a command line gives it and messages say it."""
     return name.replace("_", "-")
 
 
 def _place(name: str) -> int:
     if name not in CHANCES:
-        raise DeviceError(f"fault '{name}' does not come by chance; choose one of: {', '.join(CHANCES)}")
+        raise DeviceError(f"fault '{name}' does not come by chance; choose one of: {', '.join(map(spelt, CHANCES))}")
     return CHANCES.index(name)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from study_app.devices.falcon import wire
 from study_app.devices.falcon.bulk import BULK
 from study_app.devices.falcon.emulator import ftdi
-from study_app.devices.falcon.emulator.arm import ARMS, bend, count, strain
+from study_app.devices.falcon.emulator.arm import ARMS, bend, count, saturate, strain
 from study_app.devices.falcon.emulator.boot import LOADER, RUNNING, WAITING, load, reset
 from study_app.devices.falcon.emulator.faults import FAULTS, draw
 from study_app.devices.falcon.emulator.ftdi import BRIDGE, OUT_RING, byte_at
@@ -41,8 +41,8 @@ EMULATOR = np.dtype(
 )
 
 _emulator_at = record_at(EMULATOR)
-_INT = np.dtype([("value", np.int32)])
-_int_at = record_at(_INT)
+INT = np.dtype([("value", np.int32)])
+_int_at = record_at(INT)
 
 
 @cache
@@ -117,6 +117,29 @@ def _bulk_in(e: Any, data: int, length: int, moved: Any, end_ns: int) -> int:
         if got < wire.USB_PACKET:
             return wire.SUCCESS
     return wire.SUCCESS
+
+
+@kernel
+def poll(e: Any, data: int, length: int, moved: Any) -> int:
+    """Transfer in what the chip hands over up to now, to address ``data``; ``moved`` is a record of ``INT``.
+
+    Returns ``ERROR_TIMEOUT`` while the transfer is not over; then the rest of it is asked for later.
+    """
+    moved.value = 0
+    if e.faults.unplugged:
+        return wire.ERROR_NO_DEVICE
+    _begin(e)
+    return _bulk_in(e, data, length, moved, e.bridge.now_ns)
+
+
+@kernel
+def next_event_ns(e: Any) -> int:
+    """Return when a poll may transfer more than now: the chip hands over, or the device hears a byte [ns]."""
+    bridge = e.bridge
+    due_ns = ftdi.hand_over_ns(bridge)
+    if bridge.out_first < bridge.out_last:
+        due_ns = min(due_ns, bridge.out_ns[bridge.out_first % OUT_RING])
+    return int(due_ns)
 
 
 @kernel
@@ -227,3 +250,4 @@ def settle(e: Any) -> None:
 def feel(e: Any) -> None:
     """Put into ``arms.force_n`` what the motors make now."""
     strain(e.arms, e.run.acting, e.handle.position_m)
+    saturate(e.arms)

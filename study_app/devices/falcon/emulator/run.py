@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 
 from study_app.devices.falcon import wire
-from study_app.devices.falcon.emulator.arm import count, stop, strain
+from study_app.devices.falcon.emulator.arm import count, saturate, stop, strain
 from study_app.devices.falcon.emulator.faults import (
     CORRUPT,
     DELAY,
@@ -217,6 +217,7 @@ def _load(e: Any) -> None:
         push(e.handle, 0.0, -e.weight_n, 0.0)
         return
     strain(e.arms, e.run.acting, e.handle.position_m)
+    saturate(e.arms)
     force = e.arms.force_n
     if math.isfinite(force[0] + force[1] + force[2]):
         push(e.handle, force[0], force[1] - e.weight_n, force[2])

@@ -1,11 +1,13 @@
 """An emulated Falcon served in real time on a Unix socket, as ``framing`` says.
 
-So other programs, another driver or our own guard, can be put in front of it. Emulated time is the machine's: a
-transfer is computed at once up to where it ends, and its answer is held back until that moment has come.
+So other programs, another driver or our own guard, can be put in front of it. Emulated time is the machine's. A
+transfer out is computed at once up to where it ends, and its answer is held back until that moment has come; a transfer
+in goes on from event to event of the bridge, so that it may be pending while others are carried out.
 """
 
 from __future__ import annotations
 
+import math
 import select
 import socket
 import threading
@@ -21,11 +23,21 @@ import numpy as np
 
 from study_app.devices.falcon import wire
 from study_app.devices.falcon.emulator.face import Emulator
-from study_app.devices.falcon.framing import ANSWER, BULK_IN, BULK_OUT, CONTROL, DESCRIPTOR, IDENTITY, REQUEST
+from study_app.devices.falcon.framing import (
+    ANSWER,
+    BULK_IN,
+    BULK_OUT,
+    CONTROL,
+    DESCRIPTOR,
+    IDENTITY,
+    REQUEST,
+    TAGGED,
+)
 from study_app.errors import DeviceError
 
 _IDLE_S: Final = 0.02  # how long nobody may ask before it is looked at anyway
 _MOST_BYTES: Final = 1 << 17
+_MOST_PENDING: Final = 16  # requests of a client; further ones stay in its socket
 _REFUSALS: Final = {
     "unplugged": wire.ERROR_NO_DEVICE,
     "access_denied": wire.ERROR_ACCESS,
@@ -36,11 +48,24 @@ _REFUSALS: Final = {
 
 
 @dataclass(slots=True, eq=False)
+class _Request:
+    kind: int
+    at: int
+    value: int
+    length: int
+    timeout_ms: int
+    data: bytes  # to be transferred out, or transferred in so far
+    tagged: bool
+    ends_ns: float = 0.0  # when its time is out; 0: not begun
+    answer: bytes = b""
+    due_ns: int = 0  # when the answer may go
+
+
+@dataclass(slots=True, eq=False)
 class _Client:
     connection: socket.socket
     asked: bytearray = field(default_factory=bytearray)
-    answer: bytes = b""
-    due_ns: int = 0  # when the answer may go
+    pending: list[_Request] = field(default_factory=list)
 
 
 class EmulatorServer:
@@ -55,6 +80,7 @@ class EmulatorServer:
     def __init__(self, emulator: Emulator, path: str | Path) -> None:
         self.emulator = emulator
         self.path = Path(path)
+        emulator.compile()  # a client may ask from now on, and its time-outs are milliseconds
         self._clock = np.array([time.monotonic_ns()], np.int64)
         emulator.follow_clock(int(self._clock.ctypes.data))
         self._clients: dict[socket.socket, _Client] = {}
@@ -118,15 +144,17 @@ class EmulatorServer:
             self._thread.join()
 
     def _wait(self) -> set[socket.socket]:
-        """Return who has something to say, at the latest when the next answer is due."""
-        waiting = [client for client in self._clients.values() if client.answer]
-        listening = [client.connection for client in self._clients.values() if not client.answer]
-        seconds = _IDLE_S
-        if waiting:
-            due_ns = min(client.due_ns for client in waiting)
-            seconds = min(max(due_ns - time.monotonic_ns(), 0) * 1e-9, _IDLE_S)
+        """Return who has something to say, at the latest when a pending request may go on."""
+        listening = [client.connection for client in self._clients.values() if len(client.pending) < _MOST_PENDING]
+        due_ns = min(
+            (self._due_ns(request) for client in self._clients.values() for request in client.pending), default=math.inf
+        )
+        seconds = min(max(due_ns - time.monotonic_ns(), 0) * 1e-9, _IDLE_S)
         ready, _, _ = select.select([self._door, self._heard, *listening], [], [], seconds)
         return set(ready)
+
+    def _due_ns(self, request: _Request) -> float:
+        return request.due_ns if request.answer else min(request.ends_ns, self.emulator.next_event_ns)
 
     def _welcome(self) -> None:
         connection, _ = self._door.accept()
@@ -152,38 +180,54 @@ class EmulatorServer:
             self._owner = None
 
     def _serve(self, client: _Client) -> None:
-        """Carry out the next request that is whole, if the last one is answered; answer what is due."""
-        if not client.answer and len(client.asked) >= REQUEST.size:
-            kind, at, value, length, timeout_ms = REQUEST.unpack_from(client.asked)
-            whole = REQUEST.size + (length if kind == BULK_OUT else 0)
-            if len(client.asked) < whole:
-                return
-            data = bytes(client.asked[REQUEST.size : whole])
-            del client.asked[:whole]
-            code, told = self._carry_out(client, kind, at, value, length, timeout_ms, data)
-            client.answer = ANSWER.pack(code, len(told)) + told
-            client.due_ns = self.emulator.now_ns if self._owner is client else 0
-        if client.answer and client.due_ns <= time.monotonic_ns():
-            try:
-                client.connection.sendall(client.answer)
-            except OSError:  # gone, or not listening: it has to take one answer before it asks again
-                self._dismiss(client)
-            client.answer = b""
+        """Go on with all pending requests, at each endpoint in their order; send the answers that are due."""
+        while len(client.pending) < _MOST_PENDING and (request := _take_request(client.asked)) is not None:
+            client.pending.append(request)
+        busy: set[int] = set()
+        for request in client.pending:
+            if not request.answer and request.kind not in busy:
+                self._go_on(client, request)
+            if not request.answer:
+                busy.add(request.kind)
+        in_order = True
+        for request in list(client.pending):
+            if request.answer and request.due_ns <= time.monotonic_ns() and (request.tagged or in_order):
+                client.pending.remove(request)
+                try:
+                    client.connection.sendall(request.answer)
+                except OSError:  # gone, or it does not read its answers
+                    self._dismiss(client)
+                    return
+            elif not request.tagged:
+                in_order = False
 
-    def _carry_out(
-        self, client: _Client, kind: int, at: int, value: int, length: int, timeout_ms: int, data: bytes
-    ) -> tuple[int, bytes]:
+    def _go_on(self, client: _Client, request: _Request) -> None:
+        """Carry out a request as far as it goes by now; once it is over, give it its answer."""
+        code, data = self._carry_out(client, request)
+        if request.kind == BULK_IN:
+            request.data += data
+            now_ns = int(self._clock[0])
+            if request.ends_ns == 0.0:
+                request.ends_ns = now_ns + 1e6 * request.timeout_ms if request.timeout_ms else math.inf
+            if code == wire.ERROR_TIMEOUT and now_ns < request.ends_ns:
+                return
+            data = request.data
+        tag = bytes([request.kind | TAGGED]) if request.tagged else b""
+        request.answer = tag + ANSWER.pack(code, len(data)) + data
+        request.due_ns = self.emulator.now_ns if self._owner is client else 0
+
+    def _carry_out(self, client: _Client, request: _Request) -> tuple[int, bytes]:
         """Return the code and the bytes of the answer."""
-        emulator = self.emulator
+        emulator, kind, at = self.emulator, request.kind, request.at
         refused = self._claim(client)
         if refused != wire.SUCCESS:
             return refused, b""
         if kind == CONTROL:
-            return emulator.control(at, value), b""
+            return emulator.control(at, request.value), b""
         if kind == BULK_OUT and at == wire.ENDPOINT_OUT:
-            return emulator.write(data, timeout_ms)[0], b""
+            return emulator.write(request.data, request.timeout_ms)[0], b""
         if kind == BULK_IN and at == wire.ENDPOINT_IN:
-            return emulator.read(length, timeout_ms)
+            return emulator.poll(request.length - len(request.data))
         if kind == DESCRIPTOR:
             return wire.SUCCESS, IDENTITY.pack(wire.VENDOR_ID, wire.PRODUCT_ID) + emulator.serial.encode()
         return (wire.ERROR_NOT_FOUND if kind in {BULK_OUT, BULK_IN} else wire.ERROR_NOT_SUPPORTED), b""
@@ -211,6 +255,19 @@ class EmulatorServer:
         self.emulator.follow_clock(0)
         with self._changed:
             self._changed.notify_all()
+
+
+def _take_request(asked: bytearray) -> _Request | None:
+    """Take the next request out of what a client has sent; None where it is not whole yet."""
+    if len(asked) < REQUEST.size:
+        return None
+    kind, at, value, length, timeout_ms = REQUEST.unpack_from(asked)
+    whole = REQUEST.size + (length if kind & ~TAGGED == BULK_OUT else 0)
+    if len(asked) < whole:
+        return None
+    data = bytes(asked[REQUEST.size : whole])
+    del asked[:whole]
+    return _Request(kind & ~TAGGED, at, value, length, timeout_ms, data, bool(kind & TAGGED))
 
 
 def _listen(path: Path) -> socket.socket:

@@ -1,0 +1,330 @@
+"""The three answers of the first page: what was told apart, from when on a delay is noticed, what changes nothing.
+
+An answer is a sentence, then directions, sizes and intervals; the p that decide stand in the sections that follow.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Final, Literal, TypeAlias
+
+from study_app.analysis.decided import Decided
+from study_app.analysis.report.words import all_of, beyond, counted, interval, listed, ms, name, number, percent, short
+from study_app.analysis.results import Against, BlockFound, Named, Results, Tested
+from study_app.analysis.statistics.outcome import Interval
+from study_app.analysis.statistics.paired import Paired
+
+Question: TypeAlias = Literal["told apart", "noticed from", "unchanged up to"]
+
+ASKED: Final[dict[Question, str]] = {
+    "told apart": "What was told apart?",
+    "noticed from": "From which delay on do people notice?",
+    "unchanged up to": "Up to which delay does nothing that matters change?",
+}
+NO_EVIDENCE: Final = "That is not evidence that there is nothing."
+FOUND: Final = ("shown", "suggested")
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """An answer to one question about one block (its id).
+
+    ``claims`` says whether it claims that settings differ or that a delay is noticed, which would be false in a study
+    where nothing differs; ``exploratory`` whether that was not decided on before the study.
+    """
+
+    question: Question
+    block: str
+    title: str
+    told: str
+    sizes: tuple[str, ...]
+    claims: bool = False
+    exploratory: bool = False
+
+
+def answers(results: Results) -> tuple[Answer, ...]:
+    """Return the answers that a study gives, block by block."""
+    return tuple(one for found in results.blocks for one in of_block(found, results.decided))
+
+
+def of_block(found: BlockFound, decided: Decided) -> tuple[Answer, ...]:
+    """Return the answers that a block gives: none before anybody's answers count."""
+    if not found.n:
+        return ()
+    questions: tuple[Question, ...] = ("noticed from", "unchanged up to") if found.kind == "delays" else ("told apart",)
+    if not found.revealed:
+        waits = "This waits for the key to be opened: until then settings are codes."
+        return tuple(Answer(question, found.id, found.title, waits, ()) for question in questions)
+    if found.kind == "delays":
+        return _noticed_from(found, decided), _unchanged(found)
+    return (_told_apart(found),)
+
+
+def recognised(named: Named) -> tuple[int, ...]:
+    """Return the places of the settings that were recognised.
+
+    Only where names are right more often than by chance as a whole; then those whose share of right names, by the
+    lower end of its interval, is above the share of all settings that were given that name.
+    """
+    if named.verdict not in FOUND:
+        return ()
+    found = []
+    for rate in named.found.rates:
+        label = named.right[rate.setting]
+        if label is not None and rate.interval is not None and rate.interval.low > given(named, label):
+            found.append(rate.setting)
+    return tuple(found)
+
+
+def given(named: Named, label: str) -> float:
+    """Return the share of all answers that gave a name: what is right by chance."""
+    place = named.labels.index(label)
+    asked = sum(sum(row[:-1]) for row in named.found.table)
+    return sum(row[place] for row in named.found.table) / asked if asked else 0.0
+
+
+def _told_apart(found: BlockFound) -> Answer:
+    compared = _compared(found)
+    apart = {pair: tests for pair, tests in compared.items() if tests}
+    of_pairs = _of_pairs(found, apart)
+    named = found.named if found.named is not None and found.named.found.p is not None else None
+    known = () if named is None else recognised(named)
+    told = of_pairs if named is None else _of_names(found, named, known)
+    decisive = [one for tests in apart.values() for one in tests]
+    exploratory = all(one.verdict == "suggested" for one in decisive) and (
+        named is None or not known or named.verdict == "suggested"
+    )
+    claims = bool(decisive or known)
+    if not claims:
+        told = f"{told} {NO_EVIDENCE}"
+    sizes = (*(() if named is None else (_hits(found, named), of_pairs)), *_largest(found, apart))
+    return Answer("told apart", found.id, found.title, told, sizes, claims, claims and exploratory)
+
+
+def _of_names(found: BlockFound, named: Named, known: Sequence[int]) -> str:
+    """Return which liquids were recognised and which were not, with the name that was given instead."""
+    yes = [found.names[place].lower() for place in known]
+    no = [rate.setting for rate in named.found.rates if rate.setting not in known]
+    told = [f"{listed(yes)} {'was' if len(yes) == 1 else 'were'} recognised above chance"] if yes else []
+    if no:
+        of_no = listed([found.names[place].lower() for place in no])
+        others = [words for place in no if (words := _instead(found, named, place))]
+        verb = "was" if len(no) == 1 else "were"
+        rest = "" if yes else " recognised above chance"
+        told.append(f"{of_no} {verb} not shown to be{rest}{f' ({listed(others)})' if others else ''}")
+    return f"{_first_upper('; '.join(told))}."
+
+
+def _instead(found: BlockFound, named: Named, place: int) -> str:
+    """Return the wrong name that a setting was given most, if it was given more often than the right one."""
+    counts = named.found.table[place]
+    right = named.right[place]
+    hits = counts[named.labels.index(right)] if right is not None else 0
+    most = max(counts[: len(named.labels)])
+    label = named.labels[counts.index(most)]
+    if most <= hits:
+        return ""
+    called = next((found.names[at].lower() for at, other in enumerate(named.right) if other == label), "")
+    return f"{found.names[place].lower()} was called {called or short(found, label).lower()} by {most} of {sum(counts)}"
+
+
+def _hits(found: BlockFound, named: Named) -> str:
+    """Return how many gave each liquid its right name, with the interval of the share, and what chance would give."""
+    told = []
+    for rate in named.found.rates:
+        label = named.right[rate.setting]
+        if label is not None:
+            told.append(
+                f"{found.names[rate.setting].lower()} {rate.hits} of {rate.n}{_share(rate.interval)}, "
+                f"{100 * given(named, label):.0f} % by chance"
+            )
+    return f"Named right (95 % intervals): {'; '.join(told)}."
+
+
+def _share(of: Interval | None) -> str:
+    return "" if of is None else f" ({100 * of.low:.0f} to {100 * of.high:.0f} %)"
+
+
+def _compared(found: BlockFound) -> dict[tuple[str, str], list[Tested]]:
+    """Return in which statements each two settings (codes) were told apart."""
+    codes = [setting.code for setting in found.settings]
+    if len(codes) == 2:
+        return {(codes[0], codes[1]): [one for one in found.omnibus if one.verdict in FOUND]}
+    return {
+        (first, second): [
+            one.tested
+            for one in found.pairs
+            if (one.first, one.second) == (first, second) and one.tested.verdict in FOUND
+        ]
+        for first, second in combinations(codes, 2)
+    }
+
+
+def _of_pairs(found: BlockFound, apart: dict[tuple[str, str], list[Tested]]) -> str:
+    """Return which settings were rated differently in some statement, and which were not."""
+    pairs = list(combinations([setting.code for setting in found.settings], 2))
+    if not pairs:
+        return "There is one setting, and nothing to tell it from."
+    yes = [_pair(found, pair) for pair in pairs if pair in apart]
+    no = [_pair(found, pair) for pair in pairs if pair not in apart]
+    if not yes:
+        return "In no statement were two of them shown to be rated differently."
+    rest = f"; not shown to be: {listed(no)}" if no else ""
+    return f"Rated differently: {listed(yes)}{rest}."
+
+
+def _pair(found: BlockFound, pair: tuple[str, str]) -> str:
+    between = " and " if len(found.settings) == 2 else " – "
+    return between.join(name(found, code).lower() for code in pair)
+
+
+def _largest(found: BlockFound, apart: dict[tuple[str, str], list[Tested]]) -> Iterator[str]:
+    """Yield for each two settings that differ the statement in which they differ most."""
+    for pair, tests in apart.items():
+        largest = max(tests, key=lambda one: abs(one.outcome.effect or 0.0))
+        outcome = largest.outcome
+        if not isinstance(outcome, Paired) or not outcome.effect:
+            continue
+        higher = name(found, pair[0] if outcome.effect > 0 else pair[1]).lower()
+        away = outcome.median_difference
+        points = "" if away is None else f" by {_points(away)} (median)"
+        one_way = abs(outcome.effect) == 1.0
+        size = (
+            f"all {outcome.n - outcome.zeros} who differ"
+            if one_way
+            else f"rank-biserial {number(abs(outcome.effect))}, 95 % interval {_either(outcome)}"
+        )
+        yield (
+            f"{_first_upper(_pair(found, pair))}: in {len(tests)} of {counted(len(found.items), 'statement')}, most in "
+            f"“{short(found, largest.item)}”: {higher} higher{points}, {size}."
+        )
+
+
+def _points(difference: float) -> str:
+    size = abs(difference)
+    return f"{size:g} {'point' if size == 1 else 'points'}"
+
+
+def _either(outcome: Paired) -> str:
+    """Return the interval of an effect in the direction of its sign."""
+    of = outcome.interval
+    if of is None or (outcome.effect or 0.0) > 0:
+        return interval(of)
+    return interval(Interval(-of.high, -of.low, of.level, of.method))
+
+
+def _noticed_from(found: BlockFound, decided: Decided) -> Answer:
+    lowest = {one.item: one.over_all_ms for one in found.lowest if one.over_all_ms is not None}
+    different = [one for one in found.against if one.verdict == "different"]
+    threshold = found.threshold
+    fitted = threshold is not None and threshold.effect is not None
+    if lowest:
+        at = min(lowest.values())
+        first = [f"“{short(found, item)}”" for item, delay in lowest.items() if delay == at]
+        told = (
+            f"From {ms(at)} on at the latest: {listed(first)} {'changes' if len(first) == 1 else 'change'} with the "
+            "delay up to there. Shorter delays may be noticed too."
+        )
+    elif different:
+        at = min(one.delay_ms for one in different)
+        told = f"A trend is not shown, but answers at {ms(at)} differ from those at {ms(different[0].control_ms)}."
+    elif fitted:
+        told = "Noticing rises with the delay, but for no single delay is it shown."
+    else:
+        told = f"No delay was shown to be noticed. {NO_EVIDENCE}"
+    sizes = [
+        f"“{short(found, item)}” from {ms(delay)} on at the latest{_change(found, item, delay)}"
+        for item, delay in sorted(lowest.items(), key=lambda one: one[1])
+    ]
+    sizes += [
+        f"“{short(found, one.item)}” differs at {ms(one.delay_ms)}{_change(found, one.item, one.delay_ms)}"
+        f"{'' if one.as_expected else ', against the direction stated'}"
+        for one in _first_of_each(different)
+        if one.item not in lowest
+    ]
+    if sizes and found.against:
+        sizes[-1] += f". {_level(found.against)}"
+    if threshold is not None and threshold.effect is not None:
+        ends = "no interval" if threshold.interval is None else f"95 % interval {interval(threshold.interval, 0)} ms"
+        sizes.append(f"Half of the answers that can notice do at {threshold.effect:.0f} ms ({ends}).")
+    elif threshold is not None:
+        sizes.append(f"No detection threshold: {threshold.note}.")
+    primary = [decided.is_primary(item) for item in (*lowest, *(one.item for one in different))]
+    claims = bool(lowest or different or fitted)
+    return Answer(
+        "noticed from", found.id, found.title, told, tuple(sizes), claims, claims and not any(primary or [fitted])
+    )
+
+
+def _first_of_each(different: Iterable[Against]) -> Iterator[Against]:
+    """Yield of each statement the comparison at the shortest delay."""
+    seen = set()
+    for one in sorted(different, key=lambda one: one.delay_ms):
+        if one.item not in seen:
+            seen.add(one.item)
+            yield one
+
+
+def _change(found: BlockFound, item: str, delay_ms: float) -> str:
+    """Return how far the mean answer at a delay is from that at the shortest, with its interval."""
+    for one in found.against:
+        if one.item == item and one.delay_ms == delay_ms and one.found.effect is not None:
+            return f": {_difference(one)}"
+    return ""
+
+
+def _difference(one: Against) -> str:
+    effect, of = one.found.effect or 0.0, one.found.interval
+    return f"{'+' if effect > 0 else ''}{number(effect)} {'(no interval)' if of is None else interval(of)} points"
+
+
+def _level(against: Sequence[Against]) -> str:
+    """Return what the differences and their intervals are, said once."""
+    first = against[0]
+    return f"Points: mean difference to {ms(first.control_ms)}, {percent(1 - 2 * first.found.alpha)} interval"
+
+
+def common_ms(found: BlockFound) -> float | None:
+    """Return the longest delay up to which every statement is equivalent at every delay."""
+    delays = list((found.equivalent_up_to or {}).values())
+    known = [delay for delay in delays if delay is not None]
+    return min(known) if known and len(known) == len(delays) else None
+
+
+def _unchanged(found: BlockFound) -> Answer:
+    up_to = {item: delay for item, delay in (found.equivalent_up_to or {}).items() if delay is not None}
+    if not found.against:
+        why = next((one.why for one in found.absent if "equivalence" in one.what), "nothing was compared")
+        return Answer("unchanged up to", found.id, found.title, f"No answer: {why}.", ())
+    first = found.against[0]
+    points = "point" if first.found.bound == 1 else "points"
+    within = f"within ±{first.found.bound:g} {points} of those at {ms(first.control_ms)}"
+    at = common_ms(found)
+    if at is not None:
+        told = f"Up to {ms(at)}: mean answers to {all_of(len(up_to), 'statement')} stay {within}."
+    elif up_to:
+        single = listed([f"“{short(found, item)}” up to {ms(delay)}" for item, delay in up_to.items()])
+        told = f"For no delay is it shown in all statements. In single ones mean answers stay {within}: {single}."
+    else:
+        told = (
+            f"For no delay, not even {ms(first.delay_ms)}, are mean answers shown to stay {within}. That is not "
+            "evidence that something changes."
+        )
+    here = [one for one in found.against if one.delay_ms <= (at or first.delay_ms) and one.found.effect is not None]
+    sizes = []
+    if here:
+        largest = max(here, key=lambda one: abs(one.found.effect or 0.0))
+        level = percent(1 - 2 * largest.found.alpha)
+        sizes.append(
+            f"The largest difference {'up to' if at is not None else 'at'} {ms(at or first.delay_ms)}: "
+            f"“{short(found, largest.item)}”, {_difference(largest)} ({level} interval); "
+            f"people beyond the bound: {beyond(largest.found)}."
+        )
+    sizes.append("This is about means: single people may notice, and what is within the bound may still change.")
+    return Answer("unchanged up to", found.id, found.title, told, tuple(sizes))
+
+
+def _first_upper(words: str) -> str:
+    return words[:1].upper() + words[1:]

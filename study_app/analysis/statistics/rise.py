@@ -1,0 +1,62 @@
+"""Whether noticing rises with the level at all: a likelihood ratio against a flat line, by permutation.
+
+The width and the place of a curve mean nothing where it is flat, so that the ratio has no chi-square distribution.
+Here each participant's answers change places among the levels presented to him or her, which holds the error rate
+however participants differ from each other.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from scipy.special import expit, ndtr
+
+from study_app.analysis.statistics.outcome import Array
+from study_app.analysis.statistics.psychometric import LOGISTIC, NORMAL, Shape
+
+NO_RISE: Final = "noticing is not shown to rise with the level (likelihood ratio against a flat line, p = {p:.3f})"
+
+DRAWS: Final = 999
+CELLS: Final = 2_000_000
+"""So many answers are rearranged at most, and fewer times than ``DRAWS`` where there are many participants."""
+
+FEWEST: Final = 199
+PLACES: Final = 15
+WIDTHS: Final = (0.02, 0.1, 0.3, 0.7, 1.5, 4.0)
+RATES: Final = (0.0, 0.05, 0.2, 0.4)
+
+
+def p_of_rise(yes: Array, asked: Array, levels: Array, shape: Shape, seed: int) -> float:
+    """Return p that the share of yes answers rises with the level.
+
+    Parameters
+    ----------
+    yes, asked : (participants, levels) arrays
+        Counts; one row where answers are independent.
+    levels : (levels,) array
+        Ascending.
+    """
+    span = float(np.ptp(levels))
+    place, width, guess, lapse = (
+        axis.reshape(-1, 1)
+        for axis in np.meshgrid(np.linspace(levels[0], levels[-1], PLACES), np.array(WIDTHS) * span, RATES, RATES)
+    )
+    z = (levels - place) / width
+    grown = expit(LOGISTIC * z) if shape == "logistic" else ndtr(NORMAL * z)
+    expected = np.clip(guess + (1 - guess - lapse) * grown, 1e-9, 1 - 1e-9)
+    flat = np.log1p(-expected) @ asked.sum(axis=0)
+    slope = np.log(expected) - np.log1p(-expected)
+    found = float((slope @ yes.sum(axis=0) + flat).max())
+    drawn = (_rearranged(yes, asked, seed) @ slope.T + flat).max(axis=1)
+    return (1 + int((drawn >= found - 1e-9 * abs(found)).sum())) / (1 + len(drawn))
+
+
+def _rearranged(yes: Array, asked: Array, seed: int) -> Array:
+    """Return the yes counts (draws, levels) after each participant's answers changed places."""
+    rng = np.random.default_rng(seed)
+    draws = int(np.clip(CELLS // max(1, int(asked.sum())), FEWEST, DRAWS))
+    drawn = np.zeros((draws, asked.shape[1]))
+    for said, of in zip(yes.astype(np.int64), asked.astype(np.int64), strict=True):
+        drawn += rng.multivariate_hypergeometric(of, int(said.sum()), size=draws, method="marginals")
+    return drawn

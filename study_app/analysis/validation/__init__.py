@@ -1,0 +1,1 @@
+"""How often the report's verdicts are wrong: simulated studies through the report's own tests."""

@@ -1,0 +1,163 @@
+"""One batch of simulated studies through the report's own tests, and what is wrong in their verdicts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Final, TypeAlias
+
+import numpy as np
+
+from study_app.analysis.answered import Asked, of_tables, over_all
+from study_app.analysis.evaluate import found_in
+from study_app.analysis.failures import Failures
+from study_app.analysis.measures import Array
+from study_app.analysis.questions import Block
+from study_app.analysis.report.answers import FOUND, common_ms, of_block
+from study_app.analysis.results import BlockFound
+from study_app.analysis.validation.rates import Limit, Rate
+from study_app.analysis.validation.studies import Extent, Generator, Simulated, alike, answers, true_differences
+
+BATCH: Final = 25
+
+Event: TypeAlias = tuple[str, Limit]
+"""What is counted, and its limit."""
+
+LOST: Final[Event] = ("a part of the report is lost", "none")
+CLAIMED: Final[Event] = ("the first page claims something", "counted")
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """Studies of one kind: who answers, how much differs in truth, and how many take part."""
+
+    generator: Generator
+    extent: Extent
+    participants: int
+
+    @property
+    def name(self) -> str:
+        """The cell in words, without its size."""
+        return f"{self.generator}, {self.extent}"
+
+
+def count(of: Simulated, cell: Cell, seed: int, batch: int, studies: int) -> tuple[Rate, ...]:
+    """Return the rates of so many studies of a cell, those of batch number ``batch``."""
+    events: dict[Event, int] = {}
+    for study in range(batch * BATCH, batch * BATCH + studies):
+        for event, happened in _study(of, cell, seed, study).items():
+            events[event] = events.get(event, 0) + happened
+    return tuple(
+        Rate(cell.name, cell.participants, what, limit, hits, studies) for (what, limit), hits in events.items()
+    )
+
+
+def _study(of: Simulated, cell: Cell, seed: int, study: int) -> dict[Event, bool]:
+    failures = Failures()
+    given = answers(of, cell.generator, cell.extent, cell.participants, seed, study)
+    people = tuple(f"P{number:03d}" for number in range(cell.participants))
+    found: dict[Event, bool] = {}
+    claims = []
+    for place, (block, values) in enumerate(zip(of.blocks, given, strict=True)):
+        single = {item.id: values[:, :, [column]] for column, item in enumerate(block.items)}
+        asked = of_tables(
+            block, of.decided, people, single, failures=failures, planning=False, verdicts_only=True, seed=1
+        )
+        result = found_in(None, asked)
+        claims += [one.claims for one in of_block(result, of.decided)]
+        judged = _in_delays if block.kind == "delays" else _in_liquids
+        for (what, limit), hit in judged(of, asked, result, cell, place):
+            found[f"{what} ({block.kind})", limit] = hit
+    found[LOST] = bool(failures.found)
+    if cell.extent != "partial":
+        found[CLAIMED] = any(claims)
+    return found
+
+
+def _in_liquids(
+    of: Simulated, asked: Asked, found: BlockFound, cell: Cell, _place: int
+) -> Iterator[tuple[Event, bool]]:
+    if cell.extent == "empty":
+        yield ("test over all statements", "at most 5 %"), _over_all(asked)
+        yield ("settings differ in a statement", "at most 5 %"), any(one.verdict in FOUND for one in found.omnibus)
+        yield ("liquids recognised", "at most 5 %"), found.named is not None and found.named.verdict in FOUND
+    equal = _equal_pairs(asked.block, cell.extent)
+    if equal:
+        told = any(one.tested.verdict in FOUND and (one.first, one.second) in equal for one in found.pairs)
+        yield ("equal liquids told apart", "at most 5 %"), told
+    if cell.extent == "full":
+        yield ("some liquids told apart", "counted"), any(one.tested.verdict in FOUND for one in found.pairs)
+        yield ("liquids recognised", "counted"), found.named is not None and found.named.verdict in FOUND
+
+
+def _over_all(asked: Asked) -> bool:
+    found = over_all(replace(asked, verdicts_only=False))
+    return found is not None and found.p is not None and found.p <= asked.decided.alpha
+
+
+def _equal_pairs(block: Block, extent: Extent) -> set[tuple[str, str]]:
+    """Return the pairs of codes whose settings are equal in truth."""
+    like = alike(block, extent)
+    codes = block.codes
+    return {
+        (first, second)
+        for one, first in enumerate(codes)
+        for other, second in enumerate(codes)
+        if one < other and like.get(one, one) == like.get(other, other)
+    }
+
+
+def _in_delays(of: Simulated, asked: Asked, found: BlockFound, cell: Cell, place: int) -> Iterator[tuple[Event, bool]]:
+    block = asked.block
+    null = [block.settings[at].delay_ms or 0.0 for at in alike(block, cell.extent)]
+    if cell.extent == "empty":
+        yield ("test over all statements", "at most 5 %"), _over_all(asked)
+        yield ("trend in a statement", "at most 5 %"), any(one.verdict in FOUND for one in found.trends)
+        yield ("detection threshold printed", "at most 5 %"), _printed(found)
+    if null:
+        low = any(one.over_all_ms is not None and one.over_all_ms <= max(null) for one in found.lowest)
+        yield ("lowest delay falsely low", "at most 5 %"), low
+        differ = any(one.verdict == "different" and one.delay_ms <= max(null) for one in found.against)
+        yield ("equal delays called different", "at most 5 %"), differ
+    if cell.extent != "empty":
+        yield from _equivalence(of, found, cell, place)
+    if cell.extent == "full":
+        yield ("lowest delay stated", "counted"), any(one.over_all_ms is not None for one in found.lowest)
+        yield ("detection threshold printed", "counted"), _printed(found)
+
+
+def _printed(found: BlockFound) -> bool:
+    return found.threshold is not None and found.threshold.effect is not None
+
+
+def _equivalence(of: Simulated, found: BlockFound, cell: Cell, place: int) -> Iterator[tuple[Event, bool]]:
+    """Yield whether a delay is called equivalent that is not: the one nearest to the bound, and on the first page."""
+    bound = of.decided.equivalence_bound
+    if bound is None or not found.against:
+        return
+    block = of.blocks[place]
+    beyond = {
+        (item.id, setting.delay_ms or 0.0): float(away)
+        for setting, row in zip(block.settings, np.abs(_truth(of, cell.generator, cell.extent, place)), strict=True)
+        for item, away in zip(block.items, row, strict=True)
+        if away >= bound
+    }
+    if not beyond:
+        return
+    nearest = min(beyond, key=beyond.__getitem__)
+    called = {(one.item, one.delay_ms): one.verdict == "equivalent" for one in found.against}
+    yield ("nearest beyond the bound called equivalent", "at most 5 %"), called[nearest]
+    up_to = common_ms(found)
+    too_far = up_to is not None and any(delay <= up_to for _, delay in beyond)
+    yield ("“unchanged up to” too long", "at most 5 %"), too_far
+
+
+_TRUTHS: Final[dict[tuple[str, str, int], Array]] = {}
+
+
+def _truth(of: Simulated, generator: Generator, extent: Extent, place: int) -> Array:
+    """Return the true differences, computed once in each process."""
+    key = (generator, extent, place)
+    if key not in _TRUTHS:
+        _TRUTHS[key] = true_differences(of, generator, extent, place)
+    return _TRUTHS[key]

@@ -1,0 +1,55 @@
+"""Rates of simulated studies: how they are counted, and when one holds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, Literal, TypeAlias
+
+from study_app.analysis.power.found import interval
+
+Limit: TypeAlias = Literal["none", "at most 5 %", "at least 93 %", "at least 77 %", "at most 83 %", "counted"]
+
+Verdict: TypeAlias = Literal["yes", "no", "too few studies", "counted"]
+
+ALLOWED: Final[dict[Limit, tuple[float, float, float, float]]] = {
+    "at most 5 %": (0.0, 0.05, 0.0, 0.075),
+    "at least 93 %": (0.93, 1.0, 0.905, 1.0),
+    "at least 77 %": (0.77, 1.0, 0.0, 1.0),
+    "at most 83 %": (0.0, 0.83, 0.0, 1.0),
+}
+"""Of each limit the range that the interval of a rate must touch, and the range that it must not leave."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rate:
+    """So many ``hits`` of so many simulated studies ``of`` one cell."""
+
+    cell: str
+    participants: int
+    what: str
+    limit: Limit
+    hits: int
+    of: int
+
+    @property
+    def share(self) -> float:
+        """The share of studies."""
+        return self.hits / self.of if self.of else 0.0
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Wilson's 95 % interval of the share."""
+        return interval(self.share, self.of) if self.of else (0.0, 1.0)
+
+    @property
+    def holds(self) -> Verdict:
+        """Whether the rate keeps to its limit: "no" where its interval is beyond it, as far as so many studies tell."""
+        if self.limit == "counted":
+            return "counted"
+        if self.limit == "none":
+            return "no" if self.hits else "yes"
+        low, high = self.interval
+        lowest, highest, least, most = ALLOWED[self.limit]
+        if high < lowest or low > highest:
+            return "no"
+        return "yes" if low >= least and high <= most else "too few studies"

@@ -1,0 +1,55 @@
+"""The command that measures how often the report's verdicts are wrong."""
+
+from __future__ import annotations
+
+import sys
+import time
+from pathlib import Path
+
+import click
+
+from study_app.cli.words import EXIT_FOUND
+
+
+@click.command("validate-report")
+@click.option("--studies", type=click.IntRange(1, 1_000_000), default=1000, show_default=True, help="Of each cell.")
+@click.option("--jobs", type=click.IntRange(-1), default=-1, metavar="N", help="At once; default: one a core.")
+@click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True)
+@click.option("--to", type=click.Path(path_type=Path), metavar="DIR", help="Folder for rates.md and rates.csv.")
+def validate_report(studies: int, jobs: int, seed: int, to: Path | None) -> None:
+    """Simulate empty, partially empty and full studies, and say how often the report's verdicts are wrong.
+
+    Studies of rek2024 with 5, 12 and 24 participants, by the rehearsals' answer model and by an ordinal probit model
+    with random effects, go through the report's own tests. Of every rate the Wilson interval is printed, and whether
+    it keeps to its limit: "at most 5 %" holds if the interval reaches down to 5 % and ends below 7.5 %. Ctrl-C ends
+    with what was simulated until then. Ends with exit code 3 where a rate is beyond its limit.
+    """
+    if jobs == 0:
+        raise click.BadParameter("0 jobs do nothing: give 1 or more, or -1 for one a core", param_hint="--jobs")
+    from study_app.analysis.output import write_files
+    from study_app.analysis.power.planned import plan
+    from study_app.analysis.validation.listed import markdown, table
+    from study_app.analysis.validation.rates import Rate
+    from study_app.analysis.validation.running import validate
+    from study_app.analysis.validation.studies import simulated
+    from study_app.protocol.load import load
+    from study_app.session.feelings import feelings
+
+    protocol = load("rek2024")
+    of = simulated(protocol, plan(protocol, feelings(protocol, seed=seed)))
+    rates: tuple[Rate, ...] = ()
+    begun, done = time.monotonic(), 0
+    try:
+        for done, so_far in validate(of, studies, seed, jobs=jobs):
+            rates = so_far
+            if sys.stderr.isatty():
+                click.echo(f"\r\033[K{done} studies", err=True, nl=False)
+    except KeyboardInterrupt:
+        click.echo("ended early", err=True)
+    words = f"{done} studies in {time.monotonic() - begun:.0f} s\n\n{markdown(rates)}"
+    click.echo(words, nl=False)
+    if to is not None:
+        for path in write_files(to, {"rates.md": words.encode(), "rates.csv": table(rates)}):
+            click.echo(path)
+    if any(one.holds == "no" for one in rates):
+        click.get_current_context().exit(EXIT_FOUND)

@@ -1,0 +1,117 @@
+"""Studies made up in memory: one block with any settings, people, sessions, repetitions and answers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from study_app.analysis.decided import NOTHING, Decided
+from study_app.analysis.questions import Block, Item, Setting
+from study_app.analysis.tables import Study
+from study_app.store.columns import RESPONSES, TRIALS, Column
+
+TYPES = {"text": "string", "time": "string", "integer": "Int64", "number": "Float64", "flag": "boolean"}
+ITEMS = ("different", "harder")
+DECIDED = replace(
+    NOTHING, made=True, equivalence_bound=1.0, rising=ITEMS[:1], falling=ITEMS[1:], noticed=ITEMS[0], names=()
+)
+
+Presented = tuple[str, int, str, Sequence[int | None]]
+"""A trial: participant, session, code, and the answers to the items."""
+
+
+def delays(delays_ms: Sequence[float]) -> tuple[Setting, ...]:
+    """Return settings of one liquid, D1, D2 …, sorted as a study has them."""
+    made = [Setting(f"D{place}", f"delay_{place}", "water", ms) for place, ms in enumerate(delays_ms, start=1)]
+    return tuple(sorted(made, key=lambda setting: setting.delay_ms or 0.0))
+
+
+def liquids(count: int) -> tuple[Setting, ...]:
+    """Return settings of so many liquids, L1, L2 …, the first two of which the first two items name."""
+    names = [*ITEMS, *[None] * count]
+    return tuple(
+        Setting(f"L{place}", f"c{place}", f"liquid{place}", 0.0, names[place - 1]) for place in range(1, count + 1)
+    )
+
+
+def study(settings: Sequence[Setting], trials: Sequence[Presented], decided: Decided = DECIDED) -> Study:
+    """Return a study of one block."""
+    kind = "delays" if settings[0].code.startswith("D") else "liquids"
+    if kind == "liquids":
+        decided = replace(decided, names=ITEMS)
+    items = tuple(Item(item, item, item.capitalize()) for item in ITEMS)
+    block = Block("b", "Block", kind, tuple(settings), items, tuple("1234567"), None)
+    presented, answers = [], []
+    for number, (participant, session, code, given) in enumerate(trials, start=1):
+        place = {
+            "study": "made_up",
+            "participant": participant,
+            "session": session,
+            "simulated": True,
+            "pilot": False,
+            "trial": number,
+            "attempt": 1,
+            "block": "b",
+            "phase": "main",
+            "index": number,
+            "code": code,
+        }
+        presented.append(place)
+        answers += [
+            {**place, "item": item, "response": value, "cannot_judge": False}
+            for item, value in zip(ITEMS, given, strict=True)
+        ]
+    visits = sorted({(participant, session) for participant, session, _, _ in trials})
+    return Study(
+        folder=Path("nowhere"),
+        name="made_up",
+        title="Made up",
+        version="1",
+        blocks=(block,),
+        settings={("b", setting.code): setting for setting in settings},
+        responses=table(RESPONSES, answers),
+        trials=table(TRIALS, presented),
+        participants=pd.DataFrame([_visit(*visit) for visit in visits], columns=list(_visit("", 1))),
+        exclusions=(),
+        decided=decided,
+        protocol={"blocks": {"b": {"order": "shuffled", "task": "explore"}}, "tasks": {"explore": {"kind": "explore"}}},
+    )
+
+
+def table(columns: Sequence[Column], rows: Sequence[dict[str, Any]]) -> pd.DataFrame:
+    """Return rows with all columns of a table, missing where a row has none, and all of them counting."""
+    made = {
+        column.name: pd.array([row.get(column.name) for row in rows], dtype=TYPES[column.kind])  # type: ignore[call-overload]
+        for column in columns
+    }
+    status = pd.array(["completed"] * len(rows), dtype="string")
+    return pd.DataFrame(made).assign(session_status=status, excluded=False, exclusion_reason=None, counted=True)
+
+
+def _visit(participant: str, session: int) -> dict[str, Any]:
+    return {
+        "participant": participant,
+        "session": session,
+        "simulated": True,
+        "pilot": False,
+        "status": "completed",
+        "protocol_version": "1",
+        "counted": True,
+        "excluded": False,
+    }
+
+
+def everybody(
+    settings: Sequence[Setting], people: int, answer: Any, *, sessions: int = 1, repetitions: int = 1
+) -> Iterator[Presented]:
+    """Yield the trials in which ``answer(person, session, code, item)`` is answered, every setting to everybody."""
+    for person in range(people):
+        for session in range(1, sessions + 1):
+            for _ in range(repetitions):
+                for setting in settings:
+                    given = [answer(person, session, setting.code, item) for item in ITEMS]
+                    yield f"P{person:03d}", session, setting.code, given

@@ -1,0 +1,117 @@
+"""The first page: three answers with direction, size and interval, pictures, limits, and how often it is wrong."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from study_app.analysis.evaluate import evaluate
+from study_app.analysis.failures import Failures
+from study_app.analysis.report.answers import Answer, answers, common_ms
+from study_app.analysis.report.first_page import first_page
+from study_app.analysis.report.measured import empty_studies
+from study_app.analysis.results import Results
+from tests.analysis.made_up import DECIDED, ITEMS, delays, everybody, liquids, study
+
+DELAYS = (0.0, 50.0, 100.0, 150.0)
+
+
+def of_delays(answer: object, people: int = 12) -> Results:
+    settings = delays(DELAYS)
+    return evaluate(study(settings, list(everybody(settings, people, answer))), planning=False)
+
+
+def rising(from_code: int) -> Results:
+    """Return a study in which one statement rises and the other falls by 4 points from a setting (D1 …) on."""
+    rng = np.random.default_rng(2)
+
+    def answer(_person: int, _session: int, code: str, item: str) -> int:
+        up = 4 * (int(code[1:]) >= from_code)
+        return int(np.clip((2 + up if item == ITEMS[0] else 6 - up) + rng.integers(-1, 2), 1, 7))
+
+    return of_delays(answer)
+
+
+def flat() -> Results:
+    return of_delays(lambda person, *_: 3 + person % 2)
+
+
+def named(results: Results, question: str) -> Answer:
+    return next(one for one in answers(results) if one.question == question)
+
+
+def test_a_delay_that_is_noticed_is_told_with_direction_size_and_interval() -> None:
+    found = named(rising(3), "noticed from")
+    assert found.claims
+    assert not found.exploratory
+    assert found.told.startswith("From 100 ms on at the latest")
+    assert any("“Different” from 100 ms on at the latest: +" in line and "[" in line for line in found.sizes)
+    assert any("“Harder” from 100 ms on at the latest: −" in line for line in found.sizes)
+    assert not any("p =" in line or "p <" in line for line in (found.told, *found.sizes))
+
+
+def test_up_to_which_delay_nothing_changes_needs_every_statement() -> None:
+    results = rising(3)
+    found = named(results, "unchanged up to")
+    assert common_ms(results.blocks[0]) == 50.0
+    assert found.told.startswith("Up to 50 ms: mean answers to both statements stay within ±1 point of those at 0 ms")
+    block = replace(results.blocks[0], equivalent_up_to={ITEMS[0]: 50.0, ITEMS[1]: None})
+    assert common_ms(block) is None
+    assert (
+        "For no delay is it shown in all statements" in named(replace(results, blocks=(block,)), "unchanged up to").told
+    )
+
+
+def test_where_nothing_is_shown_it_says_that_this_is_no_evidence() -> None:
+    found = named(flat(), "noticed from")
+    assert not found.claims
+    assert "No delay was shown to be noticed. That is not evidence" in found.told
+
+
+def test_liquids_are_recognised_by_name_and_the_wrong_name_is_told() -> None:
+    settings = liquids(3)
+
+    def answer(_person: int, _session: int, code: str, item: str) -> int:
+        """Everybody names the first liquid right, and the second and third as the first."""
+        return {("L1", ITEMS[0]): 7, ("L2", ITEMS[1]): 2, ("L3", ITEMS[1]): 2}.get((code, item), 4 + (item == ITEMS[0]))
+
+    right = study(
+        settings,
+        list(
+            everybody(
+                settings, 12, lambda p, s, code, item: 7 if (code, item) in {("L1", ITEMS[0]), ("L2", ITEMS[1])} else 2
+            )
+        ),
+    )
+    told = named(evaluate(right, planning=False), "told apart")
+    assert told.claims
+    assert told.told == "Liquid1 and liquid2 were recognised above chance."
+    assert "liquid1 12 of 12 (74 to 100 %), 33 % by chance" in told.sizes[0]
+    wrong = named(evaluate(study(settings, list(everybody(settings, 12, answer))), planning=False), "told apart")
+    assert "liquid2 was called liquid1 by 12 of 12" in wrong.told
+
+
+def test_decisions_that_came_later_are_marked_as_exploratory() -> None:
+    results = rising(3)
+    made = study(delays(DELAYS), list(everybody(delays(DELAYS), 12, lambda p, s, code, i: 1 + int(code[1:]))))
+    later = evaluate(replace(made, decided=replace(DECIDED, changed=True)), planning=False)
+    assert named(later, "noticed from").exploratory
+    assert "exploratory" in first_page(later, (), Failures())
+    assert "exploratory" not in first_page(results, (), Failures())
+
+
+def test_the_page_holds_pictures_limits_and_how_often_it_is_wrong() -> None:
+    failures = Failures()
+    page = first_page(rising(3), ("<nothing> beyond 150 ms",), failures)
+    assert failures.found == []
+    assert page.count('src="data:image/png;base64,') == 2
+    assert page.index("Up to which delay") < page.index("What this study cannot show")
+    assert "&lt;nothing&gt;" in page
+    assert "In how many of a hundred empty studies would this page say something?" in page
+
+
+@pytest.mark.parametrize(("participants", "n"), [(1, 5), (10, 12), (200, 24)])
+def test_the_measured_rate_is_that_of_the_nearest_size(participants: int, n: int) -> None:
+    assert f"with {n} participants" in empty_studies(participants)

@@ -1,0 +1,101 @@
+"""What one answer stands for: repetitions, sessions and conditions of one delay are said, and never pooled silently."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+
+from study_app.analysis.codebook import codebook_bytes
+from study_app.analysis.evaluate import evaluate
+from study_app.analysis.report.methods import methods
+from study_app.analysis.report.sections import block
+from study_app.analysis.report.words import said_of_presentations
+from study_app.analysis.results import BlockFound, Results
+from study_app.analysis.tables import Study
+from tests.analysis.made_up import ITEMS, delays, everybody, liquids, study
+
+LEVELS = (0.0, 50.0, 100.0, 150.0)
+
+
+def rising(seed: int, shift: float = 0.0):  # type: ignore[no-untyped-def]
+    """Return an answer that rises with the delay, by ``shift`` more in later sessions."""
+    rng = np.random.default_rng(seed)
+
+    def answer(_person: int, session: int, code: str, _item: str) -> int:
+        return int(np.clip(round(int(code[1:]) + shift * (session - 1) + rng.normal()), 1, 7))
+
+    return answer
+
+
+def evaluated(made: Study) -> tuple[Results, BlockFound]:
+    results = evaluate(made, planning=False)
+    assert results.failures == ()
+    return results, results.blocks[0]
+
+
+def test_one_presentation_needs_no_word() -> None:
+    made = study(delays(LEVELS), list(everybody(delays(LEVELS), 10, rising(1))))
+    _, found = evaluated(made)
+    assert (found.presentations, found.sessions, found.replicated_ms) == ((1, 1), (1,), ())
+    assert said_of_presentations(found) == ()
+
+
+def test_repetitions_are_said_and_single_answers_are_used_where_levels_count() -> None:
+    made = study(delays(LEVELS), list(everybody(delays(LEVELS), 10, rising(1), repetitions=2)))
+    results, found = evaluated(made)
+    assert found.presentations == (2, 2)
+    (line,) = said_of_presentations(found)
+    assert "answered each statement 2 times for one delay" in line
+    assert line in methods(made, results)
+    assert line in " ".join(block(found, results, ()))
+    (described,) = json.loads(codebook_bytes(made, {}))["blocks"]
+    assert described["answers_per_participant_setting_and_item"] == [2, 2]
+    assert found.threshold is not None
+    assert set(found.threshold.asked) == {20}
+    for one in found.mixed:
+        assert all(float(level).is_integer() for level in one.outcome.levels)  # type: ignore[attr-defined]
+
+
+def test_sessions_are_shown_and_tested() -> None:
+    made = study(delays(LEVELS), list(everybody(delays(LEVELS), 10, rising(1, shift=2.0), sessions=2)))
+    results, found = evaluated(made)
+    assert found.sessions == (1, 2)
+    assert [one.verdict for one in found.by_session] == ["suggested", "suggested"]
+    page = " ".join(block(found, results, ()))
+    assert "The answers are of sessions 1 and 2, which are compared with each other" in page
+    assert "Do sessions differ?" in page
+    three = study(delays(LEVELS), list(everybody(delays(LEVELS), 10, rising(2), sessions=3)))
+    _, found = evaluated(three)
+    assert {one.outcome.test for one in found.by_session} == {"Friedman"}
+    assert "suggested" not in {one.verdict for one in found.by_session}
+
+
+def test_people_who_came_to_one_session_each_cannot_compare_them() -> None:
+    trials = [one for one in everybody(delays(LEVELS), 8, rising(1), sessions=2) if (one[0] < "P004") == (one[1] == 1)]
+    _, found = evaluated(study(delays(LEVELS), trials))
+    assert found.by_session == ()
+    assert any("nobody answered the same setting in all of sessions" in one.why for one in found.absent)
+
+
+def test_conditions_of_one_delay_are_replicates_of_it() -> None:
+    twice = (0.0, 50.0, 50.0, 100.0, 150.0)
+    results, found = evaluated(study(delays(twice), list(everybody(delays(twice), 12, rising(3)))))
+    assert found.delays_ms == LEVELS
+    assert found.replicated_ms == (50.0,)
+    assert {one.delay_ms for one in found.against} == {50.0, 100.0, 150.0}
+    assert found.trends[0].outcome.p is not None
+    assert found.threshold is not None
+    assert found.threshold.asked == (12, 24, 12, 12)
+    assert "Several conditions present 50 ms: they are taken as repeated presentations" in " ".join(
+        block(found, results, ())
+    )
+
+
+def test_of_two_settings_the_higher_one_is_named() -> None:
+    two = liquids(2)
+    made = study(two, list(everybody(two, 10, lambda person, _s, code, _i: 6 if code == "L2" else 1 + person % 3)))
+    results, found = evaluated(made)
+    page = " ".join(block(found, results, ()))
+    assert "above 0 where Liquid1 was rated higher than Liquid2" in page
+    assert ITEMS[0] == found.omnibus[0].item

@@ -1,0 +1,118 @@
+"""How often verdicts are wrong: rates and their limits, the simulated truth, and the quick way to the same verdicts."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from study_app.analysis.answered import of_tables
+from study_app.analysis.evaluate import found_in
+from study_app.analysis.power.planned import plan
+from study_app.analysis.validation import single
+from study_app.analysis.validation.counting import CLAIMED, LOST, Cell, count
+from study_app.analysis.validation.listed import markdown, table
+from study_app.analysis.validation.rates import Limit, Rate
+from study_app.analysis.validation.studies import (
+    EXTENTS,
+    GENERATORS,
+    Extent,
+    Generator,
+    Simulated,
+    alike,
+    answers,
+    simulated,
+)
+from study_app.protocol.answers import Felt
+from study_app.protocol.load import load
+
+
+@pytest.fixture(scope="module")
+def rek() -> Simulated:
+    """The thesis' study as if each liquid had its own force, without any rehearsal."""
+    protocol = load("rek2024")
+    force_n = {"water": 0.3, "honey": 1.2, "light_oil": 0.6}
+    felt = {
+        (block.id, name): (
+            Felt(force_n.get(name, 0.3), 3 * force_n.get(name, 0.3), 0.1, 0.05, 0.1, protocol.delay_s(name)),
+        )
+        for block in protocol.main_blocks
+        for name in block.conditions
+    }
+    return simulated(protocol, plan(protocol, felt))
+
+
+@pytest.mark.parametrize(
+    ("limit", "hits", "of", "holds"),
+    [
+        ("at most 5 %", 50, 1000, "yes"),
+        ("at most 5 %", 62, 1000, "too few studies"),
+        ("at most 5 %", 80, 1000, "no"),
+        ("at most 5 %", 0, 20, "too few studies"),
+        ("at least 93 %", 930, 1000, "yes"),
+        ("at least 93 %", 900, 1000, "no"),
+        ("at least 77 %", 760, 1000, "yes"),
+        ("at least 77 %", 700, 1000, "no"),
+        ("at most 83 %", 900, 1000, "no"),
+        ("none", 0, 10, "yes"),
+        ("none", 1, 1000, "no"),
+        ("counted", 10, 10, "counted"),
+    ],
+)
+def test_a_rate_holds_as_far_as_its_interval_tells(limit: Limit, hits: int, of: int, holds: str) -> None:
+    assert Rate("cell", 5, "what", limit, hits, of).holds == holds
+
+
+@pytest.mark.parametrize("generator", GENERATORS)
+@pytest.mark.parametrize("extent", EXTENTS)
+def test_settings_that_are_alike_are_answered_alike_on_average(
+    rek: Simulated, generator: Generator, extent: Extent
+) -> None:
+    for block, given in zip(rek.blocks, answers(rek, generator, extent, 600, 3, 1), strict=True):
+        assert given.shape == (600, len(block.settings), len(block.items))
+        assert set(np.unique(given)) <= set(range(1, 8))
+        means = given.mean(axis=0)
+        like = alike(block, extent)
+        for place, other in like.items():
+            assert means[place] == pytest.approx(means[other], abs=0.45)
+        if extent == "full":
+            assert np.ptp(means, axis=0).max() > 1
+
+
+@pytest.mark.parametrize("participants", [5, 12])
+def test_verdicts_alone_are_those_of_the_whole_evaluation(rek: Simulated, participants: int) -> None:
+    people = tuple(f"P{number}" for number in range(participants))
+    for extent in EXTENTS:
+        given = answers(rek, "ordinal probit", extent, participants, 5, 2)
+        for block, values in zip(rek.blocks, given, strict=True):
+            single_ = {item.id: values[:, :, [column]] for column, item in enumerate(block.items)}
+            whole, quick = (
+                found_in(
+                    None, of_tables(block, rek.decided, people, single_, planning=False, verdicts_only=verdicts_only)
+                )
+                for verdicts_only in (False, True)
+            )
+            assert [one.verdict for one in quick.against] == [one.verdict for one in whole.against]
+            assert [one.found.effect for one in quick.against] == [one.found.effect for one in whole.against]
+            assert quick.equivalent_up_to == whole.equivalent_up_to
+            assert (quick.omnibus, quick.pairs, quick.trends) == (whole.omnibus, whole.pairs, whole.trends)
+            assert (quick.lowest, quick.threshold, quick.named) == (whole.lowest, whole.threshold, whole.named)
+            assert quick.mixed == ()
+
+
+@pytest.mark.parametrize("generator", GENERATORS)
+def test_every_kind_of_study_is_counted(rek: Simulated, generator: Generator) -> None:
+    rates = [rate for extent in EXTENTS for rate in count(rek, Cell(generator, extent, 5), 1, 0, 2)]
+    assert {rate.of for rate in rates} == {2}
+    assert {rate.cell for rate in rates} == {f"{generator}, {extent}" for extent in EXTENTS}
+    assert [rate.hits for rate in rates if rate.what == LOST[0]] == [0, 0, 0]
+    assert sum(rate.what == CLAIMED[0] for rate in rates) == 2
+    assert {"detection threshold printed (delays)", "equal liquids told apart (liquids)"} <= {one.what for one in rates}
+    assert rates == [rate for extent in EXTENTS for rate in count(rek, Cell(generator, extent, 5), 1, 0, 2)]
+    assert len(markdown(rates).splitlines()) == len(table(rates).splitlines()) + 1 == len(rates) + 2
+
+
+def test_single_tests_are_counted() -> None:
+    (leaning,) = single.count(("one in five differs by 5 points, the others by 0", 24), 1, 0, 4)
+    assert (leaning.of, leaning.limit) == (4, "at most 5 %")
+    (covered,) = single.count(("one threshold for all", 12), 1, 0, 4)
+    assert covered.hits >= 2

@@ -1,0 +1,94 @@
+"""The report's words follow what was decided and what was tested."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from study_app.analysis.evaluate import evaluate
+from study_app.analysis.report.methods import methods
+from study_app.analysis.report.r_script import r_script
+from study_app.analysis.report.sections import block
+from study_app.analysis.report.short import findings
+from study_app.analysis.report.words import all_of, percent
+from study_app.analysis.tables import Study
+from tests.analysis.made_up import DECIDED, delays, everybody, liquids, study
+
+LEVELS = (0.0, 50.0, 100.0)
+
+
+def moved(person: int, _session: int, code: str, _item: str) -> int:
+    return min(7, 1 + person % 3 + 2 * (int(code[1:]) - 1))
+
+
+def of(people: int, *, changed: bool = False, alpha: float = 0.05, levels: tuple[float, ...] = LEVELS) -> Study:
+    settings = delays(levels)
+    decided = replace(DECIDED, changed=changed, alpha=alpha)
+    return study(settings, list(everybody(settings, people, moved)), decided)
+
+
+def test_decisions_that_changed_are_told_as_that_and_not_as_none() -> None:
+    made = of(8, changed=True)
+    told = methods(made, evaluate(made, planning=False))
+    assert "The decisions about the analysis changed between sessions" in told
+    assert "decided before the first session" not in told.lower()
+    assert "Nothing was decided beforehand" not in told
+    kept = of(8)
+    told = methods(kept, evaluate(kept, planning=False))
+    assert "a bound of ±1 point, decided before the first session, and 90 % intervals" in told
+
+
+@pytest.mark.parametrize(("alpha", "level"), [(0.05, "90 %"), (0.0005, "99.9 %"), (0.025, "95 %")])
+def test_alpha_is_told_whole(alpha: float, level: str) -> None:
+    made = of(8, alpha=alpha)
+    results = evaluate(made, planning=False)
+    assert f"alpha = {alpha:g}, " in methods(made, results)
+    page = " ".join(block(results.blocks[0], results, ()))
+    assert f"intervals of {level}." in page
+    assert "p < .05" not in page
+    assert percent(1 - 2 * alpha) == level
+
+
+def test_pooled_versions_of_a_protocol_are_named() -> None:
+    made = of(4)
+    people = made.participants.assign(protocol_version=["1", "1", "2", "2"])
+    both = replace(made, participants=people)
+    assert "versions 1 and 2, pooled" in methods(both, evaluate(both, planning=False))
+
+
+def test_a_difference_that_could_not_be_shown_has_no_p() -> None:
+    few = of(4)
+    results = evaluate(few, planning=False)
+    (found,) = results.blocks
+    assert {one.verdict for one in found.against} == {"out of reach"}
+    assert "<td>out of reach</td>" in " ".join(block(found, results, ())).replace(' class="n"', "")
+
+
+def test_the_verdict_of_unanimity_holds_after_the_correction() -> None:
+    made = of(12)
+    (found,) = evaluate(made, planning=False).blocks
+    assert {one.verdict for one in found.against if one.delay_ms > 0} == {"different"}
+    assert all(one.found.interval is None for one in found.against)
+
+
+def test_all_statements_are_told_as_a_reader_would() -> None:
+    assert [all_of(count, "statement") for count in (1, 2, 3)] == [
+        *("the one statement", "both statements", "all three statements")
+    ]
+    two = liquids(2)
+    made = study(two, list(everybody(two, 10, moved)))
+    told = " ".join(findings(evaluate(made, planning=False)))
+    assert "one test over both statements" in told
+    assert "“Different” (higher for Liquid2, adjusted p" in told
+
+
+def test_the_script_compares_a_study_of_two_settings_and_counts() -> None:
+    two = liquids(2)
+    made = study(two, list(everybody(two, 10, moved)))
+    script = r_script(made, evaluate(made, planning=False))
+    assert script.count("\npair(") == 2
+    assert "numbers compared" in script
+    assert "if (compared == 0) quit(status = 1)" in script
+    empty = study(two, [])
+    assert "of 0 numbers compared" in r_script(empty, evaluate(empty, planning=False))
