@@ -267,6 +267,8 @@ class LiveSession(QObject):
         """Hear that the windows are gone; keep what broke, for whoever asked for the session."""
         assert self.bridge is not None  # noqa: S101 - it has just spoken
         self.theme = self.bridge.operator.theme
+        if self._tell is not None and (proof := self.bridge.parts.journal.fingerprint):
+            self._tell(f"fingerprint of the session, also in fingerprints.txt of the study: {proof}")
         trouble = self.bridge.trouble or self.bridge.runner.stalled or self.bridge.parts.journal.progress.broke
         if trouble and isinstance(self.bridge.failure, StudyError | None):
             self.error = StudyError(f"the session was stopped: {trouble}; what was answered before is on the disk")

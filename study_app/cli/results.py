@@ -106,11 +106,17 @@ def reproduce(session: Path) -> None:
 
 @click.command()
 @click.argument("folder", type=click.Path(path_type=Path))
-def verify(folder: Path) -> None:
+@click.option(
+    "--fingerprints",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Compare with a copy of fingerprints.txt kept elsewhere: no session was changed, added or removed since.",
+)
+def verify(folder: Path, fingerprints: Path | None) -> None:
     """Check everything in a study's folder: columns, checksums, receipts, journals, key, recordings, Psych-DS."""
     from study_app.store.verify import verify as verify_study
 
-    found = verify_study(folder)
+    found = verify_study(folder, fingerprints)
     for kind, findings in (
         ("error", (*found.errors, *found.psychds.errors)),
         ("warning", (*found.warnings, *found.psychds.warnings)),
@@ -118,7 +124,8 @@ def verify(folder: Path) -> None:
         for finding in findings:
             click.echo(f"{kind}: {finding}")
     many = "1 session" if found.sessions == 1 else f"{found.sessions} sessions"
-    click.echo(f"{many}: {'sound' if found.sound else 'not sound'}")
+    running = f", {found.running} running" if found.running else ""
+    click.echo(f"{many}{running}: {'sound' if found.sound else 'not sound'}")
     if not found.sound:
         click.get_current_context().exit(EXIT_FOUND)
 

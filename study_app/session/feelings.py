@@ -60,6 +60,7 @@ class _Unkept:
     """A session that is kept nowhere."""
 
     recorder = None
+    fingerprint = ""
 
     def __init__(self, now_ns: Callable[[], int], codes: dict[str, dict[str, str]]) -> None:
         self.clock = SessionClock(now_ns)

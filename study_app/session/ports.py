@@ -30,6 +30,8 @@ class ServoPort(Protocol):
 class JournalPort(Protocol):
     """What is asked of the store (``store.open_session.SessionStore``)."""
 
+    fingerprint: str
+
     def append(self, event: str, *, t_s: float | None = None, waits: bool = True, **fields: Any) -> None: ...  # noqa: D102
     def check_flushed(self) -> None: ...  # noqa: D102
     def write_tables(self) -> None: ...  # noqa: D102

@@ -112,9 +112,11 @@ def rehearse(
                 clock=SessionClock(machine.servo.now_ns),
             )
             lasted_s, answers = _run(study, build_schedule(study, person, seed), machine, store, FIRST)
+            proof = store.fingerprint
         if progress is not None:
             took_s = time.perf_counter() - began
-            progress(f"{person}: {answers} responses, {lasted_s / 60:.1f} min of session in {took_s:.1f} s (simulated)")
+            held = f"{lasted_s / 60:.1f} min of session in {took_s:.1f} s (simulated)"
+            progress(f"{person}: {answers} responses, {held}, fingerprint {proof}")
     return folder
 
 

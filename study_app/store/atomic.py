@@ -74,8 +74,8 @@ def create_folder(path: Path, files: Mapping[str, bytes], *, waits: bool = True)
     return True
 
 
-def append_line(path: Path, line: bytes) -> None:
-    """Add ``line`` (which ends in a newline) to the end of ``path`` and flush it to the disk.
+def append_line(path: Path, line: bytes, *, waits: bool = True) -> None:
+    """Add ``line`` (which ends in a newline) to the end of ``path`` and, with ``waits``, flush it to the disk.
 
     A torn line left by a power cut is closed with a newline first, so that it cannot swallow this one.
 
@@ -89,11 +89,13 @@ def append_line(path: Path, line: bytes) -> None:
             size = file.seek(0, os.SEEK_END)
             try:
                 write_whole(file, line if _ends_whole(file, size) else b"\n" + line)
-                os.fsync(file.fileno())
+                if waits:
+                    os.fsync(file.fileno())
             except OSError:
                 file.truncate(size)
                 raise
-        sync_folder(path.parent)
+        if waits:
+            sync_folder(path.parent)
     except OSError as error:
         raise cannot_write(path, error) from error
 

@@ -24,6 +24,7 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.schedule import block_codes, draw_key
 from study_app.store import journal, receipt
 from study_app.store.atomic import append_line, cannot_read, create_folder, is_there, read_own
+from study_app.store.events import holds
 from study_app.store.layout import SessionFolder, StudyFolder
 from study_app.store.parsing import parse_json
 
@@ -171,16 +172,17 @@ def revealed_key(folder: Path) -> Key | None:
 
 def reveals(folder: Path) -> tuple[dict[str, str], ...]:
     """Return the recorded reveals, first to last: ``at``, ``by``, ``reason``, ``key_hash``."""
-    return tuple(record for _, record in _reveal_lines(folder) if record is not None)
+    return tuple(record for _, _, record in _reveal_lines(folder) if record is not None)
 
 
-def unreadable_reveals(folder: Path) -> tuple[int, ...]:
-    """Return the numbers of the lines that record no reveal: torn, of one that never returned, or changed since."""
-    return tuple(number for number, record in _reveal_lines(folder) if record is None)
+def unreadable_reveals(folder: Path) -> tuple[tuple[int, bool], ...]:
+    """Return the numbers of the lines that record no reveal, and whether a power cut may have torn them."""
+    lines = [(number, line, record) for number, line, record in _reveal_lines(folder) if record is None]
+    return tuple((number, not line.rstrip().endswith(b"}")) for number, line, _ in lines)
 
 
-def _reveal_lines(folder: Path) -> Iterator[tuple[int, dict[str, str] | None]]:
-    """Yield number and record of every line that is not empty."""
+def _reveal_lines(folder: Path) -> Iterator[tuple[int, bytes, dict[str, str] | None]]:
+    """Yield number, line and record of every line that is not empty."""
     path = StudyFolder(folder).reveals
     try:
         content = path.read_bytes()
@@ -194,7 +196,17 @@ def _reveal_lines(folder: Path) -> Iterator[tuple[int, dict[str, str] | None]]:
         except ValueError:
             record = None
         if line:
-            yield number, record if _is_texts(record) else None
+            yield number, line, record if _is_reveal(record) else None
+
+
+def _is_reveal(record: object) -> bool:
+    """Return whether a line says when the key was opened, by whom, why, and which."""
+    return (
+        _is_texts(record)
+        and isinstance(record, dict)
+        and holds("at", record.get("at"))
+        and all(record.get(name, "").strip() for name in ("by", "reason", "key_hash"))
+    )
 
 
 def _seal(protocol: Protocol, drawn: str, random: Callable[[], float]) -> bytes:

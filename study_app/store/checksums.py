@@ -5,17 +5,21 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Collection, Mapping
+from datetime import datetime
 from pathlib import Path
 
+import study_app
 from study_app.errors import StoreError
-from study_app.store.atomic import cannot_read, write_file
-from study_app.store.layout import SessionFolder
+from study_app.store.atomic import append_line, cannot_read, write_file
+from study_app.store.layout import REBUILT, SessionFolder
 
 _LINE = re.compile(r"([0-9a-f]{64})  (.+)")
 
 
-def write_checksums(session: SessionFolder, known: Mapping[str, str]) -> None:
-    """Write the SHA-256 of every file of the session; those of ``known`` (by path in the folder) are taken as they are.
+def write_checksums(session: SessionFolder, known: Mapping[str, str]) -> dict[str, str]:
+    """Write the SHA-256 of every file of the session, and return them by path in its folder.
+
+    Those of ``known`` are taken as they are.
 
     Raises
     ------
@@ -24,13 +28,14 @@ def write_checksums(session: SessionFolder, known: Mapping[str, str]) -> None:
     """
     sums = {name: known.get(name) or hashed(session, name) for name in files(session)}
     write_file(session.checksums, checksum_bytes(sums))
+    return sums
 
 
 def renew_checksums(session: SessionFolder, rewritten: Collection[Path], known: Mapping[str, str]) -> bool:
     """Bring the list up to date with files that were ``rewritten``; return whether it changed.
 
     What it says of all others stays, so that it never vouches for a file it has not seen when the session ended; a list
-    that is missing or none is made anew.
+    that is missing or none is made anew. Every change is noted in ``rebuilt.txt``, which is listed, too.
 
     Raises
     ------
@@ -38,17 +43,31 @@ def renew_checksums(session: SessionFolder, rewritten: Collection[Path], known: 
         A file cannot be read, or the list not written.
     """
     try:
-        before = session.checksums.read_bytes()
         listed = read_checksums(session)
-    except (OSError, StoreError):
+    except StoreError:
+        gone = "was damaged" if session.checksums.exists() else "was missing"
+        note_rebuilt(session, f"the list of checksums {gone} and was made from the files that were there")
         write_checksums(session, known)
         return True
     ours = [path.relative_to(session.path).as_posix() for path in rewritten if path.is_relative_to(session.path)]
-    after = checksum_bytes(listed | {name: hashed(session, name) for name in ours})
-    if after == before:
+    if not (changed := [name for name in ours if hashed(session, name) != listed.get(name)]):
         return False
-    write_file(session.checksums, after)
+    if told := [name for name in changed if name != REBUILT]:
+        note_rebuilt(session, f"other checksums were listed for {', '.join(told)}")
+    write_file(session.checksums, checksum_bytes(listed | {name: hashed(session, name) for name in (*ours, REBUILT)}))
     return True
+
+
+def note_rebuilt(session: SessionFolder, what: str) -> None:
+    """Note for good what `rebuild` made again of what proves a session: nothing before then is proved by it.
+
+    Raises
+    ------
+    StoreError
+        The note cannot be written.
+    """
+    at = datetime.now().astimezone().isoformat(timespec="seconds")
+    append_line(session.rebuilt, f"{at} liquid-study {study_app.__version__} rebuild: {what}\n".encode())
 
 
 def checksum_bytes(sums: Mapping[str, str]) -> bytes:

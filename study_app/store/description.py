@@ -28,6 +28,8 @@ checksums.sha256
 recordings/
 blinding/
 exclusions.csv
+fingerprints.txt
+rebuilt.txt
 """
 
 

@@ -42,7 +42,8 @@ def _folded(title: str, file: str, row: str, lines: Sequence[str]) -> str:
 
 def _journal() -> str:
     head = (
-        "Every line has `n` (from 1, without a gap), `event`, `t_s` (on the session's clock) and `at` (ISO 8601).",
+        "Every line has `n` (from 1, without a gap), `event`, `t_s` (on the session's clock), `at` (ISO 8601) and "
+        "`previous` (SHA-256 of all bytes before it). `session_started` has `format` 2; format 1 has no `previous`.",
         "",
         "| event | fields | meaning |",
         "| --- | --- | --- |",

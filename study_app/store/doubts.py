@@ -21,6 +21,8 @@ from study_app.store.opening import is_open
 from study_app.store.tables import in_columns_of
 
 CHANGED = "has changed since the session ended (its checksum differs)"
+REBUILT_AFTER = "says that checksums or fingerprint were made again after the session had ended"
+COMPARE = "compare it with fingerprints that were kept elsewhere: liquid-study verify --fingerprints FILE"
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,15 +38,22 @@ class Doubt:
 
 
 def doubts(place: Place) -> tuple[Doubt, ...]:
-    """Return what cannot be trusted of a session's journal, receipt and tables: one doubt a file at most.
+    """Return what cannot be trusted of a session's journal, receipt, tables and checksums: one doubt a file at most.
 
     Once the session has ended they are compared with their checksums: files that keep these are as they were when the
     tables were made from the journal. Where one does not, a table is compared with what the journal gives, unless the
     journal itself is doubtful. A session that is open in a program is not judged: its tables follow.
     """
     folder = place.folder
-    if is_open(folder.path) or _as_ended(place):
+    if is_open(folder.path):
         return ()
+    again = (Doubt(folder.rebuilt, REBUILT_AFTER, COMPARE),) if is_there(folder.rebuilt) else ()
+    return again if _as_ended(place) else (*again, *_changed_since(place))
+
+
+def _changed_since(place: Place) -> tuple[Doubt, ...]:
+    """Return the doubts of a session whose files are not all as when it had ended, or that has not ended."""
+    folder = place.folder
     restore = f"restore it from a copy; liquid-study verify {place.study_folder.path} checks everything"
     if not is_there(folder.journal):
         return (Doubt(folder.journal, "is missing, and nothing else proves the tables", restore),)

@@ -150,12 +150,12 @@ _KIND_OF: dict[str, tuple[str, bool]] = {column.name: (column.kind, True) for co
     name: (kind, name in _MAY_BE_NULL)
     for kind, names in {
         "text": "language operator key_hash protocol_hash version device page block phase code item "
-        "outcome sha256 frames_sha256 reason by kind text what status",
+        "outcome sha256 frames_sha256 reason by kind text what status previous",
         "study's name": "study",
         "participant's id": "participant",
         "recording's name": "recording recording_frames",
         "flag": "simulated pilot recordings",
-        "integer": "n session seed torn_bytes trial attempt part index of target samples_recorded "
+        "integer": "n format session seed torn_bytes trial attempt part index of target samples_recorded "
         "samples_unrecorded frames_recorded number value changes",
         "number": "t_s gap_s t_task_s onset_s first_s last_s",
         "time": "at",

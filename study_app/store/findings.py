@@ -29,6 +29,15 @@ class Gathered:
         self.warnings: list[Finding] = []
         self._folder = folder
 
+    def alike(self) -> Gathered:
+        """Return findings of the same folder, with nothing found."""
+        return Gathered(self._folder)
+
+    def take(self, others: Gathered) -> None:
+        """Add what others found."""
+        self.errors += others.errors
+        self.warnings += others.warnings
+
     def error(self, path: Path, message: str) -> None:
         """Add what makes ``path`` untrustworthy."""
         self.errors.append(Finding(self._name(path), message))

@@ -1,23 +1,25 @@
 """The truth about a session: one event per line, and every answer on the disk before anything follows from it.
 
 Every line is a JSON object that explains itself: ``n`` counts from 1 without a gap, ``event`` is its name, ``t_s`` the
-seconds since the session's clock origin, ``at`` the same moment for people. All tables are derived from these lines
-alone. A line is whole when its newline is on the disk; a program killed while writing leaves at most one torn tail
-without a newline, which readers leave out and count; anything else that is no line is damage. Lines that nobody waits
-for are flushed in the background, in order: a power cut may take the last of them, but none that was waited for and
-none before it.
+seconds since the session's clock origin, ``at`` the same moment for people, ``previous`` the SHA-256 of all bytes of
+the file before the line. All tables are derived from these lines alone. Journals of format 1 have no ``previous``;
+where one was resumed by a later version, its lines have it from ``session_resumed`` on. A line is whole when its
+newline is on the disk; a program killed while writing leaves at most one torn tail without a newline, which readers
+leave out and count; anything else that is no line is damage. Lines that nobody waits for are flushed in the background,
+in order: a power cut may take the last of them, but none that was waited for and none before it.
 """
 
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import json
 import math
 import os
 import threading
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 from itertools import count
 from pathlib import Path
@@ -31,10 +33,13 @@ from study_app.store.parsing import parse_json
 
 Line: TypeAlias = dict[str, Any]
 
+FORMAT = 2
+"""Of the journal and the receipt; since 2 the lines have ``previous``."""
+
 RETRY_S = 1.0
 """The background thread repeats a failed flush after this time."""
 
-_OWN = ("n", "at")
+_OWN = ("n", "at", "previous")
 
 
 class SessionClock:
@@ -86,6 +91,7 @@ class Journal:
         self._file = file
         self._lines = 0
         self._size = 0
+        self._hash = hashlib.sha256()  # of all lines
         self._unflushed = bytearray()  # the last bytes of the file, not known to be on the disk
         self._torn = False
         self._flushing = threading.RLock()  # one flush at a time: the system reports a failure to one of two alone
@@ -137,6 +143,7 @@ class Journal:
             raise cannot_write(path, error) from error
         journal = cls(path, file, clock)
         journal._lines, journal._size = len(contents.lines), contents.whole_bytes
+        journal._hash = contents.hash.copy()
         return journal
 
     def append(self, event: str, *, t_s: float | None = None, waits: bool = True, **fields: Any) -> Line:
@@ -144,7 +151,7 @@ class Journal:
 
         Without ``waits`` it returns when the system has the line, and the line is flushed in the background.
         ``t_s`` is when it happened, by default now. Infinite and undefined numbers become null, numpy numbers plain.
-        Fields cannot be called ``n`` or ``at``, which are the journal's own.
+        Fields cannot be called ``n``, ``at`` or ``previous``, which are the journal's own.
 
         Raises
         ------
@@ -154,7 +161,7 @@ class Journal:
         """
         if self._file.closed:
             raise StoreError(f"{self.path} is closed: {event!r} came after the session's end and was not recorded")
-        line = line_of(self._lines + 1, event, self.clock, t_s, fields)
+        line = line_of(self._lines + 1, event, self.clock, t_s, fields, previous=self._hash.hexdigest())
         content = line_bytes(line)
         self._refuse_if_replaced()
         try:
@@ -164,6 +171,7 @@ class Journal:
         except OSError as error:
             raise cannot_write(self.path, error) from error
         self._lines += 1
+        self._hash.update(content)
         if not waits:
             self._flush_later()
         return line
@@ -310,13 +318,16 @@ class Contents:
 
     ``torn_bytes`` counts what follows the last newline: the torn tail of a program that was killed while writing.
     ``damage`` is the sentence about anything worse (a broken line, a number missing or doubled, a field of another type
-    than its event has), else None. Every line of ``lines`` has the fields of its event, each of its kind.
+    than its event has, a line before which others stand than when it was written), else None. Every line of ``lines``
+    has the fields of its event, each of its kind, and was not changed since the next was written. ``hash`` is the
+    SHA-256 of the whole lines, to go on with.
     """
 
     lines: list[Line]
     whole_bytes: int
     torn_bytes: int = 0
     damage: str | None = None
+    hash: Any = field(default_factory=hashlib.sha256, compare=False, repr=False)
 
 
 def read(path: Path) -> list[Line]:
@@ -345,7 +356,7 @@ def whole(path: Path) -> Contents:
 
 
 def scan(path: Path) -> Contents:
-    """Read the journal to its last whole line, check each against its event, and report what follows it.
+    """Read the journal to its last whole line, check each against its event and what precedes it; report the rest.
 
     Raises
     ------
@@ -356,6 +367,8 @@ def scan(path: Path) -> Contents:
     *pieces, tail = content.split(b"\n")
     lines: list[Line] = []
     whole_bytes = 0
+    hashed = hashlib.sha256()
+    chained = False
     for number, piece in enumerate(pieces, start=1):
         line = _parse(piece)
         if line is None:
@@ -367,9 +380,32 @@ def scan(path: Path) -> Contents:
         if (wrong := problem(line)) is not None:
             damage = f"{path}, line {number} {wrong}: it was changed; restore it from a copy"
             return Contents(lines, whole_bytes, damage=damage)
+        if (wrong := _break(line, hashed.hexdigest(), chained=chained)) is not None:
+            return Contents(lines[:-1], whole_bytes, damage=f"{path}, line {number} {wrong}")
         lines.append(line)
         whole_bytes += len(piece) + 1
-    return Contents(lines, whole_bytes, torn_bytes=len(tail))
+        hashed.update(piece + b"\n")
+        chained = "previous" in line
+    return Contents(lines, whole_bytes, torn_bytes=len(tail), hash=hashed)
+
+
+def _break(line: Line, before: str, *, chained: bool) -> str | None:
+    """Return how a line fails to go on after the lines before it, whose SHA-256 is ``before``, or None.
+
+    ``chained`` says whether the line before has ``previous``: then this one must have it. The first line of a journal
+    has it since format 2; a journal of format 1 gets it where it was resumed by a later version.
+    """
+    first, told = line["n"] == 1, line.get("previous")
+    if first and line.get("format", 1) > FORMAT:
+        return f"has format {line['format']}, this version reads {FORMAT}: use a newer version"
+    if told is None:
+        needed = chained or (first and line.get("format", 1) > 1)
+        return "lacks previous: it was changed; restore it from a copy" if needed else None
+    if told != before:
+        return "was written after another line than the one before it, which was changed: restore a copy"
+    if not (chained or first or line["event"] == "session_resumed"):
+        return "has previous, and the lines before it lack it: they were changed; restore a copy"
+    return None
 
 
 def _unused_beside(path: Path) -> Path:
@@ -378,8 +414,13 @@ def _unused_beside(path: Path) -> Path:
     return next(name for name in names if not name.exists())
 
 
-def line_of(number: int, event: str, clock: SessionClock, t_s: float | None, fields: Mapping[str, Any]) -> Line:
-    """Return a line of a journal; ``t_s`` is when it happened, by default now on ``clock``."""
+def line_of(
+    number: int, event: str, clock: SessionClock, t_s: float | None, fields: Mapping[str, Any], *, previous: str
+) -> Line:
+    """Return a line of a journal; ``t_s`` is when it happened, by default now on ``clock``.
+
+    ``previous`` is the SHA-256 of all lines before it, as `line_bytes` gives them.
+    """
     if not fields.keys().isdisjoint(_OWN):
         raise ValueError(f"{event}: fields {_OWN} are the journal's own")
     moment = clock.seconds() if t_s is None else t_s
@@ -389,6 +430,7 @@ def line_of(number: int, event: str, clock: SessionClock, t_s: float | None, fie
         "t_s": round(moment, 6),
         "at": clock.at(moment),
         **{name: plain(value) for name, value in fields.items()},
+        "previous": previous,
     }
 
 

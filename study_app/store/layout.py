@@ -3,7 +3,7 @@
 ::
 
     results/<study>/
-      dataset_description.json  exclusions.csv  .psychds-ignore
+      dataset_description.json  exclusions.csv  fingerprints.txt  .psychds-ignore
       blinding/key.sealed  blinding/reveals.jsonl
       data/
         study-<study>_description-participants_data.csv
@@ -29,6 +29,8 @@ from study_app.store.atomic import is_there
 MAX_ID_LENGTH = 32
 MAX_SESSION = 99
 RESERVED_IDS = ("pilot", "test")
+REBUILT = "rebuilt.txt"
+FINGERPRINTS = "fingerprints.txt"
 
 _ID = re.compile(r"[A-Za-z0-9]+")
 _NUMBERED = re.compile(r"P([0-9]+)")
@@ -57,6 +59,11 @@ class SessionFolder:
     def checksums(self) -> Path:
         """SHA-256 of every file, when the session had ended."""
         return self.path / "checksums.sha256"
+
+    @property
+    def rebuilt(self) -> Path:
+        """When and why checksums or fingerprint were made again after the session had ended."""
+        return self.path / REBUILT
 
     @property
     def recordings(self) -> Path:
@@ -90,6 +97,11 @@ class StudyFolder:
     def exclusions(self) -> Path:
         """What is left out of the analysis, by whom and why."""
         return self.path / "exclusions.csv"
+
+    @property
+    def fingerprints(self) -> Path:
+        """A line for every session that ended: what tells it from any other."""
+        return self.path / FINGERPRINTS
 
     @property
     def blinding(self) -> Path:

@@ -100,6 +100,8 @@ def find_leaks(folder: Path, words: Telltales) -> list[Leak]:
 def _in_file(path: Path, name: str, words: Telltales) -> Iterator[Leak]:
     try:
         content = path.read_bytes().decode("utf-8", "replace")
+    except FileNotFoundError:  # a running program has just taken it away
+        return
     except OSError as error:
         raise cannot_read(path, error) from error
     if not words.in_text(content):

@@ -18,6 +18,7 @@ from study_app.store.atomic import write_file
 from study_app.store.blinding import Key
 from study_app.store.checksums import write_checksums
 from study_app.store.columns import RESPONSES, TRIALS
+from study_app.store.fingerprints import fingerprint, note_fingerprint
 from study_app.store.journal import Journal, Line
 from study_app.store.layout import SessionFolder, StudyFolder
 from study_app.store.opening import Opening
@@ -39,7 +40,8 @@ class SessionStore:
 
     ``key`` translates codes while the session runs; ``clock`` is the one the journal is stamped from; ``recorder``
     takes the trials' samples and frames, or is None in a session without recordings; ``behind`` is why the tables on
-    disk are older than the journal, or None. Made by `begin`; by ``resume.reopen`` from ``lines`` written before.
+    disk are older than the journal, or None; ``fingerprint`` is empty until the session has ended. Made by `begin`; by
+    ``resume.reopen`` from ``lines`` written before.
     """
 
     def __init__(
@@ -58,6 +60,7 @@ class SessionStore:
         self.clock = journal.clock
         self.recorder = recorder
         self.behind: StoreError | None = None
+        self.fingerprint = ""
         self._journal = journal
         self._receipt = session_receipt
         self._opening = opening
@@ -118,7 +121,7 @@ class SessionStore:
             self.behind = None
 
     def finish(self, status: str, reason: str = "") -> None:
-        """Write the session's last line, its receipt and all tables, and close it.
+        """Write the session's last line, its receipt, all tables, checksums and fingerprint, and close it.
 
         Raises
         ------
@@ -182,7 +185,10 @@ class SessionStore:
         write_participants(self.place.study_folder, self.place.study)
 
     def _write_checksums(self) -> None:
-        write_checksums(self.folder, hashes_of(self._lines))
+        found = fingerprint(write_checksums(self.folder, hashes_of(self._lines)))
+        if not self.fingerprint:
+            note_fingerprint(self.place.study_folder, self.folder, found)
+        self.fingerprint = found
 
     def _keep_recordings(self) -> None:
         """Journal what became of recordings: which files they are, or why there are none."""

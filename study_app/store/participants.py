@@ -35,11 +35,16 @@ def row_of(session: SessionFolder) -> list[tables.Row]:
     contents = journal.scan(session.journal) if is_there(session.journal) else journal.Contents([], 0)
     if not contents.lines:
         return [] if never_begun(session.path) else [_damaged(session, {})]
+    return [row_from(session, contents)]
+
+
+def row_from(session: SessionFolder, contents: journal.Contents) -> tables.Row:
+    """Return the row of a session whose journal has these lines."""
     try:
         row = tables.participant(contents.lines)
     except StoreError:  # one session that cannot be read must not stop the others
-        return [_damaged(session, contents.lines[0])]
-    return [row if contents.damage is None else row | {"status": "damaged"}]
+        return _damaged(session, contents.lines[0])
+    return row if contents.damage is None else row | {"status": "damaged"}
 
 
 def _damaged(session: SessionFolder, start: journal.Line) -> tables.Row:

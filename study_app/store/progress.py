@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 from study_app.errors import StoreError
 from study_app.store import journal
 from study_app.store.journal import Line
 from study_app.store.layout import locate
+
+_ROUNDED_S = 1.1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +77,34 @@ def progress_of(lines: Sequence[Line]) -> Progress:
     for line in lines[1:]:
         now = replace(_after(now, line), t_s=max(now.t_s, line["t_s"]))
     return now
+
+
+def wrong_responses(lines: Sequence[Line]) -> Iterator[str]:
+    """Yield a sentence on each answer in ``responses`` that is not the one given by the choices before it."""
+    now = Progress(lines[0])
+    for line in lines[1:]:
+        if line["event"] == "responses":
+            chosen = dict(now.answers)
+            for row in line["items"]:
+                given = chosen.pop(row["item"], Given())
+                if not _is_of(row, given):
+                    yield (
+                        f"line {line['n']} (responses) has for {row['item']!r} in trial {line['trial']} another answer "
+                        f"than was chosen before: it was changed"
+                    )
+            yield from (
+                f"line {line['n']} (responses) lacks {item!r}, answered in trial {line['trial']}: it was changed"
+                for item in chosen
+            )
+        now = _after(now, line)
+
+
+def _is_of(row: Mapping[str, Any], given: Given) -> bool:
+    """Return whether an answer in ``responses`` is what was ``given``; moments of a line are rounded to 1 µs."""
+    moments = ((row[name], getattr(given, name)) for name in ("onset_s", "first_s", "last_s"))
+    return (row["value"], row["changes"]) == (given.value, given.changes) and all(
+        told == ours or (None not in (told, ours) and abs(told - ours) <= _ROUNDED_S) for told, ours in moments
+    )
 
 
 def _after(now: Progress, line: Line) -> Progress:

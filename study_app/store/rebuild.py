@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from study_app.store import journal, receipt
 from study_app.store.atomic import is_there, sweep, write_file
-from study_app.store.checksums import renew_checksums
+from study_app.store.checksums import note_rebuilt, read_checksums, renew_checksums
+from study_app.store.fingerprints import fingerprint, listed, note_fingerprint, place_of
 from study_app.store.journal import Line
-from study_app.store.layout import SessionFolder, locate
+from study_app.store.layout import SessionFolder, StudyFolder, locate
 from study_app.store.open_session import Place, table_files
 from study_app.store.opening import open_alone
 from study_app.store.participants import write_participants
@@ -33,8 +35,9 @@ class Rebuilt:
 def rebuild(session_folder: Path) -> Rebuilt:
     """Make again what follows from a session's journal.
 
-    These are its tables, the study's table of participants, the receipt's status and the checksums of a finished
-    session. Files that hold what they should are left as they are.
+    These are its tables, the study's table of participants, the receipt's status and the checksums and fingerprint of a
+    finished session. Files that hold what they should are left as they are. That checksums or fingerprint were made
+    again is noted for good in ``rebuilt.txt``: they prove nothing of what happened before.
 
     Raises
     ------
@@ -55,8 +58,8 @@ def rebuild(session_folder: Path) -> Rebuilt:
         write_participants(study_folder, place.study)
         rewritten += [table] if _content(table) != before else []
         ended = contents.lines[-1]["event"] == "session_ended"
-        if ended and renew_checksums(folder, rewritten, hashes_of(contents.lines)):
-            rewritten.append(folder.checksums)
+        if ended:
+            rewritten += _renew_proof(study_folder, folder, rewritten, hashes_of(contents.lines))
         return Rebuilt(tuple(rewritten), swept, contents.torn_bytes)
     finally:
         opening.release()
@@ -80,6 +83,22 @@ def _renew_receipt(folder: SessionFolder, lines: list[Line]) -> list[Path]:
         return []
     receipt.write(folder.receipt, held | ended)
     return [folder.receipt]
+
+
+def _renew_proof(
+    study: StudyFolder, folder: SessionFolder, rewritten: list[Path], known: Mapping[str, str]
+) -> list[Path]:
+    """Renew the checksums, and list the session's fingerprint where it has none; return what was written."""
+    has_none = place_of(study, folder) not in {place for _, place in listed(study.fingerprints)}
+    noted = [folder.rebuilt] if has_none else []
+    if has_none:
+        note_rebuilt(folder, f"{study.fingerprints.name} had no fingerprint of the session")
+    if not renew_checksums(folder, [*rewritten, *noted], known):
+        return []
+    if has_none:
+        note_fingerprint(study, folder, fingerprint(read_checksums(folder)))
+        return [folder.checksums, folder.rebuilt, study.fingerprints]
+    return [folder.checksums, folder.rebuilt]
 
 
 def _content(path: Path) -> bytes | None:

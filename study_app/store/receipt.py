@@ -121,6 +121,11 @@ def read(path: Path) -> dict[str, Any]:
     return receipt
 
 
+def other_format(receipt: Mapping[str, Any], start: Mapping[str, Any]) -> bool:
+    """Return whether the journal that begins with the line ``start`` has another format than its receipt says."""
+    return bool(receipt.get("format", 1) != start.get("format", 1))
+
+
 def _holds(name: str, value: object) -> bool:
     """Return whether ``value`` is what a receipt's field called ``name`` holds."""
     if name in ("versions", "device", "screens", "clock", "protocol"):

@@ -132,6 +132,8 @@ def _left(study_folder: StudyFolder, folder: SessionFolder, protocol: Protocol, 
     start = _unfinished(folder, contents.lines)
     place = Place(study_folder, folder, start["study"])
     first = receipt.read(folder.receipt)
+    if receipt.other_format(first, start):
+        raise StoreError(f"{folder.journal} has another format than its receipt says: restore it from a copy")
     _same_protocol(place, first, start, protocol, source)
     draw = stream(start["seed"], "blinding").random if start["simulated"] else None
     return _Left(place, contents, start, first, open_or_draw_key(study_folder.path, protocol, draw))

@@ -18,7 +18,7 @@ from study_app.store.abandoned import sweep_claims, take_over
 from study_app.store.atomic import beside, cannot_write, is_there, sync_folder
 from study_app.store.blinding import Key, open_or_draw_key
 from study_app.store.description import check_study, write_description
-from study_app.store.journal import Journal, SessionClock
+from study_app.store.journal import FORMAT, Journal, SessionClock
 from study_app.store.layout import StudyFolder, check_participant, check_unused, used_id
 from study_app.store.open_session import Place, SessionStore
 from study_app.store.opening import Opening, create_opened
@@ -131,9 +131,10 @@ def first_words(
         "protocol_hash": protocol_hash(source),
         "version": study_app.__version__,
     }
-    started = {**facts, "device": device.get("name"), "limits": protocol.limits.model_dump(mode="json")}
+    limits = protocol.limits.model_dump(mode="json")
+    started = {"format": FORMAT, **facts, "device": device.get("name"), "limits": limits}
     first_receipt = {
-        "format": 1,
+        "format": FORMAT,
         "status": receipt.UNFINISHED,
         "reason": "",
         "started_at": clock.at(0),

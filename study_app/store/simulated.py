@@ -7,9 +7,9 @@ all, and a power cut may take the last ones. The files are those that a session 
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Mapping
-from hashlib import sha256
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -21,15 +21,19 @@ from study_app.store.atomic import cannot_write, create_folder
 from study_app.store.blinding import open_or_draw_key
 from study_app.store.checksums import checksum_bytes
 from study_app.store.description import check_study, write_description
+from study_app.store.fingerprints import fingerprint, note_fingerprint
 from study_app.store.journal import Line, SessionClock, line_bytes, line_of, plain
 from study_app.store.layout import StudyFolder, check_participant, check_unused, used_id
 from study_app.store.open_session import Place, table_files
+from study_app.store.opening import Opening, open_alone
 from study_app.store.participants import write_participants
 from study_app.store.session import first_words, make_folder
 
 
 class SimulatedStudy:
     """A study folder that takes sessions of simulated answers; the table of participants follows with the block's end.
+
+    Until then the study's folder itself is open in this program.
 
     Parameters
     ----------
@@ -67,6 +71,7 @@ class SimulatedStudy:
         self.key = open_or_draw_key(self.folder.path, protocol, stream(seed, "blinding").random)
         self.protocol = protocol
         self._rows: dict[Path, tables.Row] = {}
+        self._opening: Opening | None = None
         self._told: dict[str, Any] = {
             "session": 1,
             "seed": seed,
@@ -100,22 +105,24 @@ class SimulatedStudy:
         clock = {"origin_ns": session.clock.origin_ns, "origin_at": session.clock.at(0)}
         text = json.dumps({**self._receipt, **told, **ended, "clock": clock}, indent=2, ensure_ascii=False)
         files = {
-            place.folder.journal.name: b"".join(map(line_bytes, lines)),
+            place.folder.journal.name: bytes(session.content),
             place.folder.receipt.name: f"{text}\n".encode("utf-8", "backslashreplace"),
             **{path.name: content for path, content in table_files(place, lines)},
         }
-        sums = checksum_bytes({name: sha256(content).hexdigest() for name, content in files.items()})
+        sums = {name: hashlib.sha256(content).hexdigest() for name, content in files.items()}
         path = place.folder.path
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise cannot_write(path, error) from error
-        if not create_folder(path, {**files, place.folder.checksums.name: sums}, waits=False):
+        if not create_folder(path, {**files, place.folder.checksums.name: checksum_bytes(sums)}, waits=False):
             raise used_id(self.folder, place.folder.participant, place.folder.number)
+        note_fingerprint(self.folder, place.folder, fingerprint(sums), waits=False)
         self._rows[path] = tables.participant(lines)
 
     def __enter__(self) -> Self:
         """Describe the study, so that its folder is known for what it is from the first session on."""
+        self._opening = open_alone(self.folder.path)
         write_description(self.folder, self.protocol.study)
         return self
 
@@ -123,7 +130,11 @@ class SimulatedStudy:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Bring the table of participants up to date with the sessions that were finished."""
-        write_participants(self.folder, self.protocol.study.name, self._rows)
+        try:
+            write_participants(self.folder, self.protocol.study.name, self._rows)
+        finally:
+            if self._opening is not None:
+                self._opening.release()
 
 
 class SimulatedSession:
@@ -134,12 +145,18 @@ class SimulatedSession:
         self.place = Place(study.folder, study.folder.session(participant, 1), name)
         self.clock = clock
         self.lines: list[Line] = []
+        self.content = bytearray()  # of the journal
+        self._hash = hashlib.sha256()
         self._study = study
         self.append("session_started", t_s=0.0, **{**study.started, "participant": participant})
 
     def append(self, event: str, *, t_s: float | None = None, **fields: Any) -> None:
         """Keep a line of the journal; ``t_s`` is when it happened, by default now."""
-        self.lines.append(line_of(len(self.lines) + 1, event, self.clock, t_s, fields))
+        previous = self._hash.hexdigest()
+        self.lines.append(line_of(len(self.lines) + 1, event, self.clock, t_s, fields, previous=previous))
+        content = line_bytes(self.lines[-1])
+        self.content += content
+        self._hash.update(content)
 
     def write_tables(self) -> None:
         """Do nothing: tables are written with the rest."""

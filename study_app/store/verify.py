@@ -1,12 +1,15 @@
 """Whether a study folder is what it says: every file against the journals, the dictionary, the checksums and the key.
 
 Nothing is changed. An error is a file that cannot be trusted as it is; a warning is something to know before the
-analysis, such as a session that was not finished. No sentence shows a condition.
+analysis, such as a session that was not finished. No sentence shows a condition. What another program is writing is
+looked at again before it is called an error.
 """
 
 from __future__ import annotations
 
 import contextlib
+import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -14,20 +17,22 @@ from typing import Any, TypeAlias
 from study_app.errors import StoreError
 from study_app.protocol.model import StudyHead
 from study_app.store import blinding, cells, exclusions, psychds, receipt, tables
-from study_app.store.abandoned import never_begun
 from study_app.store.atomic import is_there, temporaries
 from study_app.store.blinding import Key
 from study_app.store.columns import EXCLUSIONS, PARTICIPANTS
 from study_app.store.description import described_study, describes_alike, description_bytes
 from study_app.store.findings import Finding, Gathered
-from study_app.store.journal import Line
+from study_app.store.fingerprints import listed, place_of, read_copy, unreadable
 from study_app.store.layout import StudyFolder
 from study_app.store.leaks import certain_telltales, find_leaks
 from study_app.store.open_session import Place
+from study_app.store.opening import is_open
 from study_app.store.participants import row_of
-from study_app.store.verify_session import check_session, check_table
+from study_app.store.verify_session import BETWEEN_S, LOOKS, Checked, check_session, check_table
 
-Journals: TypeAlias = list[tuple[Place, list[Line]]]
+Sessions: TypeAlias = list[Checked]
+Rows: TypeAlias = list[tuple[tables.Row, bool]]  # and whether the session runs
+Proofs: TypeAlias = Sequence[tuple[str, str]]  # fingerprint and session
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +43,7 @@ class Findings:
     warnings: tuple[Finding, ...]
     psychds: psychds.PsychDs
     sessions: int
+    running: int
 
     @property
     def sound(self) -> bool:
@@ -45,14 +51,21 @@ class Findings:
         return not self.errors and not self.psychds.errors
 
 
-def verify(folder: Path) -> Findings:
+def verify(folder: Path, fingerprints: Path | None = None) -> Findings:
     """Check the study in ``folder``, all of it.
+
+    Parameters
+    ----------
+    fingerprints : Path, optional
+        A copy of the study's ``fingerprints.txt`` that was kept elsewhere: every session that ended must be in it, and
+        be the same.
 
     Raises
     ------
     StoreError
-        It is no study's folder.
+        It is no study's folder, or ``fingerprints`` no copy of fingerprints.
     """
+    copy = None if fingerprints is None else read_copy(fingerprints)
     study = StudyFolder(folder)
     name = described_study(study)
     if name is None:
@@ -61,18 +74,21 @@ def verify(folder: Path) -> Findings:
         )
     found = Gathered(folder)
     key = _key(study, found)
-    journals: Journals = []
-    for session in study.sessions():
-        place = Place(study, session, name)
-        journals.append((place, check_session(place, key.hash if key else None, found)))
-    _participants(study, name, journals, found)
+    early = listed(study.fingerprints)
+    sessions = [check_session(Place(study, one, name), key.hash if key else None, found) for one in study.sessions()]
+    _participants(study, name, sessions, found)
+    _chains(study, sessions, found)
+    _fingerprints(study, sessions, early, found)
+    if fingerprints is not None and copy is not None:
+        _copy(study, sessions, copy, fingerprints, found)
     _description(study, found)
-    _exclusions(study, journals, found)
+    _exclusions(study, sessions, found)
     _reveals(study, key, found)
     _blinding(study, key, found)
     for path in (*temporaries(folder), *temporaries(study.data)):
         found.warning(path, "was left half-written by a program that was ended, or is just being written")
-    return Findings(tuple(found.errors), tuple(found.warnings), psychds.validate(folder), len(journals))
+    running = sum(one.running for one in sessions)
+    return Findings(tuple(found.errors), tuple(found.warnings), psychds.validate(folder), len(sessions), running)
 
 
 def _key(study: StudyFolder, found: Gathered) -> Key | None:
@@ -83,14 +99,93 @@ def _key(study: StudyFolder, found: Gathered) -> Key | None:
         return None
 
 
-def _participants(study: StudyFolder, name: str, journals: Journals, found: Gathered) -> None:
-    """Check the table of all sessions, where each session's journal could be read."""
-    if any(not lines and not never_begun(place.folder.path) for place, lines in journals):
+def _participants(study: StudyFolder, name: str, sessions: Sessions, found: Gathered) -> None:
+    """Check the table of all sessions, where each session's journal could be read.
+
+    Where it differs, journals and table are read again, until no program is about to write the table.
+    """
+    if not all(one.readable for one in sessions):
         return
-    begun = [(place, lines) for place, lines in journals if lines]
-    content = tables.csv_bytes(PARTICIPANTS, [row for place, _ in begun for row in row_of(place.folder)])
-    running = {number for number, (_, lines) in enumerate(begun, start=2) if lines[-1]["event"] != "session_ended"}
-    check_table(study.participants(name), content, "participants", found, may_be_behind=running.__contains__)
+    path = study.participants(name)
+    rows: Rows = [(one.row, one.running) for one in sessions if one.row is not None]
+    before: Rows | None = None
+    for _ in range(LOOKS):
+        if is_open(study.path):  # by a program that writes the table when it ends
+            return
+        content = tables.csv_bytes(PARTICIPANTS, [row for row, _ in rows])
+        behind = [running or row["status"] == receipt.UNFINISHED for row, running in rows]
+        late = {number for number, may_be in enumerate(behind, start=2) if may_be}
+        seen = found.alike()
+        check_table(path, content, "participants", seen, may_be_behind=late.__contains__)
+        if not seen.errors or (rows == before and not any(running for _, running in rows)):
+            break
+        time.sleep(BETWEEN_S)
+        open_now = {session.path for session in study.sessions() if is_open(session.path)}
+        again = [(row, one.path in open_now) for one in study.sessions() for row in row_of(one)]
+        before, rows = rows, again
+    found.take(seen)
+
+
+def _chains(study: StudyFolder, sessions: Sessions, found: Gathered) -> None:
+    if early := sum(one.row is not None and not one.chained for one in sessions):
+        many = "1 journal is" if early == 1 else f"{early} journals are"
+        found.warning(study.data, f"{many} of format 1, whose lines do not tell whether a line before was changed")
+
+
+def _fingerprints(study: StudyFolder, sessions: Sessions, early: Proofs, found: Gathered) -> None:
+    """Compare the sessions with the study's own list, as it was before they were checked.
+
+    A session that ended without being listed then is looked up again: it may have ended meanwhile.
+    """
+    path = study.fingerprints
+    for number in unreadable(path):
+        found.error(path, f"line {number} is no fingerprint: restore it from a copy")
+    _compare(study, sessions, early, path.name, found)
+    for one in sessions:
+        if one.fingerprint and one.chained and not _is_listed(study, one):
+            found.error(path, f"lacks {place_of(study, one.place.folder)}, which has ended; rebuild of it adds it")
+
+
+def _is_listed(study: StudyFolder, one: Checked) -> bool:
+    """Return whether the study's list has a fingerprint of the session, or gets it in a moment."""
+    for _ in range(LOOKS):
+        if place_of(study, one.place.folder) in {place for _, place in listed(study.fingerprints)}:
+            return True
+        if not is_open(study.path):
+            return False
+        time.sleep(BETWEEN_S)
+    return False
+
+
+def _copy(study: StudyFolder, sessions: Sessions, copy: Proofs, path: Path, found: Gathered) -> None:
+    """Compare the sessions with a list that was kept elsewhere."""
+    _compare(study, sessions, copy, str(path), found)
+    known = {place for _, place in copy}
+    for one in sessions:
+        if one.fingerprint and place_of(study, one.place.folder) not in known:
+            found.error(one.place.folder.path, f"is not in {path}: it was added, or ended, after that copy was made")
+
+
+def _compare(study: StudyFolder, sessions: Sessions, proofs: Proofs, name: str, found: Gathered) -> None:
+    there = {place_of(study, one.place.folder): one for one in sessions}
+    for proof, place in proofs:
+        one, path = there.get(place), study.path / place
+        if one is None:
+            found.error(path, f"is missing, though {name} lists it: it was deleted after it had ended")
+            continue
+        proved = _left(one).fingerprint
+        if proof != proved:
+            now = f"its fingerprint is {proved}" if proved else "it has no end any more"
+            found.error(path, f"is not the session that {name} lists as {proof}: it was changed ({now})")
+
+
+def _left(one: Checked) -> Checked:
+    """Return a session as it is when its program has let go of it, which it does just after it has listed it."""
+    for _ in range(LOOKS if one.running else 0):
+        if not is_open(one.place.folder.path):
+            break
+        time.sleep(BETWEEN_S)
+    return check_session(one.place, None, Gathered(one.place.folder.path)) if one.running else one
 
 
 def _description(study: StudyFolder, found: Gathered) -> None:
@@ -116,31 +211,29 @@ def _published(study: StudyFolder) -> list[dict[str, Any]]:
     return [protocol for protocol in protocols if isinstance(protocol, dict)]
 
 
-def _exclusions(study: StudyFolder, journals: Journals, found: Gathered) -> None:
+def _exclusions(study: StudyFolder, sessions: Sessions, found: Gathered) -> None:
     with found.reading(study.exclusions):
         rows = exclusions.exclusions(study.path)
         if not is_there(study.exclusions):
             return
         for problem in cells.problems(exclusions.without_mark(study.exclusions.read_bytes()), EXCLUSIONS):
             found.error(study.exclusions, problem)
-        trials = {
-            (place.folder.participant, place.folder.number): {line.get("trial") for line in lines}
-            for place, lines in journals
-        }
+        trials = {(one.place.folder.participant, one.place.folder.number): one.trials for one in sessions}
         for row in rows:
             known = trials.get((row.participant, row.session))
-            if known is None or row.trial not in known | {None}:
+            if known is None or (row.trial is not None and row.trial not in known):
                 found.error(study.exclusions, f"there is no {exclusions.named(row)}")
 
 
 def _reveals(study: StudyFolder, key: Key | None, found: Gathered) -> None:
     with found.reading(study.reveals):
-        for line in blinding.unreadable_reveals(study.path):
-            found.warning(study.reveals, f"line {line} records no reveal: it was torn by a power cut, or changed")
+        for number, torn in blinding.unreadable_reveals(study.path):
+            if torn:
+                found.warning(study.reveals, f"line {number} records no reveal: it was torn by a power cut")
+            else:
+                found.error(study.reveals, f"line {number} records no reveal: it was changed; restore it from a copy")
         for number, record in enumerate(blinding.reveals(study.path), start=1):
-            if lacking := [name for name in ("at", "by", "reason", "key_hash") if not record.get(name)]:
-                found.error(study.reveals, f"reveal {number} lacks {', '.join(lacking)}")
-            elif key is not None and record["key_hash"] != key.hash:
+            if key is not None and record["key_hash"] != key.hash:
                 found.error(study.reveals, f"reveal {number} was of another key")
 
 

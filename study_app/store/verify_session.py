@@ -1,11 +1,18 @@
-"""One session against its journal, its receipt, its checksums and its recordings."""
+"""One session against its journal, its receipt, its checksums and its recordings.
+
+Of a session that runs in a program only what that program does not change again is judged: tables, receipt, checksums
+and fingerprint follow its journal. A session that a program wrote while it was checked is checked again.
+"""
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import io
+import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any
@@ -16,79 +23,146 @@ from study_app.store.abandoned import never_begun
 from study_app.store.atomic import is_there, temporaries
 from study_app.store.checksums import files, read_checksums, sha256
 from study_app.store.columns import MISSING, TABLES
-from study_app.store.events import unknown_events
+from study_app.store.events import shortened, unknown_events
 from study_app.store.findings import Gathered
-from study_app.store.journal import Line
-from study_app.store.layout import SessionFolder
+from study_app.store.fingerprints import fingerprint
+from study_app.store.journal import Contents, Line
+from study_app.store.layout import FINGERPRINTS, SessionFolder
 from study_app.store.open_session import Place, table_files
 from study_app.store.opening import is_open
-from study_app.store.progress import attempts, progress_of
+from study_app.store.participants import row_from
+from study_app.store.progress import attempts, progress_of, wrong_responses
 from study_app.store.recorder import recording_files
+
+LOOKS = 20
+"""So often is looked again at what was found in files that another program wrote meanwhile."""
+BETWEEN_S = 0.05
 
 _BEGUN = "though receipt, tables, recordings or checksums show that the session was begun: restore it from a copy"
 _NOT_YET = frozenset({MISSING, "false"})  # cells of a trial that later events fill
+NOTHING = Contents([], 0)
 READERS = 4  # files whose checksums are computed at the same time
 
 
-def check_session(place: Place, key_hash: str | None, found: Gathered) -> list[Line]:
-    """Check one session and return its journal's lines, as far as they can be read."""
+@dataclass(frozen=True, slots=True)
+class Checked:
+    """What the study's own files are compared with, of one session.
+
+    ``row`` is its row of the participants table: None where it has not begun, or its journal cannot be read
+    (``readable`` is False). ``running`` says that a program has it open, ``chained`` that its journal's lines tell what
+    was before them. ``trials`` are their numbers. ``fingerprint`` is that of a session that has ended.
+    """
+
+    place: Place
+    readable: bool
+    running: bool
+    chained: bool = False
+    row: tables.Row | None = None
+    trials: frozenset[int] = frozenset()
+    fingerprint: str = ""
+
+
+def check_session(place: Place, key_hash: str | None, found: Gathered) -> Checked:
+    """Check one session; again, where there is an error and a program wrote it meanwhile."""
     folder = place.folder
-    half = () if is_open(folder.path) else (*temporaries(folder.path), *temporaries(folder.recordings))
+    for _ in range(LOOKS):
+        before, seen = _state(folder), found.alike()
+        checked = _look(place, key_hash, seen)
+        if not seen.errors or _state(folder) == before:
+            break
+        time.sleep(BETWEEN_S)
+    found.take(seen)
+    return checked
+
+
+def _state(folder: SessionFolder) -> dict[str, tuple[int, int, int]]:
+    """Return what tells that a file of the session came, went or changed."""
+    found = {}
+    for path in folder.path.rglob("*"):
+        with contextlib.suppress(OSError):  # it has just gone
+            facts = path.stat()
+            found[str(path)] = (facts.st_ino, facts.st_size, facts.st_mtime_ns)
+    return found
+
+
+def _look(place: Place, key_hash: str | None, found: Gathered) -> Checked:
+    folder = place.folder
+    running = is_open(folder.path)
+    half = () if running else (*temporaries(folder.path), *temporaries(folder.recordings))
     for path in half:
         found.warning(path, "was left half-written by a program that was ended; rebuild takes it away")
-    lines = _journal(folder, found)
-    _receipt(folder, lines, key_hash, found)
+    if running:
+        found.warning(folder.path, "runs in another program")
+    contents = _journal(folder, found, running=running)
+    lines = contents.lines
+    _receipt(folder, lines, key_hash, found, running=running)
     if not lines:
-        return lines
+        return Checked(place, readable=running or never_begun(folder.path), running=running)
     _place(place, lines[0], found)
-    _tables(place, lines, found)
+    _answers(folder, lines, found)
     hashes = _hashes(folder)
-    _checksums(folder, lines, hashes, found)
-    _recordings(folder, lines, hashes, found)
-    return lines
+    ended = lines[-1]["event"] == "session_ended" and not running
+    if not running:
+        _tables(place, lines, found)
+        _checksums(folder, lines, hashes, found)
+    _recordings(folder, lines, hashes, found, running=running)
+    _rebuilt(folder, found)
+    return Checked(
+        place,
+        readable=True,
+        running=running,
+        chained="previous" in lines[-1],
+        row=row_from(folder, contents),
+        trials=frozenset(trial for trial, _ in attempts(lines)),
+        fingerprint=fingerprint(hashes) if ended else "",
+    )
 
 
-def _journal(folder: SessionFolder, found: Gathered) -> list[Line]:
+def _journal(folder: SessionFolder, found: Gathered, *, running: bool) -> Contents:
+    """Return what the journal holds: no line where none can be gone by."""
     if not is_there(folder.journal):
         if never_begun(folder.path):
+            if running:
+                return NOTHING
             found.warning(
                 folder.path,
                 "was claimed, and its program was ended before it wrote a journal: begin it again, or delete it",
             )
         else:
             found.error(folder.journal, f"is missing, {_BEGUN}")
-        return []
+        return NOTHING
     try:
         contents = journal.scan(folder.journal)
     except StoreError as error:
         found.failure(folder.journal, error)
-        return []
+        return NOTHING
     if contents.damage is not None:
         found.error(folder.journal, contents.damage.removeprefix(f"{folder.journal}, "))
-    if contents.torn_bytes:
+    if contents.torn_bytes and not running:
         found.warning(folder.journal, f"its last {contents.torn_bytes} bytes are a line that was never finished")
     if not contents.lines:
-        if never_begun(folder.path):
-            found.warning(folder.journal, "holds no whole line: nothing was recorded")
+        if running or never_begun(folder.path):
+            if not running:
+                found.warning(folder.journal, "holds no whole line: nothing was recorded")
         elif contents.damage is None:
             found.error(folder.journal, f"holds no whole line, {_BEGUN}")
-        return []
+        return NOTHING
     for name in unknown_events(contents.lines):
         found.warning(folder.journal, f"has events {name!r}, which this version does not know")
     try:
         done = progress_of(contents.lines)
     except StoreError as error:
         found.error(folder.journal, str(error))
-        return []
+        return NOTHING
     if done.ended is None:
-        runs = "runs in another program" if is_open(folder.path) else "is unfinished: resume it, or leave it so"
-        found.warning(folder.path, runs)
+        if not running:
+            found.warning(folder.path, "is unfinished: resume it, or leave it so")
     elif contents.lines[-1]["event"] != "session_ended":
         found.error(folder.journal, "lines follow the session's end")
-    return contents.lines
+    return contents
 
 
-def _receipt(folder: SessionFolder, lines: list[Line], key_hash: str | None, found: Gathered) -> None:
+def _receipt(folder: SessionFolder, lines: list[Line], key_hash: str | None, found: Gathered, *, running: bool) -> None:
     path = folder.receipt
     if not lines and not is_there(path):
         return  # claimed and never begun
@@ -105,12 +179,14 @@ def _receipt(folder: SessionFolder, lines: list[Line], key_hash: str | None, fou
         return
     if differing := [name for name in receipt.FACTS if name in held and held[name] != lines[0].get(name)]:
         found.error(path, f"{', '.join(differing)}: not as in the journal")
+    if receipt.other_format(held, lines[0]):
+        found.error(folder.journal, f"has another format than {path.name} says: it was changed; restore it from a copy")
     last = lines[-1]
     status = last["status"] if last["event"] == "session_ended" else receipt.UNFINISHED
     resumed = held.get("resumed")
     if isinstance(resumed, list) and len(resumed) > sum(line["event"] == "session_resumed" for line in lines):
         found.error(path, "tells that the session was resumed more often than the journal does")
-    if held.get("status") != status:
+    if held.get("status") != status and not running:
         found.error(path, f"its status is {held.get('status')!r}, the journal's {status!r}; rebuild renews it")
 
 
@@ -119,6 +195,18 @@ def _place(place: Place, start: Line, found: Gathered) -> None:
     for name, value in expected.items():
         if start.get(name) != value:
             found.error(place.folder.journal, f"is of {name} {start.get(name)!r}, and lies among those of {value!r}")
+
+
+def _answers(folder: SessionFolder, lines: list[Line], found: Gathered) -> None:
+    for wrong in wrong_responses(lines):
+        found.error(folder.journal, wrong)
+
+
+def _rebuilt(folder: SessionFolder, found: Gathered) -> None:
+    """Say that the proof of a session was made again after its end."""
+    with contextlib.suppress(FileNotFoundError):
+        for line in folder.rebuilt.read_text(encoding="utf-8", errors="replace").splitlines():
+            found.warning(folder.rebuilt, f"{shortened(line)}; only a copy of {FINGERPRINTS} proves more")
 
 
 def _tables(place: Place, lines: list[Line], found: Gathered) -> None:
@@ -207,7 +295,9 @@ def _checksums(folder: SessionFolder, lines: list[Line], hashes: Mapping[str, st
                 found.error(path, "has changed since the session ended (its checksum differs)")
 
 
-def _recordings(folder: SessionFolder, lines: list[Line], hashes: Mapping[str, str], found: Gathered) -> None:
+def _recordings(
+    folder: SessionFolder, lines: list[Line], hashes: Mapping[str, str], found: Gathered, *, running: bool
+) -> None:
     """Check that every recording the journal tells of is there, whole and of this trial, and no other."""
     told: set[str] = set()
     known: set[tuple[int, int]] = set()
@@ -232,7 +322,7 @@ def _recordings(folder: SessionFolder, lines: list[Line], hashes: Mapping[str, s
             if hashes[name] != digest:
                 found.error(folder.path / name, f"has changed since it was recorded ({which})")
             _facts(folder, line, kind, name, rows, found)
-    if is_open(folder.path):  # what is recorded is journalled with the next page
+    if running:  # what is recorded is journalled with the next page
         return
     ends = lines[-1]["event"] == "session_ended"
     if lines[0].get("recordings"):

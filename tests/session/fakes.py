@@ -93,6 +93,7 @@ class FakeJournal:
         self.unflushed: str | None = None
         self.tables_written = 0
         self.status: str | None = None
+        self.fingerprint = ""
         self._log = log
 
     def append(self, event: str, *, t_s: float | None = None, waits: bool = True, **fields: Any) -> None:
@@ -115,6 +116,7 @@ class FakeJournal:
         self.status = status
         if self.finish_fails:
             raise StoreError("no room for the receipt")
+        self.fingerprint = "k3vq-7m2p-xw4d"
 
     def of(self, event: str) -> list[dict[str, Any]]:
         return [line for line in self.lines if line["event"] == event]

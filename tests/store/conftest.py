@@ -136,6 +136,14 @@ def files_up_to() -> Callable[[int], AbstractContextManager[None]]:
     return limited
 
 
+def choose(store: SessionStore, trial: int, items: list[dict[str, Any]]) -> None:
+    """Journal the choices that the answers ``items`` came from."""
+    for item in items:
+        told = {"trial": trial, "item": item["item"]}
+        store.append("item_shown", t_s=item["onset_s"], **told)
+        store.append("choice", t_s=item["first_s"], value=item["value"], **told)
+
+
 def summary_of_trial() -> dict[str, Any]:
     return {
         "duration_s": 9.0,
@@ -189,6 +197,7 @@ def attend(protocol: Protocol) -> Callable[[SessionStore], None]:
                     }
                     for number, item in enumerate(trial.items, start=1)
                 ]
+                choose(store, trial.number, items)
                 store.append("responses", **which, items=items)
                 store.write_tables()
 

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import json
 import subprocess
 import sys
@@ -46,6 +47,7 @@ def test_a_line_explains_itself_and_is_returned_as_it_will_be_read(tmp_path: Pat
         "at": "2026-03-01T10:00:12.345+01:00",
         "item": "calm",
         "value": None,
+        "previous": hashlib.sha256(path.read_bytes().splitlines(keepends=True)[0]).hexdigest(),
     }
 
 
@@ -314,7 +316,7 @@ def test_after_its_end_it_takes_nothing(tmp_path: Path) -> None:
 
 def test_a_field_cannot_take_the_place_of_a_lines_number_or_time(tmp_path: Path) -> None:
     with Journal.create(tmp_path / "journal.jsonl") as journal:
-        for own in ("n", "at"):
+        for own in ("n", "at", "previous"):
             with pytest.raises(ValueError, match="are the journal's own"):
                 journal.append("said", **{own: 1})
     assert read(tmp_path / "journal.jsonl") == []

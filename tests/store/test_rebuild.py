@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -7,11 +8,13 @@ import pytest
 
 from study_app.errors import StoreError
 from study_app.store import journal, receipt
+from study_app.store.doubts import doubts
 from study_app.store.open_session import Place, table_files
 from study_app.store.opening import is_open
 from study_app.store.rebuild import rebuild
 from study_app.store.session import SessionStore
 from study_app.store.verify import verify
+from tests.store.forging import forge
 
 
 def every_byte(folder: Path) -> dict[str, bytes]:
@@ -51,15 +54,55 @@ def test_everything_comes_back_to_the_byte(tmp_path: Path, ended: SessionStore, 
         else:
             path.write_bytes(spoilt)
     done = rebuild(ended.folder.path)
-    assert set(done.rewritten) == set(derived)
-    assert every_byte(tmp_path) == before
+    assert set(done.rewritten) == {*derived, ended.folder.rebuilt}
+    after = every_byte(tmp_path)
+    (noted,) = (after.pop(name) for name in set(after) - set(before))
+    assert (b"was missing" if spoilt is None else b"was damaged") in noted
+    name = str(ended.folder.checksums.relative_to(tmp_path))
+    listed = {*before.pop(name).splitlines(), f"{hashlib.sha256(noted).hexdigest()}  rebuilt.txt".encode()}
+    assert set(after.pop(name).splitlines()) == listed
+    assert after == before
+
+
+def test_a_note_of_rebuild_lasts(tmp_path: Path, ended: SessionStore) -> None:
+    """The list of checksums vouches for it, the fingerprint does not change with it, and everybody is told."""
+    table = ended.folder.table("brackish", "trials")
+    table.unlink()
+    assert rebuild(ended.folder.path).rewritten == (table,)
+    assert not ended.folder.rebuilt.exists()  # the list is as it was
+    ended.folder.checksums.unlink()
+    rebuild(ended.folder.path)
+    rebuild(ended.folder.path)
+    findings = verify(tmp_path / "study")
+    assert findings.sound
+    (told,) = [str(one) for one in findings.warnings if "rebuilt.txt" in str(one)]
+    assert "the list of checksums was missing" in told
+    assert [doubt.path for doubt in doubts(ended.place)] == [ended.folder.rebuilt]
+    ended.folder.rebuilt.unlink()
+    assert "rebuilt.txt: is missing" in "\n".join(map(str, verify(tmp_path / "study").errors))
+
+
+def test_a_session_without_a_fingerprint_gets_it_with_a_note(tmp_path: Path, ended: SessionStore) -> None:
+    path = ended.place.study_folder.fingerprints
+    before = path.read_bytes()
+    path.unlink()
+    (error,) = verify(tmp_path / "study").errors
+    assert str(error) == "fingerprints.txt: lacks data/sub-P007/ses-01, which has ended; rebuild of it adds it"
+    assert set(rebuild(ended.folder.path).rewritten) == {ended.folder.checksums, ended.folder.rebuilt, path}
+    assert path.read_bytes() == before
+    assert "fingerprints.txt had no fingerprint of the session" in ended.folder.rebuilt.read_text()
+    assert verify(tmp_path / "study").sound
+    assert rebuild(ended.folder.path).rewritten == ()
 
 
 @pytest.mark.parametrize("name", ["journal.jsonl", "receipt.json", "mood.txt"])
 def test_a_changed_or_added_file_is_never_vouched_for(tmp_path: Path, ended: SessionStore, name: str) -> None:
     """Making tables again must not hide that something else has changed since the session ended."""
     path = ended.folder.path / name
-    path.write_bytes((path.read_bytes() if path.exists() else b"").replace(b'"AB"', b'"XY"') + b" ")
+    if name == "journal.jsonl":
+        forge(path, lambda lines: lines[0].update(operator="XY"))
+    else:
+        path.write_bytes((path.read_bytes() if path.exists() else b"").replace(b'"AB"', b'"XY"') + b" ")
     ended.folder.table("brackish", "trials").unlink()
     rebuild(ended.folder.path)
     findings = verify(tmp_path / "study")
@@ -121,7 +164,7 @@ def test_an_end_that_the_receipt_never_heard_of_is_brought_into_it(tmp_path: Pat
     receipt.write(ended.folder.receipt, held | {"status": "unfinished", "ended_at": None})
     ended.folder.checksums.unlink()
     done = rebuild(ended.folder.path)
-    assert set(done.rewritten) == {ended.folder.receipt, ended.folder.checksums}
+    assert set(done.rewritten) == {ended.folder.receipt, ended.folder.checksums, ended.folder.rebuilt}
     assert ended.folder.receipt.read_bytes() == whole
     assert verify(tmp_path / "study").sound
 

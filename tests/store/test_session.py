@@ -87,6 +87,7 @@ def test_the_first_line_says_what_is_run(start: Callable[..., SessionStore]) -> 
     assert line == {
         "n": 1,
         "event": "session_started",
+        "format": 2,
         "t_s": 0.0,
         "at": "2026-03-01T10:00:00.000+01:00",
         "participant": "P007",
@@ -109,6 +110,7 @@ def test_the_first_line_says_what_is_run(start: Callable[..., SessionStore]) -> 
             "frame_gap_ms": 250.0,
             "withheld_percent": 5.0,
         },
+        "previous": hashlib.sha256(b"").hexdigest(),
     }
 
 

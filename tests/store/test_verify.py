@@ -22,7 +22,9 @@ from study_app.store.rebuild import rebuild
 from study_app.store.session import SessionStore
 from study_app.store.tables import only
 from study_app.store.verify import Findings, verify
+from tests.store.conftest import choose
 from tests.store.earlier import TRIALS_HEADER
+from tests.store.forging import forge
 
 SESSION = "data/sub-P007/ses-01"
 
@@ -54,6 +56,7 @@ def study(
             for n, item in enumerate(trial.items, start=1)
         ]
         if items:
+            choose(store, trial.number, items)
             store.append("responses", trial=trial.number, attempt=attempt, items=items)
         store.write_tables()
     store.append("note", kind="mark", text='comma, "quote"\nnew line')
@@ -146,14 +149,27 @@ FRAMES = f"{SESSION}/recordings/trial-002_attempt-2_frames.parquet"
         (TRIALS, replace(",9.0,", ",-9.0,"), "row 2, duration_s: '-9.0' is not a number of at least 0 or n/a"),
         (TRIALS, replace("complete", "over"), "outcome: 'over' is not one of complete, timeout, interrupted or n/a"),
         (PARTICIPANTS, replace("withdrawn", "completed"), "is not what the journal gives, from line 3 on"),
-        (f"{SESSION}/journal.jsonl", replace('"outcome":"complete"', '"outcome":"timeout"'), "checksum differs"),
+        (
+            f"{SESSION}/journal.jsonl",
+            replace('"outcome":"complete"', '"outcome":"timeout"'),
+            "line 4 was written after another line than the one before it, which was changed",
+        ),
+        (
+            f"{SESSION}/journal.jsonl",
+            lambda path: forge(path, lambda lines: lines[2].update(outcome="timeout")),
+            "checksum differs",
+        ),
         (f"{SESSION}/journal.jsonl", without_line(3), "line 3: its n is 4: lines are missing or doubled"),
         (f"{SESSION}/journal.jsonl", replace('"event":"trial_started"', '"event":'), "line 2: damaged"),
         (f"{SESSION}/journal.jsonl", replace('"attempt":1', '"attempts":1'), "line 2 (trial_started) lacks attempt"),
-        (f"{SESSION}/journal.jsonl", replace('"seed":11', '"seed":12'), "seed: not as in the journal"),
         (
             f"{SESSION}/journal.jsonl",
-            replace('"participant":"P007"', '"participant":"P003"'),
+            lambda path: forge(path, lambda lines: lines[0].update(seed=12)),
+            "seed: not as in the journal",
+        ),
+        (
+            f"{SESSION}/journal.jsonl",
+            lambda path: forge(path, lambda lines: lines[0].update(participant="P003")),
             "is of participant 'P003'",
         ),
         (f"{SESSION}/receipt.json", of_receipt(seed=12), "seed: not as in the journal"),
@@ -176,7 +192,11 @@ FRAMES = f"{SESSION}/recordings/trial-002_attempt-2_frames.parquet"
         ("blinding/key.sealed", Path.unlink, "key.sealed: cannot be read"),
         ("blinding/key.sealed", append(b"eA=="), "another key's hash than that of the sealed key"),
         ("blinding/key.sealed", lambda path: path.write_bytes(b"***"), "is no sealed key any more"),
-        ("blinding/reveals.jsonl", lambda path: path.write_text('{"at":"now","by":"AB"}\n'), "reveal 1 lacks reason"),
+        (
+            "blinding/reveals.jsonl",
+            lambda path: path.write_text('{"at":"now","by":"AB"}\n'),
+            "line 1 records no reveal: it was changed",
+        ),
         ("dataset_description.json", replace("Brackish", "Brine"), "is not what this version writes"),
         (
             "exclusions.csv",
@@ -287,14 +307,15 @@ def test_a_trial_without_its_recording_is_known_at_the_end(study: Path, start: C
 
 def test_samples_that_were_dropped_are_known(study: Path) -> None:
     path = study / SESSION / "journal.jsonl"
-    replace('"samples_unrecorded":0', '"samples_unrecorded":7')(path)
+    (first,) = [n for n, line in enumerate(journal.read(path)) if line["event"] == "recorded" and line["trial"] == 1]
+    forge(path, lambda lines: lines[first].update(samples_unrecorded=7))
     assert "recordings/trial-001.parquet: lacks 7 samples" in warned(verify(study))
 
 
 def test_lines_after_the_end_are_found(study: Path) -> None:
     path = study / SESSION / "journal.jsonl"
     last = journal.read(path)[-1]
-    append(json.dumps(last | {"n": last["n"] + 1, "event": "resumed", "by": "operator"}).encode() + b"\n")(path)
+    forge(path, lambda lines: lines.append(last | {"event": "resumed", "by": "operator"}))
     assert "lines follow the session's end" in told(verify(study))
 
 

@@ -54,6 +54,7 @@ class SessionProgress:
     broke: str = ""
     ended: str = ""
     ended_s: float = 0.0
+    fingerprint: str = ""
     saved_s: float | None = None
     away_s: float = 0.0
 
@@ -170,7 +171,8 @@ def _ended(progress: SessionProgress, at_s: float, fields: Mapping[str, Any]) ->
     durations = dict(progress.durations_s)
     if progress.step >= 0:
         durations[progress.step] = at_s - progress.step_since_s
-    return replace(progress, ended=fields["status"], ended_s=at_s, paused=False, durations_s=durations)
+    ended = replace(progress, ended=fields["status"], ended_s=at_s, paused=False, durations_s=durations)
+    return replace(ended, fingerprint=fields.get("fingerprint", ""))
 
 
 _TELLERS = {

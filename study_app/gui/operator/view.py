@@ -278,7 +278,8 @@ def _heading(session: Session, progress: SessionProgress) -> str:
 
 def _setting_line(session: Session, progress: SessionProgress, *, answering: bool) -> str:
     if progress.ended:
-        return "Everything answered is on disk"
+        shown = f"  ·  Fingerprint {progress.fingerprint}" if progress.fingerprint else ""
+        return f"Everything answered is on disk{shown}"
     trial = progress.trial
     if trial is None:
         return "The participant reads" if progress.step >= 0 else "The first page opens in a moment"

@@ -32,6 +32,11 @@ class WatchedJournal:
         self._store.append(event, t_s=t_s, waits=waits, **fields)
         self.progress = self.progress.after(event, self._clock() if t_s is None else t_s, fields)
 
+    @property
+    def fingerprint(self) -> str:
+        """The session's fingerprint; empty until it has ended."""
+        return self._store.fingerprint
+
     def check_flushed(self) -> None:
         """Raise StoreError if lines that nobody waited for could not be flushed."""
         self._store.check_flushed()
@@ -45,4 +50,5 @@ class WatchedJournal:
         try:
             self._store.finish(status, reason)
         finally:
-            self.progress = self.progress.after("session_ended", self._clock(), {"status": status, "reason": reason})
+            told = {"status": status, "reason": reason, "fingerprint": self._store.fingerprint}
+            self.progress = self.progress.after("session_ended", self._clock(), told)

@@ -24,6 +24,7 @@ class World:
         self.rate_hz = 1000.0
         self.full = False
         self.broken_clock = False
+        self.fingerprint = ""
         self.samples = records(SAMPLE, 0)
         self.telemetry = SimpleNamespace(reader=self._reader, position_at=lambda time_ns: (np.zeros(3), time_ns))
         self._serial = 0

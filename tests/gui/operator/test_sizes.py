@@ -77,7 +77,7 @@ def waiting(told: Any) -> dict[str, Any]:
 
 def ended(told: Any) -> dict[str, Any]:
     running(told)
-    told.tell("session_ended", status="broken", reason="")
+    told.tell("session_ended", status="broken", reason="", fingerprint="wwww-mmmm-wwww")
     return {"force_on": False}
 
 

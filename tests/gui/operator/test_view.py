@@ -135,9 +135,10 @@ def test_the_end_is_said_with_its_status(told):
 
 def test_a_complete_session_has_every_step_done(told):
     told.welcome()
-    told.tell("session_ended", 4.0, status="completed", reason="")
+    told.tell("session_ended", 4.0, status="completed", reason="", fingerprint="k3vq-7m2p-xw4d")
     assert {row.state for row in told.view().steps} == {"done"}
     assert told.view().trials_line == "4 of 4 trials"
+    assert told.view().setting_line.endswith("Fingerprint k3vq-7m2p-xw4d")
 
 
 def test_progress_counts_trials_that_were_left_behind_part_by_part(told):
