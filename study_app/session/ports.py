@@ -30,7 +30,8 @@ class ServoPort(Protocol):
 class JournalPort(Protocol):
     """What is asked of the store (``store.open_session.SessionStore``)."""
 
-    fingerprint: str
+    @property
+    def fingerprint(self) -> str: ...  # noqa: D102
 
     def append(self, event: str, *, t_s: float | None = None, waits: bool = True, **fields: Any) -> None: ...  # noqa: D102
     def check_flushed(self) -> None: ...  # noqa: D102

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,7 +10,7 @@ from study_app.store.atomic import is_there, sweep, write_file
 from study_app.store.checksums import note_rebuilt, read_checksums, renew_checksums
 from study_app.store.fingerprints import fingerprint, listed, note_fingerprint, place_of
 from study_app.store.journal import Line
-from study_app.store.layout import SessionFolder, StudyFolder, locate
+from study_app.store.layout import SessionFolder, locate
 from study_app.store.open_session import Place, table_files
 from study_app.store.opening import open_alone
 from study_app.store.participants import write_participants
@@ -59,7 +58,7 @@ def rebuild(session_folder: Path) -> Rebuilt:
         rewritten += [table] if _content(table) != before else []
         ended = contents.lines[-1]["event"] == "session_ended"
         if ended:
-            rewritten += _renew_proof(study_folder, folder, rewritten, hashes_of(contents.lines))
+            rewritten += _renew_proof(place, contents.lines, rewritten)
         return Rebuilt(tuple(rewritten), swept, contents.torn_bytes)
     finally:
         opening.release()
@@ -85,15 +84,18 @@ def _renew_receipt(folder: SessionFolder, lines: list[Line]) -> list[Path]:
     return [folder.receipt]
 
 
-def _renew_proof(
-    study: StudyFolder, folder: SessionFolder, rewritten: list[Path], known: Mapping[str, str]
-) -> list[Path]:
-    """Renew the checksums, and list the session's fingerprint where it has none; return what was written."""
-    has_none = place_of(study, folder) not in {place for _, place in listed(study.fingerprints)}
+def _renew_proof(place: Place, lines: list[Line], rewritten: list[Path]) -> list[Path]:
+    """Renew the checksums, and list the fingerprint where it is missing; return what was written.
+
+    Sessions of format 1 have none.
+    """
+    study, folder = place.study_folder, place.folder
+    there = {session for _, session in listed(study.fingerprints)}
+    has_none = "previous" in lines[-1] and place_of(study, folder) not in there
     noted = [folder.rebuilt] if has_none else []
     if has_none:
         note_rebuilt(folder, f"{study.fingerprints.name} had no fingerprint of the session")
-    if not renew_checksums(folder, [*rewritten, *noted], known):
+    if not renew_checksums(folder, [*rewritten, *noted], hashes_of(lines)):
         return []
     if has_none:
         note_fingerprint(study, folder, fingerprint(read_checksums(folder)))

@@ -164,7 +164,8 @@ def _copy(study: StudyFolder, sessions: Sessions, copy: Proofs, path: Path, foun
     known = {place for _, place in copy}
     for one in sessions:
         if one.fingerprint and place_of(study, one.place.folder) not in known:
-            found.error(one.place.folder.path, f"is not in {path}: it was added, or ended, after that copy was made")
+            lacks = f"(its fingerprint is {one.fingerprint}) is not in {path}"
+            found.error(one.place.folder.path, f"{lacks}: it was added, or ended, after that copy was made")
 
 
 def _compare(study: StudyFolder, sessions: Sessions, proofs: Proofs, name: str, found: Gathered) -> None:

@@ -76,7 +76,13 @@ def test_it_is_resumed_with_a_chain_that_covers_the_lines_before(study: Path) ->
     folder.journal.write_bytes(content)
 
 
-def test_rebuild_gives_it_a_fingerprint_and_says_so(study: Path) -> None:
+def test_rebuild_mends_a_table_and_notes_the_columns_that_have_come_since(study: Path) -> None:
     folder = StudyFolder(study).session("P001", 1)
-    assert StudyFolder(study).fingerprints in rebuild(folder.path).rewritten
-    assert "fingerprints.txt had no fingerprint of the session" in warned(study)
+    table = folder.table("rek2024", "responses")
+    before = table.read_bytes()
+    table.write_bytes(before.replace(b",4,", b",5,"))
+    trials = folder.table("rek2024", "trials")
+    assert rebuild(folder.path).rewritten == (table, trials, folder.checksums, folder.rebuilt)
+    assert table.read_bytes() == before
+    assert folder.rebuilt.read_text().endswith(f"rebuild: other checksums were listed for {trials.name}\n")
+    assert "rebuilt.txt" in warned(study)
