@@ -49,9 +49,9 @@ def answer_all(store: SessionStore, seed: int) -> int:
         store.append("trial_ended", **which, outcome="complete", **summary)
         items = []
         for number, item in enumerate(trial.items, start=1):
-            store.append("item_shown", trial=trial.number, item=item)
-            store.append("choice", trial=trial.number, item=item, value=4)
-            times = {"onset_s": 1.234567, "first_s": 2.345678, "last_s": 3.456789}
+            times = {"onset_s": 1.234567, "first_s": 2.345678, "last_s": 2.345678}
+            store.append("item_shown", t_s=times["onset_s"], trial=trial.number, item=item)
+            store.append("choice", t_s=times["first_s"], trial=trial.number, item=item, value=4)
             items.append({"item": item, "number": number, "value": 4, **times, "changes": 0})
         store.append("responses", **which, items=items)
         count += len(items)

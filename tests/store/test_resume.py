@@ -29,6 +29,7 @@ from study_app.store.recording import read_samples, write_frames
 from study_app.store.resume import check_can_go_on, reopen
 from study_app.store.session import SessionStore
 from study_app.store.verify import verify
+from tests.store.conftest import choose
 
 SOURCE = b"[study]\nname = 'brackish'\n"
 FullDisk = Callable[[int], AbstractContextManager[None]]
@@ -74,6 +75,7 @@ def answer(store: SessionStore, trial: Trial) -> None:
         for number, item in enumerate(trial.items, start=1)
     ]
     if items:
+        choose(store, trial.number, items)
         store.append("responses", trial=trial.number, attempt=1, items=items)
     store.write_tables()
 
@@ -88,7 +90,7 @@ def test_it_goes_on_after_the_last_line_and_says_so(start: Callable[..., Session
     resumed.close()
     assert journal.read(store.folder.journal) == list(resumed.lines)
     assert [line["n"] for line in resumed.lines] == [1, 2, 3, 4]
-    assert {name: line[name] for name in line if name not in ("t_s", "at")} == {
+    assert {name: line[name] for name in line if name not in ("t_s", "at", "previous")} == {
         "n": 3,
         "event": "session_resumed",
         "gap_s": 72_000.25,
@@ -536,6 +538,8 @@ for trial in range(1, 1000):
     store.recorder.stop()
     store.append("trial_ended", trial=trial, attempt=1, outcome="complete")
     item = {"item": "wet", "number": 1, "value": 4, "onset_s": 1.0, "first_s": 2.0, "last_s": 2.0, "changes": 0}
+    store.append("item_shown", t_s=1.0, trial=trial, item="wet")
+    store.append("choice", t_s=2.0, trial=trial, item="wet", value=4)
     store.append("responses", trial=trial, attempt=1, items=[item])
     print(trial, flush=True)
     store.write_tables()
