@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -204,13 +204,13 @@ def _description(study: StudyFolder, found: Gathered) -> None:
         found.error(study.description, "is not what this version writes for the study in the receipts")
 
 
-def _published(study: StudyFolder) -> list[dict[str, Any]]:
-    """Return the protocols of the receipts that can be read."""
-    protocols = []
+def _published(study: StudyFolder) -> Iterator[dict[str, Any]]:
+    """Yield the protocols of the receipts that can be read."""
     for session in study.sessions():
         with contextlib.suppress(StoreError):  # said of the receipt already
-            protocols.append(receipt.read(session.receipt).get("protocol"))
-    return [protocol for protocol in protocols if isinstance(protocol, dict)]
+            protocol = receipt.read(session.receipt).get("protocol")
+            if isinstance(protocol, dict):
+                yield protocol
 
 
 def _exclusions(study: StudyFolder, sessions: Sessions, found: Gathered) -> None:
@@ -241,8 +241,8 @@ def _reveals(study: StudyFolder, key: Key | None, found: Gathered) -> None:
 
 def _blinding(study: StudyFolder, key: Key | None, found: Gathered) -> None:
     """Say where a condition is told before the key was revealed, but not which."""
-    published = _published(study)
-    if key is None or blinding.reveals(study.path) or not published:
+    published = next(_published(study), None)
+    if key is None or blinding.reveals(study.path) or published is None:
         return
-    for leak in find_leaks(study.path, certain_telltales(key.tables, published[:1])):
+    for leak in find_leaks(study.path, certain_telltales(key.tables, published)):
         found.warning(study.path, f"{leak.place} tells a condition, though the key is sealed")
