@@ -31,6 +31,7 @@ from study_app.store.atomic import cannot_read
 from study_app.store.exclusions import exclude, exclusions
 from study_app.store.layout import StudyFolder
 from study_app.store.participants import participants
+from study_app.store.unblinding import unblind
 
 if TYPE_CHECKING:
     from study_app.analysis.questions import Block
@@ -65,7 +66,7 @@ def carry_out(order: Order, tell: Tell, stop: Callable[[], bool]) -> Done:
         case LeaveOut():
             exclude(order.folder, order.participant, order.session, trial=order.trial, by=order.by, reason=order.reason)
         case OpenKey():
-            blinding.reveal(order.folder, by=order.by, reason=order.reason)
+            return Done(warnings=unblind(order.folder, by=order.by, reason=order.reason).left)
         case WriteTables():
             return _write_tables(order, tell, stop)
         case WriteReport():

@@ -12,7 +12,7 @@ from study_app.analysis.measures import AGREEMENT, LEVELS, QUARTILES
 from study_app.analysis.questions import Block
 from study_app.analysis.tables import Study
 from study_app.store import blinding
-from study_app.store.columns import MISSING, Column
+from study_app.store.columns import MISSING, SEALED, Column
 
 
 def codebook_bytes(study: Study, files: Mapping[str, Iterable[Column]]) -> bytes:
@@ -44,6 +44,7 @@ def _codebook(study: Study, files: Mapping[str, Any]) -> dict[str, Any]:
         "format": "CSV: UTF-8, comma, decimal point, RFC 4180 quoting",
         "missing": MISSING,
         "blinded": not study.revealed,
+        "sealed_columns": [] if study.revealed else sorted(SEALED),
         "key_opened": list(blinding.reveals(study.folder)),
         "doubts": [
             {"file": doubt.path.relative_to(study.folder).as_posix(), "what": doubt.what} for doubt in study.doubts

@@ -1,6 +1,7 @@
 """The tables that are handed out, as typed frames with a description of every column; formats are made from them.
 
-Settings are codes until the key was opened; then condition, liquid and delay (asked for, and achieved) stand beside.
+Settings are codes until the key was opened, and the sealed columns are left out; then condition, liquid and delay
+(asked for, and achieved) stand beside.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import pandas as pd
 from study_app.analysis.measures import AGREEMENT, LEVELS, QUARTILES
 from study_app.analysis.questions import Setting
 from study_app.analysis.tables import Study
-from study_app.store.columns import PARTICIPANTS, RESPONSES, TRIALS, Column, header
+from study_app.store.columns import PARTICIPANTS, RESPONSES, TRIALS, Column, header, unsealed
 
 _STATUS: Final = next(column for column in PARTICIPANTS if column.name == "status")
 _BY_NAME: Final = {column.name: column for column in (*TRIALS, *RESPONSES)}
@@ -86,9 +87,10 @@ def deliver(study: Study) -> tuple[Delivered, ...]:
     """Return responses, trials and aggregate of a study."""
     opened = OPENED if study.revealed else ()
     achieved = (*OPENED, ACHIEVED) if study.revealed else ()
+    trials = TRIALS if study.revealed else unsealed(TRIALS)
     return (
         _delivered("responses", (*RESPONSES, *JUDGED, *achieved), _named(study, _with_delay_error(study))),
-        _delivered("trials", (*TRIALS, *JUDGED, *achieved), _named(study, study.trials)),
+        _delivered("trials", (*trials, *JUDGED, *achieved), _named(study, study.trials)),
         _delivered("aggregate", (*_aggregate_head(), *opened, *MEASURED), _aggregate(study)),
     )
 

@@ -15,7 +15,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from study_app.errors import AnalysisError
-from study_app.store.columns import MISSING, Column, Kind, columns_held, header
+from study_app.store.columns import LATER, MISSING, SEALED, Column, Kind, columns_held, header
 from study_app.store.parsing import parse_json
 
 _ARRAYS: Final[dict[str, tuple[Any, Callable[[Any, Any], Any]]]] = {
@@ -55,7 +55,7 @@ def tables(paths: Sequence[Path], columns: tuple[Column, ...]) -> tuple[pd.DataF
 def rows(path: Path, columns: tuple[Column, ...]) -> list[list[str]]:
     """Read the cells of a table, whose header and row lengths must be those of the dictionary.
 
-    Columns that the version which wrote it did not have yet hold n/a.
+    Columns that the version which wrote it did not have yet, or that are sealed, hold n/a.
 
     Raises
     ------
@@ -70,7 +70,7 @@ def rows(path: Path, columns: tuple[Column, ...]) -> list[list[str]]:
         raise AnalysisError(f"{path} cannot be read ({why}): {_again(path)}, or mend the permissions") from error
     except (UnicodeDecodeError, csv.Error) as error:
         raise AnalysisError(f"{path} is damaged ({error}): {_again(path)}") from error
-    held = columns_held(found[0] if found else (), columns)
+    held = columns_held(found[0] if found else (), columns, LATER | SEALED)
     names = header(held)
     if not found or tuple(found[0]) != names:
         raise AnalysisError(

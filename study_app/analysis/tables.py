@@ -24,6 +24,7 @@ from study_app.errors import AnalysisError, StoreError
 from study_app.store import blinding
 from study_app.store.abandoned import never_begun
 from study_app.store.blinding import Key
+from study_app.store.columns import SEALED
 from study_app.store.doubts import Doubt, doubts
 from study_app.store.exclusions import Exclusion, exclusions
 from study_app.store.layout import SessionFolder, StudyFolder
@@ -157,6 +158,8 @@ def load_study(folder: Path) -> Study:
     for session in records[1:]:
         _check_alike(records[0], session)
     responses, trials = read_tables(records, "responses"), read_tables(records, "trials")
+    if key is None:  # tables of earlier versions have these columns
+        trials = trials.assign(**{name: trials[name].mask(trials[name].notna()) for name in SEALED})
     check_there(place, trials, listed)
     last = pd.concat([responses, trials])[[*_TRIAL, "attempt"]].groupby(_TRIAL)["attempt"].max().rename("last_attempt")
     return Study(

@@ -179,6 +179,8 @@ class ResultsDesk(QObject):
         match answer:
             case Done():
                 del self._orders[number]
+                if isinstance(order, OpenKey) and answer.warnings:
+                    self.place.told.emit("Some tables are as they were", "\n".join(answer.warnings))
                 self._end(order, newest=newest)
             case Refused():
                 del self._orders[number]

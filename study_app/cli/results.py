@@ -50,12 +50,15 @@ def plot(results: Path, to: Path) -> None:
 @click.option("--by", required=True, metavar="NAME", help="Who opens the key.")
 @click.option("--reason", required=True, metavar="TEXT", help="Why; recorded with the time.")
 def unblind(results: Path, by: str, reason: str) -> None:
-    """Open the sealed key of a study; who, when and why are recorded."""
-    from study_app.store.blinding import reveal
+    """Open the sealed key of a study, and write the sealed columns; who, when and why are recorded."""
+    from study_app.store.unblinding import unblind as unblind_study
 
-    for block, codes in reveal(results, by=by, reason=reason).items():
+    found = unblind_study(results, by=by, reason=reason)
+    for block, codes in found.codes.items():
         for code, condition in codes.items():
             click.echo(f"{block}  {code}  {condition}")
+    for sentence in found.left:
+        click.echo(f"warning: {sentence}", err=True)
 
 
 @click.command()

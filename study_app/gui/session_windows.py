@@ -26,6 +26,7 @@ from study_app.session.pages import Page, TaskPage
 from study_app.session.resume import FIRST, Start
 from study_app.session.simulated import Explorer, Reacher
 from study_app.store.exclusions import exclude
+from study_app.store.sealing import opened
 
 if TYPE_CHECKING:
     from study_app.devices.base import Device
@@ -54,7 +55,9 @@ def open_windows(
     must be at least. With ``refresh_hz`` there are so many frames a second by the clock, whatever the screen's rate is.
     """
     clock, device, servo = store.clock.seconds, machine.device, machine.servo
-    journal = WatchedJournal(store, progress_after(SessionProgress(protocol, schedule), store.lines), clock)
+    journal = WatchedJournal(
+        store, progress_after(SessionProgress(protocol, schedule), opened(store.lines, store.key)), clock
+    )
     by_mouse = device.name == "mouse"
     operator = OperatorWindow(
         protocol.study.name,

@@ -64,7 +64,7 @@ class _Unkept:
 
     def __init__(self, now_ns: Callable[[], int], codes: dict[str, dict[str, str]]) -> None:
         self.clock = SessionClock(now_ns)
-        self.key = Key(hash="", drawn="seed", codes=codes, tables={}, tables_hash="")
+        self.key = Key(hash="", drawn="seed", codes=codes, tables={}, tables_hash="", nonce=b"")
 
     def append(self, event: str, *, t_s: float | None = None, **fields: Any) -> None:
         """Keep nothing."""

@@ -43,12 +43,12 @@ def write_file(path: Path, content: bytes, *, waits: bool = True) -> None:
             half.unlink(missing_ok=True)
 
 
-def create_folder(path: Path, files: Mapping[str, bytes], *, waits: bool = True) -> bool:
+def create_folder(path: Path, files: Mapping[str, bytes], *, waits: bool = True, mode: int = 0o666) -> bool:
     """Create folder ``path`` holding ``files``, or return False where another program was first.
 
     The folder is filled beside and renamed into place, which no system does over a folder that holds something: of
     two programs exactly one succeeds, and the other finds every file whole. Without ``waits`` nothing is flushed: for
-    what can be made again, since a power cut may then take it.
+    what can be made again, since a power cut may then take it. ``mode`` is what the files may be at most to whom.
 
     Raises
     ------
@@ -59,7 +59,7 @@ def create_folder(path: Path, files: Mapping[str, bytes], *, waits: bool = True)
     try:
         half.mkdir()
         for name, content in files.items():
-            _write_through(half / name, content, waits=waits)
+            _write_through(half / name, content, waits=waits, mode=mode)
         if waits:
             sync_folder(half)
         half.rename(path)
@@ -241,8 +241,8 @@ def _ends_whole(file: BinaryIO, size: int) -> bool:
     return file.read(1) == b"\n"
 
 
-def _write_through(path: Path, content: bytes, *, waits: bool = True) -> None:
-    with path.open("xb", buffering=0) as file:
+def _write_through(path: Path, content: bytes, *, waits: bool = True, mode: int = 0o666) -> None:
+    with open(path, "xb", buffering=0, opener=lambda name, flags: os.open(name, flags, mode)) as file:
         write_whole(file, content)
         if waits:
             os.fsync(file.fileno())

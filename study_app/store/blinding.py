@@ -1,9 +1,10 @@
 """Which code stands for which condition: drawn once per study, sealed, and opened only with a name and a reason.
 
 ``blinding/key.sealed`` is base64 of a JSON object with the codes, the conditions' and liquids' tables and a 256-bit
-nonce. It is encoded, not encrypted: that stops accidental sight, and its SHA-256 in every receipt proves it unchanged.
-The nonce keeps the hash from telling the key, however few keys there are. A real study's key comes from the operating
-system's randomness, a rehearsal's from its seed, and a folder holds one or the other.
+nonce. It is encoded, not encrypted: that stops accidental sight, and its SHA-256 in every receipt proves it unchanged;
+only its owner may read the file. The nonce keeps the hash from telling the key, however few keys there are, and
+encrypts what tells a condition in the journals (see ``sealing``). A real study's key comes from the operating system's
+randomness, a rehearsal's from its seed, and a folder holds one or the other.
 """
 
 from __future__ import annotations
@@ -39,7 +40,8 @@ class Key:
     """The opened key. Never print, log or show what it holds before it was revealed.
 
     ``codes`` is block → code → condition id; ``tables`` holds the protocol's tables ``conditions`` and ``liquids``;
-    ``drawn`` says where its randomness came from; ``hash`` is the SHA-256 of the sealed file.
+    ``drawn`` says where its randomness came from; ``hash`` is the SHA-256 of the sealed file; ``nonce`` is as secret as
+    the codes.
     """
 
     hash: str
@@ -47,6 +49,7 @@ class Key:
     codes: Codes = field(repr=False)
     tables: dict[str, Any] = field(repr=False)
     tables_hash: str = field(repr=False)
+    nonce: bytes = field(repr=False)
 
     def condition(self, block: str, code: str) -> str:
         """Return the id of the condition that ``code`` of ``block`` stands for."""
@@ -98,7 +101,7 @@ def open_or_draw_key(folder: Path, protocol: Protocol, random: Callable[[], floa
     if not is_there(study.key):
         _refuse_if_lost(study)
         content = _seal(protocol, drawn, random or secrets.SystemRandom().random)
-        create_folder(study.blinding, {study.key.name: content})
+        create_folder(study.blinding, {study.key.name: content}, mode=0o600)
     key = _verified_key(study)
     if key.drawn != drawn:
         kinds = {"system": "real sessions", "seed": "a rehearsal"}
@@ -279,6 +282,7 @@ def read_key(folder: Path) -> Key:
             codes=content["codes"],
             tables=content["tables"],
             tables_hash=content["tables_hash"],
+            nonce=bytes.fromhex(content["nonce"]),
         )
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise StoreError(f"{path} is no sealed key any more: restore it from a copy") from error

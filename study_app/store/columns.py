@@ -22,7 +22,8 @@ class Column:
     """One column: its name, what its cells are, and what they mean.
 
     ``kind``: flags are ``true`` or ``false``, times ISO 8601 with zone. ``levels`` are all permitted values where
-    these are few, each with its meaning. Where ``may_miss``, a cell can be ``n/a``.
+    these are few, each with its meaning. Where ``may_miss``, a cell can be ``n/a``. A ``sealed`` column can tell the
+    condition: no table has it before the study's key was opened.
     """
 
     name: str
@@ -33,6 +34,7 @@ class Column:
     minimum: float | None = None
     maximum: float | None = None
     may_miss: bool = False
+    sealed: bool = False
 
 
 _STUDY = Column("study", "text", "Short name of the study, from its protocol.")
@@ -105,12 +107,16 @@ RESPONSES: tuple[Column, ...] = (
 )
 
 
-def _measure(name: str, description: str, unit: str = "") -> Column:
-    return Column(name, "number", description, unit, minimum=0, may_miss=True)
+def _measure(name: str, description: str, unit: str = "", *, sealed: bool = False) -> Column:
+    return Column(name, "number", description, unit, minimum=0, may_miss=True, sealed=sealed)
 
 
-def _count(name: str, description: str) -> Column:
-    return Column(name, "integer", description, minimum=0, may_miss=True)
+def _count(name: str, description: str, *, sealed: bool = False) -> Column:
+    return Column(name, "integer", description, minimum=0, may_miss=True, sealed=sealed)
+
+
+def _delay_error(name: str, which: str) -> Column:
+    return Column(name, "number", f"Visual delay, achieved less requested: {which}.", "ms", may_miss=True, sealed=True)
 
 
 _LIMITERS = {
@@ -153,33 +159,37 @@ TRIALS: tuple[Column, ...] = (
         ),
         may_miss=True,
     ),
-    _measure("duration_s", "From the trial's first painted frame to the task's end, on the device's clock.", "s"),
-    _count("targets_reached", "Targets reached."),
+    _measure(
+        "duration_s", "From the trial's first painted frame to the task's end, on the device's clock.", "s", sealed=True
+    ),
+    _count("targets_reached", "Targets reached.", sealed=True),
     _count("targets", "Targets to be reached; n/a where the task has none or no fixed number."),
-    _count("ticks", "Ticks of the servo during the trial."),
+    _count("ticks", "Ticks of the servo during the trial.", sealed=True),
     _measure("tick_rate_hz", "Rate of the servo, achieved.", "Hz"),
     _measure("lateness_p99_ms", "Lateness of the servo's ticks, 99th percentile.", "ms"),
     _measure("worst_gap_ms", "Longest time between two ticks of the servo.", "ms"),
     _count("overruns", "Deadlines of the servo that were skipped because a tick took too long."),
     _count("samples_dropped", "Samples of the telemetry that were overwritten before they were read."),
-    _measure("path_length_m", "Length of the hand's path.", "m"),
-    _measure("mean_speed_mps", "Mean speed of the hand.", "m/s"),
-    _measure("force_mean_n", "Mean magnitude of the force sent to the device.", "N"),
-    _measure("force_peak_n", "Largest magnitude of the force sent to the device.", "N"),
+    _measure("path_length_m", "Length of the hand's path.", "m", sealed=True),
+    _measure("mean_speed_mps", "Mean speed of the hand.", "m/s", sealed=True),
+    _measure("force_mean_n", "Mean magnitude of the force sent to the device.", "N", sealed=True),
+    _measure("force_peak_n", "Largest magnitude of the force sent to the device.", "N", sealed=True),
     _measure(
         "withheld_share",
         "Share of the force that passivity controller, slew limit and device withheld in the task: 0.05 is 5 %.",
+        sealed=True,
     ),
     _count("loop_delay_ticks", "Ticks from a command of the servo until its force acts, the most in the task."),
     _count("loop_delay_changes", "How often that number of ticks changed in the task."),
-    *(_count(f"limiter_{name}", f"Ticks of the servo in which {_LIMITERS[name]}.") for name in LIMITER_NAMES),
-    _count("frames", "Frames shown to the participant."),
-    _count("frames_late", "Frames whose delay was more than the limit over the one asked for."),
-    Column("delay_error_mean_ms", "number", "Visual delay, achieved less requested: mean.", "ms", may_miss=True),
-    Column(
-        "delay_error_p95_ms", "number", "Visual delay, achieved less requested: 95th percentile.", "ms", may_miss=True
+    *(
+        _count(f"limiter_{name}", f"Ticks of the servo in which {_LIMITERS[name]}.", sealed=True)
+        for name in LIMITER_NAMES
     ),
-    Column("delay_error_max_ms", "number", "Visual delay, achieved less requested: largest.", "ms", may_miss=True),
+    _count("frames", "Frames shown to the participant.", sealed=True),
+    _count("frames_late", "Frames whose delay was more than the limit over the one asked for.", sealed=True),
+    _delay_error("delay_error_mean_ms", "mean"),
+    _delay_error("delay_error_p95_ms", "95th percentile"),
+    _delay_error("delay_error_max_ms", "largest"),
     _measure(
         "first_frame_gap_ms",
         "From the trial's beginning to its first painted frame, with which force and task begin.",
@@ -189,7 +199,8 @@ TRIALS: tuple[Column, ...] = (
     Column(
         "valid",
         "flag",
-        "true where the trial kept the protocol's limits of lateness, gaps, delay error and force withheld.",
+        "true where the trial kept the protocol's limits of lateness, gaps, delay error and force withheld; until "
+        "unblinding those of lateness and gaps.",
         may_miss=True,
     ),
     Column(
@@ -244,7 +255,7 @@ PARTICIPANTS: tuple[Column, ...] = (
     Column(
         "validity",
         "text",
-        "Whether the session's main trials kept the protocol's limits; n/a before the first has ended.",
+        "Whether the session's main trials were valid; n/a before the first has ended.",
         levels=(("valid", "all did"), ("invalid", "at least one did not")),
         may_miss=True,
     ),
@@ -272,9 +283,20 @@ LATER = frozenset(
 """Columns that earlier versions did not write: a table without them is read as if they held n/a."""
 
 
-def columns_held(names: Sequence[str], columns: Sequence[Column]) -> tuple[Column, ...]:
-    """Return the columns that a table with these names must hold: all but those of `LATER` that it lacks."""
-    return tuple(column for column in columns if column.name in names or column.name not in LATER)
+SEALED = frozenset(column.name for column in TRIALS if column.sealed)
+"""Columns of a trial that no table has before the key was opened (see ``sealing``)."""
+
+
+def unsealed(columns: tuple[Column, ...]) -> tuple[Column, ...]:
+    """Return the columns that a table has before the key was opened."""
+    return tuple(column for column in columns if not column.sealed)
+
+
+def columns_held(
+    names: Sequence[str], columns: Sequence[Column], may_lack: frozenset[str] = LATER
+) -> tuple[Column, ...]:
+    """Return the columns that a table with these names must hold: all but those of ``may_lack`` that it lacks."""
+    return tuple(column for column in columns if column.name in names or column.name not in may_lack)
 
 
 def header(columns: tuple[Column, ...]) -> tuple[str, ...]:

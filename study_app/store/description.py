@@ -6,6 +6,7 @@ folder are written whole, headers included, before this file.
 
 from __future__ import annotations
 
+import contextlib
 import json
 from pathlib import Path
 
@@ -13,7 +14,8 @@ from study_app.errors import StoreError
 from study_app.protocol.model import StudyHead
 from study_app.protocol.texts import text_in
 from study_app.store.atomic import cannot_read, is_there, write_file
-from study_app.store.columns import LATER, every_column, variable
+from study_app.store.blinding import reveals
+from study_app.store.columns import LATER, SEALED, every_column, variable
 from study_app.store.layout import StudyFolder
 from study_app.store.parsing import check_study_name, parse_json
 
@@ -33,8 +35,11 @@ rebuilt.txt
 """
 
 
-def description_bytes(study: StudyHead) -> bytes:
-    """Return the file for ``study``; the same bytes for the same study on every machine."""
+def description_bytes(study: StudyHead, *, sealed: bool) -> bytes:
+    """Return the file for ``study``; the same bytes for the same study on every machine.
+
+    ``sealed`` says that no table has the sealed columns.
+    """
     title = text_in(study.title, study.languages[0])
     content = {
         "@context": "https://schema.org/",
@@ -43,7 +48,7 @@ def description_bytes(study: StudyHead) -> bytes:
         "alternateName": title,
         "description": study.description or title,
         "version": study.version,
-        "variableMeasured": [variable(column) for column in every_column()],
+        "variableMeasured": [variable(column) for column in every_column() if not (sealed and column.sealed)],
     }
     return (json.dumps(content, indent=2, ensure_ascii=False) + "\n").encode()
 
@@ -62,12 +67,24 @@ def describes_alike(content: bytes, expected: bytes) -> bool:
 
 
 def write_description(folder: StudyFolder, study: StudyHead) -> None:
-    """Write the description where it is missing or of an older version of the study."""
-    content = description_bytes(study)
-    if not is_there(folder.description) or _read(folder.description) != content:
+    """Write the description where it is missing or of an older version of the study.
+
+    Until the key is opened it lacks the sealed columns, unless an earlier version of the program described them: then
+    tables have them.
+    """
+    held = _read(folder.description) if is_there(folder.description) else b""
+    content = description_bytes(study, sealed=not (reveals(folder.path) or names_sealed(held)))
+    if held != content:
         write_file(folder.description, content)
     if not is_there(folder.ignore):
         write_file(folder.ignore, IGNORED)
+
+
+def names_sealed(content: bytes) -> bool:
+    """Return whether a description names a sealed column."""
+    with contextlib.suppress(AttributeError, KeyError, TypeError, ValueError):
+        return any(variable["name"] in SEALED for variable in parse_json(content)["variableMeasured"])
+    return False
 
 
 def described_study(folder: StudyFolder) -> str | None:

@@ -66,7 +66,8 @@ def _kind(column: Column) -> str:
 
 def _meaning(column: Column) -> str:
     levels = "; ".join(f"`{level}`: {meaning}" for level, meaning in column.levels)
-    return f"{column.description} {levels}." if levels else column.description
+    meaning = f"{column.description} {levels}." if levels else column.description
+    return f"{meaning} **Sealed until unblinding.**" if column.sealed else meaning
 
 
 if __name__ == "__main__":

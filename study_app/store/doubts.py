@@ -18,6 +18,7 @@ from study_app.store.columns import TABLES
 from study_app.store.journal import Contents
 from study_app.store.open_session import Place, table_files
 from study_app.store.opening import is_open
+from study_app.store.sealing import opened_key
 from study_app.store.tables import in_columns_of
 
 CHANGED = "has changed since the session ended (its checksum differs)"
@@ -113,7 +114,7 @@ def _behind(place: Place) -> dict[str, Path]:
 def _tables(place: Place, contents: Contents, restore: str) -> Iterator[Doubt]:
     """Yield the tables that are not what the journal gives."""
     try:
-        expected = table_files(place, contents.lines)
+        expected = table_files(place, contents.lines, opened_key(place.study_folder))
     except (StoreError, KeyError) as error:
         yield Doubt(place.folder.journal, f"gives no tables ({error})", restore)
         return

@@ -40,7 +40,11 @@ EVENTS: tuple[Event, ...] = (
     Event("language_chosen", "The participant reads in another of the study's languages from here on.", ("language",)),
     Event("trial_started", "A trial was presented.", (*_WHICH, "block", "phase", "part", "index", "of", "code")),
     Event("target_reached", "A target was reached, on the task's clock.", ("trial", "target", "t_task_s")),
-    Event("trial_ended", "The trial's task was over, and what was measured of it.", (*_WHICH, "outcome")),
+    Event(
+        "trial_ended",
+        "The trial's task was over, and what was measured of it; `sealed` holds the sealed columns, encrypted.",
+        (*_WHICH, "outcome"),
+    ),
     Event(
         "recorded",
         "The trial's recording is whole on the disk, under these names and checksums.",
@@ -150,11 +154,11 @@ _KIND_OF: dict[str, tuple[str, bool]] = {column.name: (column.kind, True) for co
     name: (kind, name in _MAY_BE_NULL)
     for kind, names in {
         "text": "language operator key_hash protocol_hash version device page block phase code item "
-        "outcome sha256 frames_sha256 reason by kind text what status previous",
+        "outcome sealed sha256 frames_sha256 reason by kind text what status previous",
         "study's name": "study",
         "participant's id": "participant",
         "recording's name": "recording recording_frames",
-        "flag": "simulated pilot recordings",
+        "flag": "simulated pilot recordings measures_sealed",
         "integer": "n format session seed torn_bytes trial attempt part index of target samples_recorded "
         "samples_unrecorded frames_recorded number value changes",
         "number": "t_s gap_s t_task_s onset_s first_s last_s",

@@ -17,13 +17,14 @@ from study_app.store import receipt, tables
 from study_app.store.atomic import write_file
 from study_app.store.blinding import Key
 from study_app.store.checksums import write_checksums
-from study_app.store.columns import RESPONSES, TRIALS
+from study_app.store.columns import RESPONSES
 from study_app.store.fingerprints import fingerprint, note_fingerprint
 from study_app.store.journal import Journal, Line
 from study_app.store.layout import SessionFolder, StudyFolder
 from study_app.store.opening import Opening
 from study_app.store.participants import write_participants
 from study_app.store.recorder import Kept, Recorder, event_of, hashes_of
+from study_app.store.sealing import opened, opened_key, sealed
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,13 +83,15 @@ class SessionStore:
     def append(self, event: str, *, t_s: float | None = None, waits: bool = True, **fields: Any) -> None:
         """Put an event into the journal; with ``waits`` it is on the disk when this returns, else soon after.
 
-        ``t_s`` is when it happened [s since the clock's origin], by default now.
+        ``t_s`` is when it happened [s since the clock's origin], by default now. What tells a condition is sealed.
 
         Raises
         ------
         StoreError
             It was not written, or is not on the disk; the journal is as before and can be tried again.
         """
+        if self._lines:
+            fields = sealed(self._lines[0], event, fields, self.key)
         self._lines.append(self._journal.append(event, t_s=t_s, waits=waits, **fields))
 
     def check_flushed(self) -> None:
@@ -111,7 +114,7 @@ class SessionStore:
         """
         try:
             self._keep_recordings()
-            for path, content in table_files(self.place, self._lines):
+            for path, content in table_files(self.place, self._lines, opened_key(self.place.study_folder)):
                 if self._written.get(path) != content:
                     write_file(path, content, waits=self._journal.closed)
                     self._written[path] = content
@@ -213,9 +216,15 @@ class SessionStore:
             error.add_note(str(failed))
 
 
-def table_files(place: Place, lines: Sequence[Line]) -> tuple[tuple[Path, bytes], ...]:
-    """Return the session's tables as files: paths and contents, from the journal's lines alone."""
+def table_files(place: Place, lines: Sequence[Line], key: Key | None) -> tuple[tuple[Path, bytes], ...]:
+    """Return the session's tables as files: paths and contents, from the journal's lines alone.
+
+    ``key`` is the study's once it was opened; without it the sealed columns are left out.
+    """
+    lines = opened(lines, key)
+    responses, trials = tables.responses(lines), tables.trials(lines)
+    columns = tables.trial_columns(lines, opened=key is not None)
     return (
-        (place.folder.table(place.study, "responses"), tables.csv_bytes(RESPONSES, tables.responses(lines))),
-        (place.folder.table(place.study, "trials"), tables.csv_bytes(TRIALS, tables.trials(lines))),
+        (place.folder.table(place.study, "responses"), tables.csv_bytes(RESPONSES, responses)),
+        (place.folder.table(place.study, "trials"), tables.csv_bytes(columns, trials)),
     )

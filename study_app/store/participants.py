@@ -12,8 +12,10 @@ from study_app.errors import StoreError
 from study_app.store import journal, receipt, tables
 from study_app.store.abandoned import never_begun
 from study_app.store.atomic import is_there, write_file
+from study_app.store.blinding import Key
 from study_app.store.columns import PARTICIPANTS, header
 from study_app.store.layout import SessionFolder, StudyFolder
+from study_app.store.sealing import opened, opened_key
 
 NONE: Final[Mapping[Path, tables.Row]] = MappingProxyType({})
 
@@ -23,25 +25,33 @@ def participants(folder: StudyFolder, known: Mapping[Path, tables.Row] = NONE) -
 
     ``known`` are rows by session folder whose journals need not be read, since this program has just written them.
     """
+    key = opened_or_none(folder)
     return [
         row
         for session in folder.sessions()
-        for row in ([known[session.path]] if session.path in known else row_of(session))
+        for row in ([known[session.path]] if session.path in known else row_of(session, key))
     ]
 
 
-def row_of(session: SessionFolder) -> list[tables.Row]:
-    """Return the row of one session; none if it has not begun."""
+def opened_or_none(folder: StudyFolder) -> Key | None:
+    """Return the study's key where it was opened and can be read: a lost one hides no session."""
+    with contextlib.suppress(StoreError):
+        return opened_key(folder)
+    return None
+
+
+def row_of(session: SessionFolder, key: Key | None) -> list[tables.Row]:
+    """Return the row of one session; none if it has not begun. ``key`` is the study's once it was opened."""
     contents = journal.scan(session.journal) if is_there(session.journal) else journal.Contents([], 0)
     if not contents.lines:
         return [] if never_begun(session.path) else [_damaged(session, {})]
-    return [row_from(session, contents)]
+    return [row_from(session, contents, key)]
 
 
-def row_from(session: SessionFolder, contents: journal.Contents) -> tables.Row:
+def row_from(session: SessionFolder, contents: journal.Contents, key: Key | None) -> tables.Row:
     """Return the row of a session whose journal has these lines."""
     try:
-        row = tables.participant(contents.lines)
+        row = tables.participant(opened(contents.lines, key))
     except StoreError:  # one session that cannot be read must not stop the others
         return _damaged(session, contents.lines[0])
     return row if contents.damage is None else row | {"status": "damaged"}

@@ -16,6 +16,7 @@ from study_app.store.opening import open_alone
 from study_app.store.participants import write_participants
 from study_app.store.progress import progress_of
 from study_app.store.recorder import hashes_of
+from study_app.store.sealing import opened_key
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +53,8 @@ def rebuild(session_folder: Path) -> Rebuilt:
         swept = sweep(folder.path) + (sweep(folder.recordings) if is_there(folder.recordings) else ())
         table = study_folder.participants(place.study)
         before = _content(table)
-        rewritten = [path for path, content in table_files(place, contents.lines) if _renew(path, content)]
+        tables = table_files(place, contents.lines, opened_key(study_folder))
+        rewritten = [path for path, content in tables if _renew(path, content)]
         rewritten += _renew_receipt(folder, contents.lines)
         write_participants(study_folder, place.study)
         rewritten += [table] if _content(table) != before else []

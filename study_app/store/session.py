@@ -16,7 +16,7 @@ from study_app.protocol.schedule import stream
 from study_app.store import receipt
 from study_app.store.abandoned import sweep_claims, take_over
 from study_app.store.atomic import beside, cannot_write, is_there, sync_folder
-from study_app.store.blinding import Key, open_or_draw_key
+from study_app.store.blinding import Key, open_or_draw_key, reveals
 from study_app.store.description import check_study, write_description
 from study_app.store.journal import FORMAT, Journal, SessionClock
 from study_app.store.layout import StudyFolder, check_participant, check_unused, used_id
@@ -89,6 +89,7 @@ def begin(
         pilot=pilot,
         recordings=recordings,
         key_hash=key.hash,
+        measures_sealed=not reveals(study_folder.path),
         clock=clock,
     )
     opening = _claim(place)
@@ -114,6 +115,7 @@ def first_words(
     pilot: bool,
     recordings: bool,
     key_hash: str,
+    measures_sealed: bool,
     clock: SessionClock,
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """Return the fields of a session's first line, and its receipt as it is before the first trial."""
@@ -133,6 +135,7 @@ def first_words(
     }
     limits = protocol.limits.model_dump(mode="json")
     started = {"format": FORMAT, **facts, "device": device.get("name"), "limits": limits}
+    started["measures_sealed"] = measures_sealed
     first_receipt = {
         "format": FORMAT,
         "status": receipt.UNFINISHED,

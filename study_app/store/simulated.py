@@ -18,7 +18,7 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.schedule import stream
 from study_app.store import tables
 from study_app.store.atomic import cannot_write, create_folder
-from study_app.store.blinding import open_or_draw_key
+from study_app.store.blinding import open_or_draw_key, reveals
 from study_app.store.checksums import checksum_bytes
 from study_app.store.description import check_study, write_description
 from study_app.store.fingerprints import fingerprint, note_fingerprint
@@ -27,6 +27,7 @@ from study_app.store.layout import StudyFolder, check_participant, check_unused,
 from study_app.store.open_session import Place, table_files
 from study_app.store.opening import Opening, open_alone
 from study_app.store.participants import write_participants
+from study_app.store.sealing import opened, opened_key, sealed
 from study_app.store.session import first_words, make_folder
 
 
@@ -83,6 +84,7 @@ class SimulatedStudy:
             "pilot": False,
             "recordings": False,
             "key_hash": self.key.hash,
+            "measures_sealed": not reveals(self.folder.path),
         }
         started, receipt = first_words(protocol, source, "", **self._told, clock=SessionClock())
         self.started, self._receipt = started, plain(receipt)
@@ -99,7 +101,7 @@ class SimulatedStudy:
         StoreError
             Another program was first, or it cannot be written.
         """
-        place, lines = session.place, session.lines
+        place, lines, key = session.place, session.lines, opened_key(self.folder)
         told = {"participant": place.folder.participant, "started_at": session.clock.at(0)}
         ended = {"status": lines[-1]["status"], "reason": lines[-1]["reason"], "ended_at": lines[-1]["at"]}
         clock = {"origin_ns": session.clock.origin_ns, "origin_at": session.clock.at(0)}
@@ -107,7 +109,7 @@ class SimulatedStudy:
         files = {
             place.folder.journal.name: bytes(session.content),
             place.folder.receipt.name: f"{text}\n".encode("utf-8", "backslashreplace"),
-            **{path.name: content for path, content in table_files(place, lines)},
+            **{path.name: content for path, content in table_files(place, lines, key)},
         }
         sums = {name: hashlib.sha256(content).hexdigest() for name, content in files.items()}
         path = place.folder.path
@@ -118,7 +120,7 @@ class SimulatedStudy:
         if not create_folder(path, {**files, place.folder.checksums.name: checksum_bytes(sums)}, waits=False):
             raise used_id(self.folder, place.folder.participant, place.folder.number)
         note_fingerprint(self.folder, place.folder, fingerprint(sums), waits=False)
-        self._rows[path] = tables.participant(lines)
+        self._rows[path] = tables.participant(opened(lines, key))
 
     def __enter__(self) -> Self:
         """Describe the study, so that its folder is known for what it is from the first session on."""
@@ -152,6 +154,8 @@ class SimulatedSession:
 
     def append(self, event: str, *, t_s: float | None = None, **fields: Any) -> None:
         """Keep a line of the journal; ``t_s`` is when it happened, by default now."""
+        if self.lines:
+            fields = sealed(self.lines[0], event, fields, self._study.key)
         previous = self._hash.hexdigest()
         self.lines.append(line_of(len(self.lines) + 1, event, self.clock, t_s, fields, previous=previous))
         content = line_bytes(self.lines[-1])

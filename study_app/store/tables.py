@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, TypeAlias
 
 from study_app.errors import StoreError
-from study_app.store.columns import MISSING, RESPONSES, TRIALS, Column, columns_held, header
+from study_app.store.columns import MISSING, RESPONSES, TRIALS, Column, columns_held, header, unsealed
 from study_app.store.journal import Line
 
 Row: TypeAlias = dict[str, Any]
@@ -74,6 +74,11 @@ def trials(lines: Sequence[Line]) -> list[Row]:
             case "repeat" if rows:
                 _note(rows[-1], f"repeated: {line['reason']}")
     return rows
+
+
+def trial_columns(lines: Sequence[Line], *, opened: bool) -> tuple[Column, ...]:
+    """Return the columns of the trials' table: without the sealed ones where they are sealed and not ``opened``."""
+    return TRIALS if opened or not lines[0].get("measures_sealed") else unsealed(TRIALS)
 
 
 def participant(lines: Sequence[Line]) -> Row:
@@ -159,11 +164,12 @@ def only(table: bytes, columns: Sequence[Column]) -> bytes:
 def in_columns_of(held: bytes, table: bytes, columns: Sequence[Column]) -> tuple[bytes, tuple[Column, ...]]:
     """Return ``table``, whose columns are ``columns``, with those that the table ``held`` must have; and these columns.
 
-    ``held`` may lack columns that its version did not write.
+    ``held`` may lack columns that its version did not write, and ``table`` those that are sealed.
     """
-    names = held.partition(b"\n")[0].decode("utf-8", "replace").split(",")
-    kept = columns_held(names, columns)
-    return (table if kept == tuple(columns) else only(table, kept)), kept
+    names, ours = (one.partition(b"\n")[0].decode("utf-8", "replace").split(",") for one in (held, table))
+    there = tuple(column for column in columns if column.name in ours)
+    kept = columns_held(names, there)
+    return (table if kept == there else only(table, kept)), kept
 
 
 def cell_text(value: Any) -> str:

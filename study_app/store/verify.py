@@ -20,14 +20,14 @@ from study_app.store import blinding, cells, exclusions, psychds, receipt, table
 from study_app.store.atomic import is_there, temporaries
 from study_app.store.blinding import Key
 from study_app.store.columns import EXCLUSIONS, PARTICIPANTS
-from study_app.store.description import described_study, describes_alike, description_bytes
+from study_app.store.description import described_study, describes_alike, description_bytes, names_sealed
 from study_app.store.findings import Finding, Gathered
 from study_app.store.fingerprints import listed, place_of, read_copy, unreadable
 from study_app.store.layout import StudyFolder
 from study_app.store.leaks import certain_telltales, find_leaks
 from study_app.store.open_session import Place
 from study_app.store.opening import is_open
-from study_app.store.participants import row_of
+from study_app.store.participants import opened_or_none, row_of
 from study_app.store.verify_session import BETWEEN_S, LOOKS, Checked, check_session, check_table
 
 Sessions: TypeAlias = list[Checked]
@@ -75,7 +75,7 @@ def verify(folder: Path, fingerprints: Path | None = None) -> Findings:
     found = Gathered(folder)
     key = _key(study, found)
     early = listed(study.fingerprints)
-    sessions = [check_session(Place(study, one, name), key.hash if key else None, found) for one in study.sessions()]
+    sessions = [check_session(Place(study, one, name), key, found) for one in study.sessions()]
     _participants(study, name, sessions, found)
     _chains(study, sessions, found)
     _fingerprints(study, sessions, early, found)
@@ -124,7 +124,7 @@ def _participants(study: StudyFolder, name: str, sessions: Sessions, found: Gath
             break
         time.sleep(BETWEEN_S)
         open_now = {session.path for session in study.sessions() if is_open(session.path)}
-        again = [(row, one.path in open_now) for one in study.sessions() for row in row_of(one)]
+        again = [(row, one.path in open_now) for one in study.sessions() for row in row_of(one, opened_or_none(study))]
         before, rows = rows, again
     found.take(seen)
 
@@ -192,10 +192,11 @@ def _left(one: Checked) -> Checked:
 
 def _description(study: StudyFolder, found: Gathered) -> None:
     """Compare the description with what this version writes for the study as one of the receipts has it."""
+    sealed = not (blinding.reveals(study.path) or names_sealed(study.description.read_bytes()))
     heads: set[bytes] = set()
     for protocol in _published(study):
         with contextlib.suppress(KeyError, TypeError, ValueError):  # said of the receipt already
-            heads.add(description_bytes(StudyHead.model_validate(protocol["study"])))
+            heads.add(description_bytes(StudyHead.model_validate(protocol["study"]), sealed=sealed))
     if not heads or study.description.read_bytes() in heads:
         return
     if any(describes_alike(study.description.read_bytes(), head) for head in heads):

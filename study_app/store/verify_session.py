@@ -21,6 +21,7 @@ from study_app.errors import StoreError
 from study_app.store import cells, journal, receipt, tables
 from study_app.store.abandoned import never_begun
 from study_app.store.atomic import is_there, temporaries
+from study_app.store.blinding import Key
 from study_app.store.checksums import files, read_checksums, sha256
 from study_app.store.columns import MISSING, TABLES
 from study_app.store.events import shortened, unknown_events
@@ -30,9 +31,10 @@ from study_app.store.journal import Contents, Line
 from study_app.store.layout import FINGERPRINTS, SessionFolder
 from study_app.store.open_session import Place, table_files
 from study_app.store.opening import is_open
-from study_app.store.participants import row_from
+from study_app.store.participants import opened_or_none, row_from
 from study_app.store.progress import attempts, progress_of, wrong_responses
 from study_app.store.recorder import recording_files
+from study_app.store.sealing import opened, opened_key
 
 LOOKS = 20
 """So often is looked again at what was found in files that another program wrote meanwhile."""
@@ -62,12 +64,12 @@ class Checked:
     fingerprint: str = ""
 
 
-def check_session(place: Place, key_hash: str | None, found: Gathered) -> Checked:
+def check_session(place: Place, key: Key | None, found: Gathered) -> Checked:
     """Check one session; again, where there is an error and a program wrote it meanwhile."""
     folder = place.folder
     for _ in range(LOOKS):
         before, seen = _state(folder), found.alike()
-        checked = _look(place, key_hash, seen)
+        checked = _look(place, key, seen)
         if not seen.errors or _state(folder) == before:
             break
         time.sleep(BETWEEN_S)
@@ -85,7 +87,7 @@ def _state(folder: SessionFolder) -> dict[str, tuple[int, int, int]]:
     return found
 
 
-def _look(place: Place, key_hash: str | None, found: Gathered) -> Checked:
+def _look(place: Place, key: Key | None, found: Gathered) -> Checked:
     folder = place.folder
     running = is_open(folder.path)
     half = () if running else (*temporaries(folder.path), *temporaries(folder.recordings))
@@ -95,10 +97,12 @@ def _look(place: Place, key_hash: str | None, found: Gathered) -> Checked:
         found.warning(folder.path, "runs in another program")
     contents = _journal(folder, found, running=running)
     lines = contents.lines
-    _receipt(folder, lines, key_hash, found, running=running)
+    _receipt(folder, lines, key.hash if key else None, found, running=running)
     if not lines:
         return Checked(place, readable=running or never_begun(folder.path), running=running)
     _place(place, lines[0], found)
+    with found.reading(folder.journal):
+        opened(lines, key)
     _answers(folder, lines, found)
     hashes = _hashes(folder)
     ended = lines[-1]["event"] == "session_ended" and not running
@@ -112,7 +116,7 @@ def _look(place: Place, key_hash: str | None, found: Gathered) -> Checked:
         readable=True,
         running=running,
         chained="previous" in lines[-1],
-        row=row_from(folder, contents),
+        row=row_from(folder, contents, opened_or_none(place.study_folder)),
         trials=frozenset(trial for trial, _ in attempts(lines)),
         fingerprint=fingerprint(hashes) if ended else "",
     )
@@ -211,7 +215,7 @@ def _rebuilt(folder: SessionFolder, found: Gathered) -> None:
 
 def _tables(place: Place, lines: list[Line], found: Gathered) -> None:
     try:
-        expected = table_files(place, lines)
+        expected = table_files(place, lines, opened_key(place.study_folder))
     except StoreError as error:
         found.error(place.folder.journal, f"gives no tables: {error}")
         return

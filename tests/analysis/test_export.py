@@ -7,7 +7,7 @@ import pytest
 from study_app.analysis.export import export
 from study_app.analysis.output import write_files
 from study_app.errors import AnalysisError
-from study_app.store.columns import RESPONSES, TRIALS, header
+from study_app.store.columns import RESPONSES, SEALED, TRIALS, header, unsealed
 from tests.analysis.conftest import CANNOT_JUDGE, DELAY_ERROR_MS, HIDDEN, Results
 
 NAMES = {
@@ -45,13 +45,14 @@ def test_every_row_of_every_participant_is_there_with_its_values(rek: Results, t
         assert row["counted"] == ("true" if row["participant"] == "P001" else "false")
     assert [row["session_status"] for row in found[-2:]] == ["withdrawn", "withdrawn"]
     assert len(rows(to, "trials")) == 12 + 4
-    assert list(rows(to, "trials")[0]) == [*header(TRIALS), *JUDGED]
+    assert list(rows(to, "trials")[0]) == [*header(unsealed(TRIALS)), *JUDGED]
 
 
 def test_cells_are_those_of_the_sessions_own_tables(rek: Results, to: Path) -> None:
     rek.add(
         "P001", lambda *_: 6, changes={"force_mean_n": 0.1 + 0.2, "notes": '=1+1, "so"\nnew line π 😀', "targets": None}
     )
+    rek.open()
     export(rek.folder, to)
     with rek.trials("P001").open(encoding="utf-8", newline="") as file:
         own = list(csv.DictReader(file, strict=True))
@@ -59,6 +60,20 @@ def test_cells_are_those_of_the_sessions_own_tables(rek: Results, to: Path) -> N
     assert [{name: row[name] for name in header(TRIALS)} for row in exported] == own
     assert exported[0]["force_mean_n"] == "0.30000000000000004"
     assert exported[0]["notes"] == '=1+1, "so"\nnew line π 😀'
+
+
+def test_what_earlier_versions_wrote_in_clear_is_not_handed_out_sealed(rek: Results, to: Path) -> None:
+    """Their tables have the columns that tell a condition: files that are handed out have them after unblinding."""
+    rek.add("P001", lambda *_: 6, changes={"force_mean_n": 4.8151623})
+    export(rek.folder, to, extras=("psych-ds", "wide"))
+    held = {path: path.read_text(encoding="utf-8") for path in to.rglob("*") if path.is_file()}
+    assert not [path for path, text in held.items() if "4.8151623" in text]
+    assert set(json.loads((to / "codebook.json").read_text())["sealed_columns"]) == SEALED
+    described = json.loads((to / "psych-ds" / "dataset_description.json").read_text())["variableMeasured"]
+    assert not SEALED & {one["name"] for one in described}
+    rek.open()
+    export(rek.folder, to)
+    assert {row["force_mean_n"] for row in rows(to, "trials")} == {"4.8151623"}
 
 
 def test_the_aggregate_counts_all_levels_and_what_is_missing(small: Results, to: Path) -> None:

@@ -13,8 +13,8 @@ from study_app.analysis.performance import performance
 from study_app.analysis.reaches import Targets, path_length_m, reaches, submovements
 from study_app.analysis.tables import load_study
 from study_app.session.rehearsal import rehearse
-from study_app.store.blinding import reveal
 from study_app.store.layout import StudyFolder
+from study_app.store.unblinding import unblind
 from tests.compiled import needs_servo
 
 TWO = Targets(np.array([[-0.03, 0, 0], [0.03, 0, 0]]), 0.006, 0.5)
@@ -74,7 +74,7 @@ def test_a_circle_has_the_length_of_its_circumference() -> None:
 @needs_servo
 def test_reaches_are_those_that_the_session_decided_and_absent_recordings_are_told(tmp_path: Path) -> None:
     folder = rehearse("rek2024", participants=1, seed=3, results=tmp_path / "rek2024")
-    reveal(folder, by="AB", reason="a test")
+    unblind(folder, by="AB", reason="a test")
     (session,) = StudyFolder(folder).sessions()
     lines = [json.loads(text) for text in session.journal.read_text().splitlines()]
     study = load_study(folder)
@@ -104,7 +104,7 @@ def test_reaches_are_those_that_the_session_decided_and_absent_recordings_are_to
 @needs_servo
 def test_without_recordings_there_are_measures_of_trials_alone(tmp_path: Path) -> None:
     folder = rehearse("rek2024", participants=1, seed=3, results=tmp_path / "rek2024", recordings=False)
-    reveal(folder, by="AB", reason="a test")
+    unblind(folder, by="AB", reason="a test")
     measured = performance(load_study(folder))
     assert (measured.recorded, measured.unread) == (0, ("7 × no recording was kept",))
     assert {one.measure for one in measured.moved} == {

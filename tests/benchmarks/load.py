@@ -24,6 +24,7 @@ from study_app import app
 from study_app.gui.operator import OperatorWindow
 from study_app.gui.participant import ParticipantWindow
 from study_app.store.layout import StudyFolder
+from study_app.store.unblinding import unblind
 from tests.faults.windows import Person
 
 COLUMNS = (
@@ -78,6 +79,7 @@ def main(name: str = "rek2024", seconds: float = 600.0) -> None:
             )
             person.leave()
         lasted_s = time.monotonic() - began
+        unblind(results, "load", "to print what was measured")
         rows = [row for session in StudyFolder(results).sessions() for row in trials(session.path)]
         del application
     report(rows, sessions, lasted_s)

@@ -3,7 +3,9 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
+import os
 import random
+import stat
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
@@ -17,6 +19,7 @@ from study_app.protocol.schedule import stream
 from study_app.store import blinding
 from study_app.store.blinding import open_or_draw_key, reveal, revealed, revealed_key, reveals, unreadable_reveals
 from study_app.store.session import SessionStore
+from study_app.store.unblinding import unblind
 from study_app.store.verify import verify
 
 
@@ -31,6 +34,17 @@ def sealed(folder: Path) -> Path:
 def content_of(folder: Path) -> dict[str, Any]:
     content: dict[str, Any] = json.loads(base64.b64decode(sealed(folder).read_bytes()))
     return content
+
+
+@pytest.mark.skipif(os.name != "posix", reason="elsewhere files have no such modes")
+@pytest.mark.parametrize("mask", [0o000, 0o022])
+def test_only_its_owner_may_read_the_key(tmp_path: Path, protocol: Protocol, mask: int) -> None:
+    before = os.umask(mask)
+    try:
+        open_or_draw_key(tmp_path, protocol)
+    finally:
+        os.umask(before)
+    assert stat.S_IMODE(sealed(tmp_path).stat().st_mode) == 0o600
 
 
 def test_the_key_gives_every_code_its_condition(tmp_path: Path, protocol: Protocol) -> None:
@@ -81,10 +95,10 @@ def test_who_comes_second_reads_what_the_first_drew(
     first: list[blinding.Key] = []
     create = blinding.create_folder
 
-    def after_the_first(path: Path, files: dict[str, bytes]) -> bool:
+    def after_the_first(path: Path, files: dict[str, bytes], *, mode: int) -> bool:
         monkeypatch.setattr(blinding, "create_folder", create)
         first.append(open_or_draw_key(tmp_path, protocol))
-        return create(path, files)
+        return create(path, files, mode=mode)
 
     monkeypatch.setattr(blinding, "create_folder", after_the_first)
     assert open_or_draw_key(tmp_path, protocol) == first[0]
@@ -215,7 +229,7 @@ def test_a_damaged_receipt_stops_no_session_but_its_own(
     else:
         damaged.write_bytes(content)
     start("P003").finish("completed")
-    assert set(reveal(tmp_path / "study", by="AK", reason="done")) == {"practice", "liquids", "delays"}
+    assert set(unblind(tmp_path / "study", by="AK", reason="done").codes) == {"practice", "liquids", "delays"}
     assert [error.place for error in verify(tmp_path / "study").errors] == ["data/sub-P002/ses-01/receipt.json"]
 
 
@@ -286,7 +300,7 @@ def test_a_line_that_is_no_reveal_is_told_and_the_others_count(
     path = folder / "blinding" / "reveals.jsonl"
     path.write_bytes(line + b"\n")
     assert revealed(folder) is None
-    reveal(folder, "AB", "done")
+    unblind(folder, "AB", "done")
     assert unreadable_reveals(folder) == (1,)
     assert [one["by"] for one in reveals(folder)] == ["AB"]
     findings = verify(folder)

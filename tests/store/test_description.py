@@ -52,7 +52,7 @@ def test_the_description_is_the_same_for_every_participant(
     start("P001").finish("completed")
     written = path.stat().st_ino
     start("P002").finish("completed")
-    assert path.read_bytes() == description_bytes(protocol.study)
+    assert path.read_bytes() == description_bytes(protocol.study, sealed=True)
     assert path.stat().st_ino == written
 
 

@@ -140,7 +140,7 @@ def test_of_a_journal_cut_at_any_byte_everything_whole_is_rebuilt_and_the_journa
     content, lines = path.read_bytes(), journal.read(path)
     ends = [end + 1 for end, byte in enumerate(content) if byte == ord("\n")]
     assert len(ends) == 10
-    expected = [table_files(store.place, lines[:count]) for count in range(1, 11)]
+    expected = [table_files(store.place, lines[:count], None) for count in range(1, 11)]
     receipt_bytes = store.folder.receipt.read_bytes()
     for size in range(len(content) + 1):
         path.write_bytes(content[:size])

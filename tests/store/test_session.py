@@ -111,6 +111,7 @@ def test_the_first_line_says_what_is_run(start: Callable[..., SessionStore]) -> 
             "withheld_percent": 5.0,
         },
         "previous": hashlib.sha256(b"").hexdigest(),
+        "measures_sealed": True,
     }
 
 

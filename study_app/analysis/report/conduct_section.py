@@ -58,11 +58,8 @@ def _delivered(study: Study, results: Results) -> Iterator[str]:
             [
                 blocks[one.block].title,
                 "all" if one.code is None else name(blocks[one.block], one.code),
-                "sealed" if one.delay_ms is None else ms(one.delay_ms),
-                "–" if one.achieved_ms is None else f"{number(one.achieved_ms, 1)} ms",
-                _ms(one.error_mean_ms),
-                _ms(one.error_worst_ms),
-                _trials(one),
+                *(_delays(one) if study.revealed else ["sealed"] * 4),
+                _trials(one) if study.revealed else str(one.trials),
                 _within(one),
             ]
             for one in results.delivered
@@ -74,9 +71,20 @@ def _delivered(study: Study, results: Results) -> Iterator[str]:
         "Age of what was drawn, less the delay asked for: mean over trials of each trial's mean, and the trial whose "
         "mean was farthest off; on the program's clock, without the display's own latency. Within limits: "
         + "; ".join(_limit(what, limit) for what, limit in limits.items())
-        + ". Trials beyond them are counted all the same, unless they are excluded above.",
+        + ". Trials beyond them are counted all the same, unless they are excluded above."
+        + ("" if study.revealed else " Until unblinding delay error and force withheld are sealed, and not judged."),
         "soft",
     )
+
+
+def _delays(one: Delivered) -> list[str]:
+    """Return the cells on the delay asked for, the one achieved and the errors."""
+    return [
+        "–" if one.delay_ms is None else ms(one.delay_ms),
+        "–" if one.achieved_ms is None else f"{number(one.achieved_ms, 1)} ms",
+        _ms(one.error_mean_ms),
+        _ms(one.error_worst_ms),
+    ]
 
 
 def _limit(what: str, limit: float) -> str:

@@ -11,6 +11,7 @@ from typing import Any, TypeAlias
 
 from study_app.protocol.model import Protocol
 from study_app.protocol.schedule import PageStep, Schedule, Trial
+from study_app.store.columns import SEALED
 from study_app.store.tables import beyond_limits
 
 # A block of more trials than this is one row of the rail ("Delay settings 1 to 7"), so that a day's study fits it.
@@ -35,7 +36,7 @@ class SessionProgress:
     ``step`` indexes the schedule's steps (−1 before the first); ``durations_s`` holds the steps left behind; ``away_s``
     is how long no program held the session, which no duration counts; ``answers`` counts the answered items of each
     trial, ``trials_done`` says of each trial what was measured in it that broke the protocol's limits: column, value
-    and limit.
+    and limit, in a double-blind study of lateness and gaps alone.
     """
 
     protocol: Protocol
@@ -73,7 +74,7 @@ class SessionProgress:
 
     @property
     def trials_within_limits(self) -> int:
-        """How many finished trials kept the protocol's limits of lateness, gap and delay error."""
+        """How many finished trials kept the protocol's limits, as far as the operator may know."""
         return sum(not beyond for beyond in self.trials_done.values())
 
     @property
@@ -133,9 +134,9 @@ def _trial_ended(progress: SessionProgress, at_s: float, fields: Mapping[str, An
     progress = replace(progress, trial_lasted_s=lasted)
     if fields["outcome"] not in {"complete", "timeout"}:
         return progress
-    protocol = progress.protocol
-    hidden = {"withheld_percent"} if protocol.study.blinding == "double" else set()  # it would tell a condition
-    beyond = beyond_limits(fields, protocol.limits.model_dump(exclude=hidden))
+    beyond = beyond_limits(fields, progress.protocol.limits.model_dump())
+    if progress.protocol.study.blinding == "double":
+        beyond = tuple(one for one in beyond if one[0] not in SEALED)
     return replace(progress, trials_done={**progress.trials_done, fields["trial"]: beyond})
 
 

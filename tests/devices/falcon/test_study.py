@@ -24,6 +24,7 @@ from study_app.protocol.load import load
 from study_app.session import rehearsal
 from study_app.session.strokes import exploration
 from study_app.store.layout import StudyFolder
+from study_app.store.unblinding import unblind
 from study_app.store.verify import verify
 
 STUDY = "rek2024"
@@ -71,6 +72,7 @@ def tied(tmp_path_factory):
         for device in ("scripted", "falcon-emulated"):
             folder = tmp_path_factory.mktemp("results") / device
             rehearsal.rehearse(STUDY, participants=1, seed=3, device=device, results=folder)
+            unblind(folder, "AB", "to compare what was measured")
             folders.append(StudyFolder(folder))
     return folders
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -37,6 +37,11 @@ class Told:
     def welcome(self) -> None:
         self.tell("session_started")
         self.tell("page_shown", 1.0, page="welcome")
+
+    def make_single_blind(self) -> None:
+        """Let the operator see forces."""
+        study = self.protocol.study.model_copy(update={"blinding": "single"})
+        self.progress = replace(self.progress, protocol=self.protocol.model_copy(update={"study": study}))
 
     def start(self, number: int, attempt: int = 1) -> None:
         self.tell("trial_started", 10.0, trial=number, attempt=attempt)

@@ -54,6 +54,7 @@ def test_a_trial_beyond_a_limit_is_done_but_not_within_limits(told):
 def test_a_picture_that_came_too_early_is_judged_as_in_the_trials_table(told):
     told.welcome()
     told.start(1)
+    told.make_single_blind()
     told.end(1, delay_error_p95_ms=-40.0)
     assert within_limits({"delay_error_p95_ms": -40.0}, told.protocol.limits.model_dump()) is False
     assert told.progress.trials_done == {1: (("delay_error_p95_ms", -40.0, 25.0),)}

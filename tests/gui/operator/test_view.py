@@ -200,22 +200,24 @@ def test_a_trial_out_of_limits_says_which_and_by_how_much_the_newest_first(told)
     told.start(2)
     told.end(2, lateness_p99_ms=1.0)
     told.start(3)
-    told.end(3, delay_error_p95_ms=27.211752, worst_frame_gap_ms=300.0)
+    told.end(3, first_frame_gap_ms=327.211752, worst_frame_gap_ms=300.0)
     assert told.view().beyond == (
-        "Delay setting 1 out of limits: delay error, p95, 27.2 ms, limit 25 ms; longest gap between frames 300 ms, "
-        "limit 250 ms",
+        "Delay setting 1 out of limits: time to the first frame 327 ms, limit 250 ms; longest gap between frames "
+        "300 ms, limit 250 ms",
         "Liquid setting 1 out of limits: longest gap of the servo 31.2 ms, limit 20 ms",
     )
 
 
 @pytest.mark.parametrize("blinding", ["double", "single"])
-def test_force_withheld_is_judged_before_an_operator_who_sees_forces_alone(told, blinding):
-    study = told.protocol.study.model_copy(update={"blinding": blinding})
-    told.progress = dataclasses.replace(told.progress, protocol=told.protocol.model_copy(update={"study": study}))
+def test_what_tells_a_condition_is_judged_before_an_operator_who_sees_forces_alone(told, blinding):
+    if blinding == "single":
+        told.make_single_blind()
     told.start(1)
-    told.end(1, withheld_share=0.0712)
+    told.end(1, withheld_share=0.0712, delay_error_p95_ms=27.211752)
     said = [line.partition(" out of limits: ")[2] for line in told.view().beyond]
-    assert said == ([] if blinding == "double" else ["force withheld 7.12 %, limit 5 %"])
+    single = "delay error, p95, 27.2 ms, limit 25 ms; force withheld 7.12 %, limit 5 %"
+    assert said == ([] if blinding == "double" else [single])
+    assert dict(told.view().counts)["Trials within limits"] == ("1 of 1" if blinding == "double" else "0 of 1")
 
 
 def test_every_limit_of_a_trial_has_a_name_for_the_operator(told):

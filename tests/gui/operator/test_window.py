@@ -83,11 +83,11 @@ def test_the_limit_a_trial_broke_can_be_read_in_the_smallest_window(window, told
     assert window.rail.tally.beyond.isHidden()
     told.end(1, worst_gap_ms=31.0)
     told.start(2)
-    told.end(2, delay_error_p95_ms=27.2)
+    told.end(2, first_frame_gap_ms=272.0)
     window.resize(window.minimumSize())
     window.show_view(told.view(health))
     line = window.rail.tally.beyond
-    assert line.text() == "Liquid setting 2 out of limits: delay error, p95, 27.2 ms, limit 25 ms."
+    assert line.text() == "Liquid setting 2 out of limits: time to the first frame 272 ms, limit 250 ms."
     assert "longest gap of the servo 31 ms" in line.toolTip()
     qtbot.waitUntil(lambda: line.height() >= line.heightForWidth(line.width()))
     qtbot.waitUntil(lambda: window.rail.tally.rect().contains(line.geometry()))
