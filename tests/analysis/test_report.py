@@ -158,6 +158,10 @@ def test_while_sealed_nothing_is_told_that_blinding_hides(small: Results, tmp_pa
     told = read(tmp_path / "report")
     assert "Blinded: by code" in told
     assert "after unblinding" in told
+    assert re.search(r" all +sealed +sealed +sealed +sealed +28 +28 of 28 ", " ".join(told.split()))
+    assert "Until unblinding delay error and force withheld are sealed, and not judged." in told
+    (delivered,) = numbers(tmp_path / "report")["results"]["delivered"]
+    assert (delivered["error_mean_ms"], delivered["error_worst_ms"], delivered["achieved_ms"]) == (None, None, None)
     for path in (tmp_path / "report").iterdir():
         content = path.read_bytes().decode("utf-8", "replace").lower()
         assert not [word for word in HIDDEN if word in content], path.name

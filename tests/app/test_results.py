@@ -134,6 +134,8 @@ def test_unblinding_is_recorded_and_shows_names_at_once(shown: Opened, results: 
     assert not shown.place.unblind.isVisible()
     assert shown.titles[:2] == ["Agreement for each liquid", "Answers over added delay"]
     assert b">Thick<" in shown.place.figures.cards[0].figure.svg
+    for table in (results / "demo").rglob("*trials_data.csv"):
+        assert b",force_mean_n," in table.read_bytes()
 
 
 def test_leaving_out_changes_foot_figures_and_list(shown: Opened, results: Path) -> None:

@@ -9,7 +9,9 @@ from itertools import count
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
+from study_app.cli import commands
 from study_app.errors import StoreError
 from study_app.protocol.model import Protocol, StudyHead
 from study_app.store import journal, receipt
@@ -152,6 +154,23 @@ def test_what_is_not_the_journals_is_left_and_named(tmp_path: Path, start: Start
     for name in ("P001", "P003"):
         rebuild(stores[name].folder.path)
     assert sound(folder)
+
+
+def test_the_command_names_the_codes_and_what_it_left(start: Start, attend: Attend) -> None:
+    store = start()
+    attend(store)
+    store.finish("completed")
+    table = store.folder.table("brackish", "trials")
+    table.unlink()
+    asked = ["unblind", str(store.place.study_folder.path), "--by", "AB", "--reason", "done"]
+    done = CliRunner().invoke(commands, asked)
+    assert done.exit_code == 0
+    codes = {line.split()[1] for line in done.stdout.splitlines()}
+    assert codes == {"practice", "L1", "L2", "D1", "D2"}
+    assert done.stderr.splitlines() == [
+        f"warning: {table} is not what the journal gives, so it was left as it is: "
+        f"liquid-study rebuild {store.folder.path} makes it again"
+    ]
 
 
 def test_a_session_goes_on_as_it_began(tmp_path: Path, protocol: Protocol, start: Start, attend: Attend) -> None:
