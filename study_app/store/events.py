@@ -28,7 +28,11 @@ _HASHES = ("key_hash", "protocol_hash", "version")
 _WHICH = ("trial", "attempt")
 
 EVENTS: tuple[Event, ...] = (
-    Event("session_started", "The session began: always the first line.", (*_SESSION, *_HASHES, "device", "limits")),
+    Event(
+        "session_started",
+        "The session began: always the first line; `measures_sealed` says whether sealed columns are encrypted.",
+        (*_SESSION, *_HASHES, "device", "limits"),
+    ),
     Event(
         "session_resumed",
         "It was taken up again after its program had ended, so long after the line before.",

@@ -21,6 +21,7 @@ from study_app.session.runner import BUTTON_STOP, Runner
 from study_app.session.state import Phase
 from study_app.session.trial import SETTLED_S
 from study_app.store.journal import SessionClock
+from study_app.store.sealing import opened
 from study_app.store.session import begin
 from study_app.store.tables import trials
 from tests.compiled import needs_servo
@@ -186,7 +187,7 @@ class Judged:
                     if view is not None:
                         runner.frame_shown(servo.now_ns() + 3_000_000, view.sample_time_ns)
                     runner.poll()
-            self.row = next(row for row in trials(store.lines) if row["outcome"] == "complete")
+            self.row = next(row for row in trials(opened(store.lines, store.key)) if row["outcome"] == "complete")
 
 
 def test_a_trial_without_incidents_is_valid(tmp_path: Path) -> None:

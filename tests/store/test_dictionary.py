@@ -43,7 +43,8 @@ def test_every_table_is_one_that_renders() -> None:
         "| `response` | whole number, 1 to 7, or n/a | The answer on the scale, from 1 (completely disagree) to 7 "
         "(completely agree). |",
         "| `simulated` | true, false | true where participant and device were simulated (a rehearsal). |",
-        "| `force_peak_n` | number [N], or n/a | Largest magnitude of the force sent to the device. |",
+        "| `force_peak_n` | number [N], or n/a | Largest magnitude of the force sent to the device. **Sealed until "
+        "unblinding.** |",
         "| `page_left` | `page` | The participant went on from it. |",
         "| `due_ns` | whole number [ns] | When the turn was due; it was late by time_ns - due_ns. |",
     ],
