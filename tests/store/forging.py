@@ -39,7 +39,7 @@ def cover_up(study: Path) -> None:
     for session in folder.sessions():
         lines = read(session.journal)
         name = lines[0]["study"]
-        for path, content in table_files(Place(folder, session, name), lines):
+        for path, content in table_files(Place(folder, session, name), lines, None):
             path.write_bytes(content)
         session.checksums.unlink(missing_ok=True)
         if lines[-1]["event"] == "session_ended":
