@@ -14,7 +14,6 @@ from PySide6.QtGui import QScreen
 from study_app.errors import StudyError
 from study_app.evaluation.appraised import Costs, Errors
 from study_app.evaluation.appraiser import Appraiser
-from study_app.evaluation.fastest import Stroke, fastest_stroke
 from study_app.gui.beginning import Ready, measured
 from study_app.gui.choices import NewSession
 from study_app.gui.preflight.view import preflight_view
@@ -24,6 +23,7 @@ from study_app.gui.theme import Theme
 from study_app.haptics.dynamics import Dynamics
 from study_app.haptics.scene import Scene
 from study_app.protocol.model import Protocol
+from study_app.protocol.tasks import Stroke, fastest_stroke
 from study_app.session.preflight import Facts, checks
 
 LOOK_MS = 100

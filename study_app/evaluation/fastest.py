@@ -1,45 +1,18 @@
-"""The fastest stroke that a task calls for, and the share of a scene's force that safety withholds in it."""
+"""The share of a scene's force that safety withholds in a stroke, such as the fastest of a task."""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
-
-from study_app.protocol.tasks import Explore, Reach
 
 if TYPE_CHECKING:
     from study_app.haptics.dynamics import Dynamics
     from study_app.haptics.scene import Scene
+    from study_app.protocol.tasks import Stroke
 
-SHAKE_HZ: Final = 5.0
-SHAKE_M: Final = 0.03
-"""As quick and as wide as free shaking of a light handle commonly is. [choice]"""
-REACH_S: Final = 0.3
-"""From target to target, as fast as aimed reaches are. [choice]"""
 LASTS_S: Final = 2.0
-
-
-class Stroke(NamedTuple):
-    """A straight stroke to and fro: x = A cos 2πft in the hand frame."""
-
-    frequency_hz: float
-    amplitude_m: float
-
-    @property
-    def speed_mps(self) -> float:
-        """The greatest speed [m/s]."""
-        return 2.0 * math.pi * self.frequency_hz * self.amplitude_m
-
-
-def fastest_stroke(task: Explore | Reach, workspace_m: tuple[float, float, float]) -> Stroke:
-    """Return the fastest stroke of a task in a tank of these extents [m, hand frame]."""
-    if isinstance(task, Explore):
-        return Stroke(SHAKE_HZ, min(SHAKE_M, workspace_m[0] / 2))
-    following = (*task.targets_m[1:], task.targets_m[0])
-    way_m = max(math.dist(*pair) for pair in zip(task.targets_m, following, strict=True))
-    return Stroke(0.5 / REACH_S, way_m / 2)
 
 
 def withheld_share(scene: Scene, stroke: Stroke, dynamics: Dynamics) -> float:

@@ -10,15 +10,21 @@ from typing import Annotated, Literal, TypeAlias, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
 
-Metres: TypeAlias = tuple[float, float, float]
-Positive: TypeAlias = Annotated[float, Field(gt=0)]
+from study_app.haptics.ranges import Decay, DensityKgM3, Exponent, Extent, Flow, Metres, ViscosityPaS, within
+
 Effect: TypeAlias = Literal["drag", "wake", "local_wake", "current", "buoyancy", "surface", "added_mass", "history"]
 Effects: TypeAlias = Annotated[
     Annotated[tuple[Effect, ...], Tag("named")] | Annotated[Literal["auto"], Tag("auto")],
     Discriminator(lambda value: "auto" if isinstance(value, str) else "named"),
 ]
 
+Length: TypeAlias = Annotated[int, within(1, 100_000, "elements, one per millisecond: at most 100 s")]
+Scaling: TypeAlias = Annotated[float, within(1, 1e9, "elements; at least the length")]
+Smoothing: TypeAlias = Annotated[float, within(0, 1, "a hand moves on within a second")]
+
 MAX_LIQUIDS = 8
+MAX_ID = 60
+"""Letters of a name that tables and windows can show whole."""
 
 
 class Frozen(BaseModel):
@@ -38,7 +44,7 @@ class Box(Frozen):
 
     kind: Literal["box"] = "box"
     centre_m: Metres = (0.0, 0.0, 0.0)
-    size_m: tuple[Positive, Positive, Positive]
+    size_m: tuple[Extent, Extent, Extent]
 
 
 class Cylinder(Frozen):
@@ -46,8 +52,8 @@ class Cylinder(Frozen):
 
     kind: Literal["cylinder"] = "cylinder"
     centre_m: Metres = (0.0, 0.0, 0.0)
-    radius_m: Positive
-    height_m: Positive
+    radius_m: Extent
+    height_m: Extent
 
 
 Region: TypeAlias = Annotated[Everywhere | Box | Cylinder, Field(discriminator="kind")]
@@ -69,13 +75,13 @@ class Wake(Frozen):
     motion enters the tail.
     """
 
-    length: int = Field(ge=1, le=100_000)
-    scaling: float = Field(gt=0, le=1e9)
-    exponent: float = Field(default=1.0, gt=0, le=10)
-    breaking_angle_deg: float = Field(default=45.0, ge=0, le=180)
-    breaking_span_m: float = Field(default=0.068, ge=0)
-    decay: float = Field(default=0.999975, gt=0, le=1)
-    resolution_m: float = Field(default=0.0, ge=0)
+    length: Length
+    scaling: Scaling
+    exponent: Exponent = 1.0
+    breaking_angle_deg: Annotated[float, within(0, 180, "180° is straight back")] = 45.0
+    breaking_span_m: Annotated[float, within(0, 100, "the hand turns within its reach")] = 0.068
+    decay: Decay = 0.999975
+    resolution_m: Annotated[float, within(0, 10, "a tail of coarser elements never moves")] = 0.0
     axes: Literal["xz", "xyz"] = "xz"
 
     @model_validator(mode="after")
@@ -90,13 +96,13 @@ class LocalWake(Frozen):
     from it (None: one diameter of the body), ever farther and weaker as it spreads by ``spreading_m2ps``.
     """
 
-    length: int = Field(ge=1, le=100_000)
-    scaling: float = Field(gt=0, le=1e9)
-    exponent: float = Field(default=1.0, gt=0, le=10)
-    decay: float = Field(default=0.999975, gt=0, le=1)
+    length: Length
+    scaling: Scaling
+    exponent: Exponent = 1.0
+    decay: Decay = 0.999975
     axes: Literal["xz", "xyz"] = "xz"
-    reach_m: Positive | None = None
-    spreading_m2ps: float = Field(default=1e-3, ge=0, le=10)
+    reach_m: Extent | None = None
+    spreading_m2ps: Annotated[float, within(0, 10, "beyond, a wake is gone within a tick")] = 1e-3
 
     @model_validator(mode="after")
     def _liquid_never_outruns_the_body(self) -> LocalWake:
@@ -119,7 +125,7 @@ class Uniform(Frozen):
     """A current that is the same everywhere in the liquid."""
 
     kind: Literal["uniform"] = "uniform"
-    velocity_mps: Metres
+    velocity_mps: tuple[Flow, Flow, Flow]
 
 
 class Channel(Frozen):
@@ -131,9 +137,9 @@ class Channel(Frozen):
 
     kind: Literal["channel"] = "channel"
     centre_m: Metres = (0.0, 0.0, 0.0)
-    heading_deg: float = Field(default=0.0, ge=-360, le=360)
-    width_m: Positive
-    peak_mps: float
+    heading_deg: Annotated[float, within(-360, 360, "one turn")] = 0.0
+    width_m: Extent
+    peak_mps: Flow
 
 
 class Vortex(Frozen):
@@ -141,8 +147,8 @@ class Vortex(Frozen):
 
     kind: Literal["vortex"] = "vortex"
     centre_m: Metres = (0.0, 0.0, 0.0)
-    core_m: Positive
-    peak_mps: float
+    core_m: Extent
+    peak_mps: Flow
 
 
 Current: TypeAlias = Annotated[Uniform | Channel | Vortex, Field(discriminator="kind")]
@@ -155,8 +161,8 @@ class AddedMass(Frozen):
     given.
     """
 
-    coefficient: float = Field(default=0.5, ge=0, le=10)
-    filter_s: float = Field(default=0.025, ge=0, le=1)
+    coefficient: Annotated[float, within(0, 10, "a sphere has 0.5")] = 0.5
+    filter_s: Smoothing = 0.025
 
 
 class History(Frozen):
@@ -166,8 +172,8 @@ class History(Frozen):
     over ``smoothing_s`` before, but not where they are given.
     """
 
-    window_s: float = Field(default=0.05, ge=0.005, le=0.5)
-    smoothing_s: float = Field(default=0.01, ge=0, le=1)
+    window_s: Annotated[float, within(0.005, 0.5, "the window holds 5 to 500 accelerations at 1 kHz")] = 0.05
+    smoothing_s: Smoothing = 0.01
 
 
 class Liquid(Frozen):
@@ -176,9 +182,9 @@ class Liquid(Frozen):
     The table of an effect that is not called for may stand; it means nothing.
     """
 
-    id: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")
-    density_kg_m3: float = Field(gt=0, le=25_000)
-    viscosity_pa_s: float | None = Field(default=None, gt=0)
+    id: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$", max_length=MAX_ID)
+    density_kg_m3: DensityKgM3
+    viscosity_pa_s: ViscosityPaS | None = None
     region: Region = Everywhere()
     effects: Effects = ("drag",)
     drag: Drag = Drag()

@@ -14,6 +14,8 @@ from study_app.haptics.scene import Scene
 
 Tables: TypeAlias = "dict[str, list[dict[str, Any]]]"
 
+SHOWN = 200  # characters of a bad value that a message repeats
+
 # Where a parameter may sit; the places that a plain name means first come first.
 _OF_A_LIQUID = ("wake", "local_wake", "region", "current", "added_mass", "history")
 _OF_THE_SCENE = ("body", "velocity", "knee", "accuracy", "motion")
@@ -47,9 +49,15 @@ def override_all(scene: Scene, values: Mapping[str, object]) -> Scene:
     try:
         return Scene.model_validate(tree)
     except ValidationError as error:
-        named = ", ".join(f"{name} = {value}" for name, value in values.items())
+        named = ", ".join(f"{_shown(name)} = {_shown(value)}" for name, value in values.items())
         reasons = "; ".join(_reason(problem["loc"], problem["msg"]) for problem in error.errors())
         raise StudyError(f"cannot set {named}: {reasons}") from error
+
+
+def _shown(value: object) -> str:
+    """Return a value as a message repeats it."""
+    text = str(value)
+    return text if len(text) <= SHOWN else f"{text[:SHOWN]}…"
 
 
 def _reason(place: tuple[int | str, ...], message: str) -> str:
@@ -84,7 +92,7 @@ def _places(tables: Tables, name: str) -> list[tuple[dict[str, Any], str]]:
     known = sorted(leaves - _FIXED - {"kind"} - tables.keys())
     near = difflib.get_close_matches(field, known, n=1)
     meant = f"did you mean {near[0]!r}? " if near else ""
-    raise StudyError(f"this scene has no parameter {name!r}: {meant}it has {', '.join(known)}")
+    raise StudyError(f"this scene has no parameter {_shown(name)!r}: {meant}it has {', '.join(known)}")
 
 
 def _set(table: dict[str, Any], field: str, value: object) -> None:
@@ -103,6 +111,6 @@ def _read(text: str, present: object, field: str) -> object:
             return tomllib.loads(f"table = {text}")["table"]
         except tomllib.TOMLDecodeError as error:
             example = f'{field}={{kind="uniform", velocity_mps=[1, 0, 0]}}'
-            raise StudyError(f"cannot read {field} = {text}: write a table such as {example}") from error
+            raise StudyError(f"cannot read {field} = {_shown(text)}: write a table such as {example}") from error
     several = isinstance(present, tuple) or field == "effects" or "," in text
     return tuple(text.split(",")) if several and text != "auto" else text

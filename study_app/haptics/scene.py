@@ -25,12 +25,20 @@ from study_app.haptics.liquid import (
     History,
     Liquid,
     LocalWake,
-    Metres,
-    Positive,
     Region,
     Uniform,
     Vortex,
     Wake,
+)
+from study_app.haptics.ranges import (
+    Alpha,
+    Coordinate,
+    DensityKgM3,
+    DiameterM,
+    DragCoefficient,
+    ForceLimitN,
+    Metres,
+    within,
 )
 
 __all__ = [
@@ -57,9 +65,7 @@ __all__ = [
     "Line",
     "Liquid",
     "LocalWake",
-    "Metres",
     "MotionBox",
-    "Positive",
     "Raw",
     "Region",
     "Scene",
@@ -68,6 +74,9 @@ __all__ = [
     "Vortex",
     "Wake",
 ]
+
+RateHz: TypeAlias = Annotated[float, within(50, 5000, "no servo is stable below, and no tick fits above")]
+SceneScale: TypeAlias = Annotated[float, within(0.01, 100, "a stroke of 60 mm is then 0.6 mm to 6 m in the scene")]
 
 MAX_WINDOW = 16
 
@@ -79,9 +88,9 @@ HAND_REACH_M = 0.04
 class Body(Frozen):
     """The ball that is moved through the liquids."""
 
-    diameter_m: float = Field(default=0.068, ge=1e-3, le=1)
-    drag_coefficient: float = Field(default=0.47, ge=0, le=10)
-    density_kg_m3: float = Field(default=1000.0, gt=0, le=25_000)
+    diameter_m: DiameterM = 0.068
+    drag_coefficient: DragCoefficient = 0.47
+    density_kg_m3: DensityKgM3 = 1000.0
 
 
 class Ewma(Frozen):
@@ -94,7 +103,7 @@ class Ewma(Frozen):
     """
 
     kind: Literal["ewma"] = "ewma"
-    alpha: float = Field(default=0.1, gt=0, le=1)
+    alpha: Alpha = 0.1
 
 
 class Line(Frozen):
@@ -113,7 +122,7 @@ class Foaw(Frozen):
 
     kind: Literal["foaw"] = "foaw"
     samples: int = Field(default=16, ge=2, le=MAX_WINDOW)
-    tolerance_m: float = Field(default=38e-6, ge=0, le=0.01)
+    tolerance_m: Annotated[float, within(0, 0.01, "10 mm is a third of a hand's stroke")] = 38e-6
 
 
 class Kalman(Frozen):
@@ -146,14 +155,14 @@ class Knee(Frozen):
     """How speeds above a threshold are lowered before anything is computed from them."""
 
     law: Literal["sqrt", "square", "none"] = "sqrt"
-    threshold_mps: float = Field(default=5.0, gt=0)
+    threshold_mps: Annotated[float, within(0.01, 1000, "a hand moves at 0.01 to 2 m/s, times the scale")] = 5.0
 
 
 class Accuracy(Frozen):
     """What ``effects = "auto"`` may leave out: up to a share of the whole force, or a force if that is greater."""
 
-    relative: float = Field(default=0.05, ge=0, le=1)
-    absolute_n: float = Field(default=0.05, ge=0)
+    relative: Annotated[float, within(0, 1, "a share of the force")] = 0.05
+    absolute_n: Annotated[float, within(0, 20, "the force limit is at most 20 N")] = 0.05
 
 
 class MotionBox(Frozen):
@@ -163,9 +172,11 @@ class MotionBox(Frozen):
     is None follows from a hand that moves 40 mm to every side at up to 0.3 m/s and 3 m/s² (`Scene.motion_in`).
     """
 
-    speed_mps: Positive | None = None
-    acceleration_mps2: Positive | None = None
-    depth_m: tuple[float, float] | None = None
+    speed_mps: Annotated[float, within(0.001, 1000, "a hand moves at 0.01 to 2 m/s, times the scale")] | None = None
+    acceleration_mps2: (
+        Annotated[float, within(0.001, 1e5, "a hand accelerates at 0.01 to 100 m/s², times the scale")] | None
+    ) = None
+    depth_m: tuple[Coordinate, Coordinate] | None = None
 
     @model_validator(mode="after")
     def _least_depth_comes_first(self) -> MotionBox:
@@ -181,14 +192,14 @@ class Scene(Frozen):
     the greatest force that may be sent. ``accuracy`` and ``motion`` are for liquids with ``effects = "auto"``.
     """
 
-    scale: float = Field(default=10.0, ge=0.01, le=100)
+    scale: SceneScale = 10.0
     origin_m: Metres = (0.0, 0.0, 0.0)
-    rate_hz: float = Field(default=1000.0, ge=50, le=5000)
+    rate_hz: RateHz = 1000.0
     body: Body = Body()
     liquids: tuple[Liquid, ...] = Field(default=(), max_length=MAX_LIQUIDS)
     velocity: Velocity = Ewma()
     knee: Knee = Knee()
-    force_limit_n: float = Field(default=8.0, gt=0, le=20)
+    force_limit_n: ForceLimitN = 8.0
     accuracy: Accuracy = Accuracy()
     motion: MotionBox = MotionBox()
 

@@ -6,10 +6,11 @@ Nothing here changes what a participant meets. It stands in every receipt, so th
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import Annotated, Any
 
 from pydantic import Field
 
+from study_app.haptics.ranges import within
 from study_app.protocol.document import Path, entries
 from study_app.protocol.problems import Fault, did_you_mean
 from study_app.protocol.table import Table
@@ -21,13 +22,15 @@ LISTS = ("primary", "names", "rising", "falling")
 class Analysis(Table):
     """The decisions; a protocol without this table decides nothing, and the report calls all it finds exploratory."""
 
-    alpha: float = Field(default=0.05, gt=0, le=0.2, description="Largest p that counts as significant.")
-    equivalence_bound: float | None = Field(
-        default=None,
-        gt=0,
-        le=6,
-        description="Largest mean difference to no delay that would not matter, in points of the scale; left out: "
-        "equivalence is not tested.",
+    alpha: Annotated[float, within(0.0001, 0.2, "no study of people shows less than 0.0001")] = Field(
+        default=0.05, description="Largest p that counts as significant."
+    )
+    equivalence_bound: Annotated[float, within(0.05, 6, "the scale has 6 steps, means differ by tenths")] | None = (
+        Field(
+            default=None,
+            description="Largest mean difference to no delay that would not matter, in points of the scale; left out: "
+            "equivalence is not tested.",
+        )
     )
     primary: tuple[Id, ...] = Field(
         default=(), description="Items of the questions asked; the others are exploratory. Left out: all are primary."
@@ -49,7 +52,7 @@ def decisions(document: Mapping[str, Any]) -> Iterator[Fault]:
     for key in LISTS:
         yield from _listed(list(entries(document, f"analysis.{key}.*")), items)
     yield from _unknown(entries(document, "analysis.noticed"), items)
-    falling = {name for _, name in entries(document, "analysis.falling.*")}
+    falling = [name for _, name in entries(document, "analysis.falling.*")]
     for path, name in entries(document, "analysis.rising.*"):
         if name in falling:
             yield Fault(path, f'"{name}" is expected to fall too', "an item rises, falls, or is in neither list")

@@ -35,6 +35,10 @@ class Block(Table):
         description="What the conditions of a main block differ in; left out: delays if all have one liquid and their "
         "delays differ, otherwise liquids.",
     )
+    replicates: bool = Field(
+        default=False,
+        description="Whether equal conditions of the block are meant: they are analysed as presentations of one.",
+    )
     order: Order = Field(
         default="fixed",
         description="fixed: as written; shuffled: anew in each repetition; constrained: all trials together, within "
@@ -51,7 +55,9 @@ class Block(Table):
         "others between; order constrained only.",
     )
     repetitions: int = Field(default=1, ge=1, le=100, description="How often each condition comes.")
-    break_every: int | None = Field(default=None, ge=1, description="Trials between two breaks; left out: no breaks.")
+    break_every: int | None = Field(
+        default=None, ge=1, le=10_000, description="Trials between two breaks; left out: no breaks."
+    )
     break_page: Id | None = Field(default=None, description="The page shown in a break, of kind break.")
     task: Id = Field(description="What the participant does.")
     questionnaire: Id | None = Field(default=None, description="What is answered after each trial; left out: nothing.")

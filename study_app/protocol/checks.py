@@ -1,4 +1,4 @@
-"""What only sound tables together can show: targets inside the tank, practice apart, codes and parts in order.
+"""What only sound tables together can show: targets inside the tank, liquids that are felt and differ, codes in order.
 
 The checks work on a :class:`Draft` of every entry that is sound by itself, so that one broken table does not hide what
 is wrong between the others.
@@ -11,15 +11,16 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict
 
-from study_app.haptics.scene import MAX_LIQUIDS
+from study_app.haptics.scene import MAX_LIQUIDS, Liquid, Scene
 from study_app.protocol.analysis import decisions
 from study_app.protocol.document import Path, names
-from study_app.protocol.model import Block, Condition, DeviceNeeds, Named, PageText, Reach, compared
+from study_app.protocol.felt import LEAST_N, force_n, numbers, within_tank
+from study_app.protocol.model import Block, Condition, DeviceNeeds, Named, PageText, Reach, SceneDefaults, compared
 from study_app.protocol.problems import Fault
-from study_app.protocol.references import items, languages, references, repeats, sequence
-from study_app.protocol.tasks import Task
+from study_app.protocol.references import alike, items, languages, references, repeats, sequence
+from study_app.protocol.tasks import Task, fastest_stroke
 
-_TABLES = ("conditions", "tasks", "pages", "blocks")
+_TABLES = ("liquids", "conditions", "tasks", "pages", "blocks")
 
 
 class Draft(BaseModel):
@@ -28,12 +29,30 @@ class Draft(BaseModel):
     model_config = ConfigDict(frozen=True, extra="ignore")
 
     device: DeviceNeeds | None = None
+    scene: SceneDefaults | None = None
+    liquids: Named[Liquid] = {}
     conditions: dict[str, Condition] = {}
     tasks: dict[str, Task] = {}
     pages: dict[str, PageText] = {}
     blocks: Named[Block] = {}
     sequence: tuple[str, ...] = ()
     whole: bool = True
+
+    def scene_of(self, condition: Condition) -> Scene | None:
+        """Return what is felt in a condition, if all of it is sound."""
+        liquids = [self.liquids[name] for name in condition.liquid_ids if name in self.liquids]
+        if (
+            self.device is None
+            or self.scene is None
+            or not 0 < len(liquids) == len(set(condition.liquid_ids)) <= MAX_LIQUIDS
+        ):
+            return None
+        return Scene(
+            **dict(self.scene),
+            rate_hz=self.device.rate_hz,
+            liquids=tuple(liquids),
+            force_limit_n=self.device.force_limit_n,
+        )
 
     def liquids_of(self, block: Block) -> set[str]:
         """Return the liquids that a block presents, as far as its conditions are sound."""
@@ -54,16 +73,19 @@ def draft(document: Mapping[str, Any], broken: Iterable[Path]) -> Draft:
             sound.get(section, {}).pop(path[1], None)
         else:
             sound.pop(section, None)
+    sound.setdefault("scene", None if "scene" in document else {})
     whole = len(names(document, "blocks")) == len(names(sound, "blocks"))
     return Draft.model_validate({**sound, "whole": whole}, strict=True)
 
 
 def check(document: Mapping[str, Any], broken: Iterable[Path]) -> Iterator[Fault]:
     """Yield every problem between the tables of ``document``, whose ``broken`` places are known already."""
-    for of_names in (references, sequence, repeats, items, languages, decisions):
+    for of_names in (references, sequence, repeats, items, alike, languages, decisions):
         yield from of_names(document)
     parts = draft(document, broken)
-    for of_tables in (targets, crowded, practice, codes, compares, breaks, counted_parts):
+    for of_tables in (targets, crowded, outside, unfelt, equal_liquids, equal_conditions):
+        yield from of_tables(parts)
+    for of_tables in (practice, codes, compares, breaks, counted_parts):
         yield from of_tables(parts)
 
 
@@ -92,6 +114,57 @@ def crowded(parts: Draft) -> Iterator[Fault]:
             yield Fault(
                 ("conditions", name, "liquids"), f"has more than {MAX_LIQUIDS} liquids", "a scene holds no more"
             )
+
+
+def outside(parts: Draft) -> Iterator[Fault]:
+    """Check that the ball meets every liquid of a condition somewhere in the tank."""
+    if parts.device is None or parts.scene is None:
+        return
+    for name, condition in parts.conditions.items():
+        for liquid in condition.liquid_ids:
+            if liquid in parts.liquids and not within_tank(parts.liquids[liquid], parts.scene, parts.device):
+                message = f'the region of "{liquid}" lies outside the tank, where no hand meets it'
+                yield Fault(("conditions", name), message, "move or enlarge the region, or scene.origin_m")
+
+
+def unfelt(parts: Draft) -> Iterator[Fault]:
+    """Check that every condition exerts a force in the fastest stroke of its block's task."""
+    for name, block in parts.blocks.items():
+        task = parts.tasks.get(block.task)
+        if task is None or parts.device is None:
+            continue
+        stroke = fastest_stroke(task, parts.device.workspace_m)
+        for index, condition in enumerate(block.conditions):
+            scene = parts.scene_of(parts.conditions[condition]) if condition in parts.conditions else None
+            if scene is not None and (exerted_n := force_n(scene, stroke)) < LEAST_N:
+                yield Fault(
+                    ("blocks", name, "conditions", index),
+                    f'"{condition}" exerts {exerted_n:.2g} N in the fastest stroke of task "{block.task}" '
+                    f"({stroke.speed_mps:.2g} m/s), less than {LEAST_N:g} N: nothing is felt",
+                    "call for effects such as drag, or raise density, scale or the ball's diameter",
+                )
+
+
+def equal_liquids(parts: Draft) -> Iterator[Fault]:
+    """Check that no two liquids have the same numbers."""
+    first: dict[str, str] = {}
+    for name, liquid in parts.liquids.items():
+        if (earlier := first.setdefault(repr(numbers(liquid)), name)) != name:
+            yield Fault(("liquids", name), f'has the same numbers as "{earlier}"', "change it, or use that one twice")
+
+
+def equal_conditions(parts: Draft) -> Iterator[Fault]:
+    """Check that the conditions of a block differ, unless the block says that some are replicates."""
+    for name, block in parts.blocks.items():
+        first: dict[tuple[tuple[str, ...], float], str] = {}
+        for index, condition in enumerate(() if block.replicates else block.conditions):
+            if (presented := parts.conditions.get(condition)) is None:
+                continue
+            earlier = first.setdefault((presented.liquid_ids, presented.delay_ms), condition)
+            if earlier != condition:
+                message = f'"{condition}" presents the same as "{earlier}"'
+                hint = "change it, use repetitions, or write replicates = true if that is meant"
+                yield Fault(("blocks", name, "conditions", index), message, hint)
 
 
 def practice(parts: Draft) -> Iterator[Fault]:

@@ -7,15 +7,16 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import Any, TypeVar
 
 from pydantic import BaseModel, Field, ValidationError
 
 from study_app.errors import Problem, ProtocolError
-from study_app.haptics.scene import Liquid, Scene
+from study_app.haptics.scene import Liquid, RateHz, Scene
 from study_app.protocol.checks import check
+from study_app.protocol.document import entries
 from study_app.protocol.files import protocol_hash, shipped, source_bytes
-from study_app.protocol.model import Named, Protocol, SceneDefaults, schema
+from study_app.protocol.model import Format, HandForceN, Named, Protocol, SceneDefaults, schema
 from study_app.protocol.places import Places
 from study_app.protocol.problems import Fault, did_you_mean, faults_of
 from study_app.protocol.table import Table
@@ -31,14 +32,14 @@ _LONG = re.compile(rf'(?<=")[^"]{{{SHOWN + 1},}}(?=")|\S{{{SHOWN + 1},}}')
 class SceneTable(SceneDefaults):
     """The scene of a file that holds no study: rate and force limit stand here, there is no device table."""
 
-    rate_hz: float = Field(default=1000, ge=50, le=5000, description="Nominal rate of ticks [Hz].")
-    force_limit_n: float = Field(default=8, gt=0, le=8, description="Largest force on the hand [N].")
+    rate_hz: RateHz = Field(default=1000, description="Nominal rate of ticks [Hz].")
+    force_limit_n: HandForceN = Field(default=8, description="Largest force on the hand [N].")
 
 
 class SceneFile(Table):
     """A file of liquids without a study."""
 
-    format: Literal[1] = 1
+    format: Format = 1
     scene: SceneTable = SceneTable()
     liquids: Named[Liquid] = Field(min_length=1)
 
@@ -164,11 +165,13 @@ def _shortened(words: str) -> str:
 def _faults(model: type[M], document: Mapping[str, Any]) -> list[Fault]:
     if _future_format(document):
         return [Fault(("format",), f"is {document['format']}, this program reads format 1", "use a newer program")]
+    named = [path for section in ("liquids", "blocks") for path, _ in entries(document, f"{section}.*.id")]
+    faults = [Fault(path, "unknown key", "the name of the table is its id") for path in named]
     try:
         model.model_validate(document, strict=True)
     except ValidationError as error:
-        return faults_of(error, document, schema(model))
-    return []
+        faults += faults_of(error, document, schema(model))
+    return faults
 
 
 def _future_format(document: Mapping[str, Any]) -> bool:

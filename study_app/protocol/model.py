@@ -13,13 +13,15 @@ from typing import Annotated, Any, Literal, Self, TypeAlias, TypeVar
 from pydantic import BaseModel, BeforeValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from study_app.haptics.scene import Accuracy, Body, Estimator, Ewma, Knee, Liquid, MotionBox, Scene
+from study_app.haptics.ranges import Metres, within
+from study_app.haptics.scene import Accuracy, Body, Estimator, Ewma, Knee, Liquid, MotionBox, Scene, SceneScale
 from study_app.protocol.analysis import Analysis
 from study_app.protocol.blocks import Block, Compared
 from study_app.protocol.questionnaires import Item, Questionnaire, Scale
 from study_app.protocol.table import Table
-from study_app.protocol.tasks import Explore, Reach, Task
-from study_app.protocol.texts import Id, Language, Localised, text_in
+from study_app.protocol.tasks import Explore, Reach, Seconds, Task
+from study_app.protocol.texts import Body as PageBody
+from study_app.protocol.texts import Description, Id, Language, Localised, text_in
 
 __all__ = [
     "Analysis",
@@ -40,6 +42,18 @@ __all__ = [
 ]
 
 MAX_FORCE_N = 8.0
+HandForceN: TypeAlias = Annotated[
+    float, within(0.1, MAX_FORCE_N, "below 0.1 N a hand feels little; 8 N is the most that is safe")
+]
+
+
+def _whole(value: Any) -> Any:
+    if type(value) is not int:
+        raise PydanticCustomError("format", "must be 1, the number of this format")
+    return value
+
+
+Format: TypeAlias = Annotated[Literal[1], BeforeValidator(_whole)]
 
 
 class StudyHead(Table):
@@ -47,9 +61,9 @@ class StudyHead(Table):
 
     name: str = Field(pattern=r"^[a-z][a-z0-9]*$", max_length=40, description="Short name, used in folders and files.")
     title: Localised = Field(description="Title as people read it.")
-    description: str = Field(default="", description="What the study asks, for those who find its results.")
+    description: Description = Field(default="", description="What the study asks, for those who find its results.")
     version: str = Field(
-        pattern=r"^[0-9A-Za-z.+-]+$", description="Version of this protocol; raise it with every change."
+        pattern=r"^[0-9A-Za-z.+-]+$", max_length=40, description="Version of this protocol; raise it with every change."
     )
     languages: tuple[Language, ...] = Field(
         min_length=1, description="Languages every text exists in; the first is preset."
@@ -67,10 +81,10 @@ class StudyHead(Table):
 class DeviceNeeds(Table):
     """What the study asks of whichever device is used."""
 
-    rate_hz: float = Field(default=1000, ge=250, le=4000, description="Rate of the servo [Hz].")
-    force_limit_n: float = Field(
-        default=MAX_FORCE_N, gt=0, le=MAX_FORCE_N, description="Largest force on the hand [N]."
+    rate_hz: Annotated[float, within(250, 4000, "no force is stable below, and no tick fits above")] = Field(
+        default=1000, description="Rate of the servo [Hz]."
     )
+    force_limit_n: HandForceN = Field(default=MAX_FORCE_N, description="Largest force on the hand [N].")
     workspace_mm: tuple[float, float, float] = Field(
         description="Full sizes of the drawn tank in x, y, z, hand frame, centred on the device's middle [mm]."
     )
@@ -91,10 +105,8 @@ class DeviceNeeds(Table):
 class SceneDefaults(Table):
     """What all conditions share of the scene: everything but the liquids."""
 
-    scale: float = Field(default=10, ge=0.01, le=100, description="Scene metres per hand metre.")
-    origin_m: tuple[float, float, float] = Field(
-        default=(0, 0, 0), description="Scene point under the hand's zero [m]."
-    )
+    scale: SceneScale = Field(default=10, description="Scene metres per hand metre.")
+    origin_m: Metres = Field(default=(0, 0, 0), description="Scene point under the hand's zero [m].")
     body: Body = Field(default_factory=Body, description="The ball that is felt.")
     velocity: Estimator = Field(default_factory=Ewma, description="How velocity is estimated from positions.")
     knee: Knee = Field(default_factory=Knee, description="How high speeds are lowered.")
@@ -107,7 +119,9 @@ class Condition(Table):
 
     liquid: Id | None = Field(default=None, description="The liquid; or give liquids.")
     liquids: tuple[Id, ...] = Field(default=(), description="Several liquids; where they overlap the last one counts.")
-    delay_ms: float = Field(default=0, ge=0, le=1000, description="Delay of everything drawn in the tank [ms].")
+    delay_ms: Annotated[float, within(0, 1000, "what is seen more than a second late is no feedback")] = Field(
+        default=0, description="Delay of everything drawn in the tank [ms]."
+    )
     label: Id | None = Field(
         default=None, description="The item of analysis.names that is right for it; left out: none is."
     )
@@ -135,12 +149,10 @@ class PageText(Table):
 
     kind: Literal["consent", "instructions", "break", "debrief"]
     title: Localised = Field(description="Heading of the page.")
-    body: Localised = Field(description="The text; a blank line begins a paragraph.")
+    body: PageBody = Field(description="The text; a blank line begins a paragraph.")
     button: Localised | None = Field(default=None, description="Words on the button; left out: Continue.")
-    min_s: float | None = Field(
+    min_s: Seconds | None = Field(
         default=None,
-        gt=0,
-        le=3600,
         description="A break's least time [s], counted down on the page; left out: as long as the participant likes.",
     )
 
@@ -156,14 +168,21 @@ class PageText(Table):
 class Limits(Table):
     """What a trial may show at most and still be valid."""
 
-    lateness_ms: float = Field(default=2, gt=0, description="99th percentile of the lateness of ticks [ms].")
-    worst_gap_ms: float = Field(default=20, gt=0, description="Longest time between two ticks [ms].")
-    delay_error_ms: float = Field(default=25, gt=0, description="95th percentile of achieved − requested delay [ms].")
-    frame_gap_ms: float = Field(
-        default=250, gt=0, description="Longest time before the first frame or between two [ms]."
+    lateness_ms: Annotated[float, within(0.01, 1000, "no servo is more punctual, and 1 s is a failure")] = Field(
+        default=2, description="99th percentile of the lateness of ticks [ms]."
     )
-    withheld_percent: float = Field(
-        default=5, gt=0, le=100, description="Share of the force that passivity controller and slew limit withhold [%]."
+    worst_gap_ms: Annotated[float, within(0.25, 1000, "from a tick at 4 kHz to a second, which is a failure")] = Field(
+        default=20, description="Longest time between two ticks [ms]."
+    )
+    delay_error_ms: Annotated[float, within(1, 1000, "no screen is more punctual, and 1 s is a failure")] = Field(
+        default=25, description="95th percentile of achieved − requested delay [ms]."
+    )
+    frame_gap_ms: Annotated[float, within(1, 1000, "no screen is faster, and 1 s is a failure")] = Field(
+        default=250,
+        description="Longest time before the first frame or between two, or before the trial's end [ms].",
+    )
+    withheld_percent: Annotated[float, within(0.01, 100, "a share of the force; none withheld at all is rare")] = Field(
+        default=5, description="Share of the force that passivity controller and slew limit withhold [%]."
     )
 
 
@@ -174,7 +193,7 @@ def _named(tables: Any) -> Any:
     """Give each table its name as ``id``, so that it can be used without the dictionary that held it."""
     if not isinstance(tables, Mapping):
         return tables
-    return {name: {"id": name, **table} if isinstance(table, Mapping) else table for name, table in tables.items()}
+    return {name: {**table, "id": name} if isinstance(table, Mapping) else table for name, table in tables.items()}
 
 
 Named: TypeAlias = Annotated[dict[Id, T], BeforeValidator(_named)]
@@ -183,7 +202,7 @@ Named: TypeAlias = Annotated[dict[Id, T], BeforeValidator(_named)]
 class Protocol(Table):
     """The whole file."""
 
-    format: Literal[1] = Field(description="Version of this file format.")
+    format: Format = Field(description="Version of this file format.")
     study: StudyHead
     device: DeviceNeeds
     scene: SceneDefaults = Field(default_factory=SceneDefaults)

@@ -10,6 +10,7 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from study_app.errors import Problem
+from study_app.haptics.ranges import REASON
 from study_app.protocol.document import Path, has
 from study_app.protocol.places import Places
 
@@ -107,6 +108,8 @@ def _fault(details: ErrorDetails, document: Mapping[str, Any], schema: Schema) -
         tags = str(context["expected_tags"]).replace("'", '"')
         return Fault((*path, _tag_key(context)), f'"{context["tag"]}" is not one of {tags}')
     sentence, hint = _sentence(kind, value, context, details["msg"])
+    if kind in _BOUNDS:
+        hint = next((node[REASON] for node in _nodes_at(document, path, schema) if REASON in node), "")
     return Fault(path, sentence, hint, counts_entries=kind == "too_short")
 
 
@@ -151,6 +154,11 @@ def _path_in(document: Any, loc: tuple[str | int, ...], *, keep_last: bool) -> P
 
 def _keys_at(document: Any, path: Path, schema: Schema) -> set[str]:
     """Return the keys that the schema permits in the table at ``path``."""
+    return {key for node in _nodes_at(document, path, schema) for key in node.get("properties", {})}
+
+
+def _nodes_at(document: Any, path: Path, schema: Schema) -> list[Schema]:
+    """Return what the schema says of the place at ``path``: several alternatives where it permits them."""
     nodes = list(_alternatives(schema, schema, document))
     for step in path:
         document = document[step]
@@ -160,12 +168,15 @@ def _keys_at(document: Any, path: Path, schema: Schema) -> set[str]:
             for child in _children(node, step)
             for alternative in _alternatives(child, schema, document)
         ]
-    return {key for node in nodes for key in node.get("properties", {})}
+    return nodes
 
 
 def _children(node: Schema, step: str | int) -> Iterator[Schema]:
     if isinstance(step, int):
-        if "items" in node:
+        fixed = node.get("prefixItems", ())
+        if step < len(fixed):
+            yield fixed[step]
+        elif "items" in node:
             yield node["items"]
     elif step in node.get("properties", {}):
         yield node["properties"][step]

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from study_app.protocol.table import Table
-from study_app.protocol.texts import Id, Localised
+from study_app.protocol.texts import Id, Localised, Printable
 
 POINTS = 7
 
@@ -15,7 +15,7 @@ POINTS = 7
 class Scale(Table):
     """The seven points of an answer, lowest first."""
 
-    labels: dict[str, Annotated[tuple[str, ...], Field(min_length=POINTS, max_length=POINTS)]] = Field(
+    labels: dict[str, Annotated[tuple[Printable, ...], Field(min_length=POINTS, max_length=POINTS)]] = Field(
         description="Per language the names of the seven points, lowest first."
     )
     cannot_judge: Localised | None = Field(

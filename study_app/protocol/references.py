@@ -5,6 +5,7 @@ These checks read the document itself, so that they also see the sound keys of t
 
 from __future__ import annotations
 
+import unicodedata
 from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
@@ -102,6 +103,34 @@ def items(document: Document) -> Iterator[Fault]:
             message = f'item "{name}" has another text in another questionnaire'
             yield Fault((*path, "id"), message, "give it another id")
         seen.add((path[1], name))
+
+
+def alike(document: Document) -> Iterator[Fault]:
+    """Check that statements of a questionnaire, their short names and the points of a scale differ."""
+    for name in names(document, "questionnaires"):
+        for key in ("text", "short"):
+            yield from _alike(list(entries(document, f"questionnaires.{name}.items.*.{key}")), "item")
+    for path, labels in entries(document, "scales.*.labels.*"):
+        points = [((*path, index), label) for index, label in enumerate(labels if isinstance(labels, tuple) else ())]
+        for _, off in entries(document, f"scales.{path[1]}.cannot_judge"):
+            points.append(((*path[:2], "cannot_judge"), off.get(path[-1]) if isinstance(off, Mapping) else off))
+        yield from _alike(points, "label")
+
+
+def _alike(found: list[tuple[Path, Any]], kind: str) -> Iterator[Fault]:
+    """Yield a fault for every text that reads as an earlier one does; an entry may hold a text per language."""
+    seen: set[tuple[str, str]] = set()
+    for path, entry in found:
+        texts = entry if isinstance(entry, Mapping) else {"": entry}
+        read = {(language, _read(text)) for language, text in texts.items() if isinstance(text, str)}
+        if read & seen:
+            yield Fault(path, f"reads as an earlier {kind} does", "people could not tell the two apart: change one")
+        seen |= read
+
+
+def _read(text: str) -> str:
+    """Return a text as people tell texts apart: not by case, width or white space."""
+    return " ".join(unicodedata.normalize("NFKC", text).casefold().split())
 
 
 def languages(document: Document) -> Iterator[Fault]:

@@ -4,15 +4,41 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
-from typing import Annotated, Literal, Self, TypeAlias
+from typing import Annotated, Final, Literal, NamedTuple, Self, TypeAlias
 
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
+from study_app.haptics.ranges import within
 from study_app.protocol.table import Table
 from study_app.protocol.texts import Localised
 
+Millimetres: TypeAlias = Annotated[float, within(-500, 500, "the tank reaches to 500 mm on either side at most")]
+Seconds: TypeAlias = Annotated[float, within(0.1, 3600, "a hand moves within 0.1 s, no trial takes an hour")]
 Point: TypeAlias = tuple[float, float, float]
+
+SHAKE_HZ: Final = 5.0
+SHAKE_M: Final = 0.03
+"""As quick and as wide as free shaking of a light handle commonly is. [choice]"""
+REACH_S: Final = 0.3
+"""From target to target, as fast as aimed reaches are. [choice]"""
+
+
+class Stroke(NamedTuple):
+    """A straight stroke to and fro: x = A cos 2πft in the hand frame."""
+
+    frequency_hz: float
+    amplitude_m: float
+
+    @property
+    def speed_mps(self) -> float:
+        """The greatest speed [m/s]."""
+        return 2.0 * math.pi * self.frequency_hz * self.amplitude_m
+
+    @property
+    def acceleration_mps2(self) -> float:
+        """The greatest acceleration [m/s²]."""
+        return 2.0 * math.pi * self.frequency_hz * self.speed_mps
 
 
 class Explore(Table):
@@ -20,7 +46,7 @@ class Explore(Table):
 
     kind: Literal["explore"]
     min_s: float = Field(ge=0, le=3600, description="Least time before the participant may go on [s].")
-    max_s: float = Field(gt=0, le=3600, description="Time after which the questionnaire comes by itself [s].")
+    max_s: Seconds = Field(description="Time after which the questionnaire comes by itself [s].")
     instruction: Localised = Field(description="One sentence shown under the tank.")
 
     @model_validator(mode="after")
@@ -42,12 +68,16 @@ class Reach(Table):
     """
 
     kind: Literal["reach"]
-    targets_mm: tuple[Point, ...] = Field(min_length=2, description="Centres of the targets, hand frame [mm].")
-    radius_mm: float = Field(gt=0, le=100, description="Radius of a target [mm].")
+    targets_mm: tuple[tuple[Millimetres, Millimetres, Millimetres], ...] = Field(
+        min_length=2, max_length=100, description="Centres of the targets, hand frame [mm]."
+    )
+    radius_mm: Annotated[float, within(0.5, 100, "a hand at rest trembles by a few tenths of a millimetre")] = Field(
+        description="Radius of a target [mm]."
+    )
     dwell_s: float = Field(ge=0, le=10, description="How long the ball must stay in the lit target [s].")
     count: int | None = Field(default=None, ge=1, le=1000, description="Targets to reach; or give duration_s.")
-    duration_s: float | None = Field(default=None, gt=0, le=3600, description="Length of the task [s]; or give count.")
-    timeout_s: float = Field(default=120, gt=0, le=3600, description="End of the task at the latest [s].")
+    duration_s: Seconds | None = Field(default=None, description="Length of the task [s]; or give count.")
+    timeout_s: Seconds = Field(default=120, description="End of the task at the latest [s].")
     instruction: Localised = Field(description="One sentence shown under the tank.")
 
     @property
@@ -73,6 +103,22 @@ class Reach(Table):
         return self
 
     @model_validator(mode="after")
+    def _time_for_every_target(self) -> Self:
+        limit, targets = self.duration_s or self.timeout_s, self.count or 1
+        if targets * self.dwell_s >= limit:
+            raise PydanticCustomError(
+                "order",
+                "dwell_s = {dwell} in {targets} takes as long as the {limit} s that the task lasts at most: shorten it",
+                {
+                    "dwell": f"{self.dwell_s:g}",
+                    "targets": "a target" if targets == 1 else f"each of {targets} targets",
+                    "limit": f"{limit:g}",
+                    "place": "dwell_s",
+                },
+            )
+        return self
+
+    @model_validator(mode="after")
     def _targets_apart(self) -> Self:
         for index, (one, other) in enumerate(pairwise((*self.targets_mm, self.targets_mm[0])), start=1):
             distance = math.dist(one, other)
@@ -91,3 +137,12 @@ class Reach(Table):
 
 
 Task: TypeAlias = Annotated[Explore | Reach, Field(discriminator="kind")]
+
+
+def fastest_stroke(task: Task, workspace_m: tuple[float, float, float]) -> Stroke:
+    """Return the fastest stroke that a task calls for, in a tank of these extents [m, hand frame]."""
+    if isinstance(task, Explore):
+        return Stroke(SHAKE_HZ, min(SHAKE_M, workspace_m[0] / 2))
+    following = (*task.targets_m[1:], task.targets_m[0])
+    way_m = max(math.dist(*pair) for pair in zip(task.targets_m, following, strict=True))
+    return Stroke(0.5 / REACH_S, way_m / 2)

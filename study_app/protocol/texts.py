@@ -7,13 +7,23 @@ matter: a blank line divides paragraphs, every other run of white space becomes 
 from __future__ import annotations
 
 import re
-from typing import Annotated, Any, TypeAlias
+import unicodedata
+from typing import Annotated, Any, Final, TypeAlias
 
-from pydantic import BeforeValidator, Field, StringConstraints
+from pydantic import AfterValidator, BeforeValidator, Field, StringConstraints
 from pydantic_core import PydanticCustomError
 
-Id: TypeAlias = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]*$")]
+from study_app.haptics.liquid import MAX_ID
+
+Id: TypeAlias = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]*$", max_length=MAX_ID)]
 Language: TypeAlias = Annotated[str, StringConstraints(pattern=r"^[a-z]{2}$")]
+
+MAX_TEXT: Final = 500
+MAX_BODY: Final = 20_000
+UNPRINTABLE: Final = ("Cc", "Cs", "Co", "Cn")  # control, surrogate, private use, unassigned
+VISIBLE: Final = "LNPS"  # letters, numbers, punctuation, symbols
+DIRECTIONS: Final = "\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069"
+"""Characters that change the direction of what follows, and so can make a text read as another one."""
 
 
 def tidy(text: str) -> str:
@@ -23,23 +33,53 @@ def tidy(text: str) -> str:
 
 def _tidy_each(value: Any) -> Any:
     if isinstance(value, str):
-        value = tidy(value)
-        empty = not value
-    elif isinstance(value, dict) and value and all(isinstance(text, str) for text in value.values()):
-        value = {language: tidy(text) for language, text in value.items()}
-        empty = not all(value.values())
-    else:
-        raise PydanticCustomError("text_type", 'a text is a string, or one string per language: {{en = "…", nl = "…"}}')
-    if empty:
-        raise PydanticCustomError("text_empty", "the text is empty")
-    return value
+        return tidy(_printable(value))
+    if isinstance(value, dict) and value and all(isinstance(text, str) for text in value.values()):
+        return {language: tidy(_printable(text)) for language, text in value.items()}
+    raise PydanticCustomError("text_type", 'a text is a string, or one string per language: {{en = "…", nl = "…"}}')
 
 
-Localised: TypeAlias = Annotated[
+def _printable(text: str) -> str:
+    """Return ``text`` if a person can read it: something visible, and nothing that hides or reorders what is there."""
+    for letter in text:
+        if (unicodedata.category(letter) in UNPRINTABLE and letter not in "\t\n\r") or letter in DIRECTIONS:
+            raise PydanticCustomError(
+                "text_unprintable",
+                "holds the character U+{code}, which cannot be printed: take it out",
+                {"code": f"{ord(letter):04X}"},
+            )
+    if not any(unicodedata.category(letter)[0] in VISIBLE for letter in text):
+        raise PydanticCustomError("text_empty", "the text is empty: write one that can be read")
+    return text
+
+
+def _not_longer(most: int) -> AfterValidator:
+    def checked(value: str | dict[str, str]) -> str | dict[str, str]:
+        longest = max(map(len, value.values() if isinstance(value, dict) else (value,)))
+        if longest > most:
+            raise PydanticCustomError(
+                "text_long",
+                "has {longest} characters, more than {most}: shorten it",
+                {"longest": longest, "most": most},
+            )
+        return value
+
+    return AfterValidator(checked)
+
+
+Description: TypeAlias = Annotated[
+    str, AfterValidator(lambda text: _printable(text) if text else text), StringConstraints(max_length=MAX_BODY)
+]
+Printable: TypeAlias = Annotated[str, AfterValidator(_printable), StringConstraints(max_length=MAX_TEXT)]
+_Text: TypeAlias = Annotated[
     str | dict[str, str],
     BeforeValidator(_tidy_each),
     Field(description="A text: one string, or one string per language of the study."),
 ]
+Localised: TypeAlias = Annotated[_Text, _not_longer(MAX_TEXT)]
+"""A title, a statement, a label: what fits on a page beside others."""
+Body: TypeAlias = Annotated[_Text, _not_longer(MAX_BODY)]
+"""What fills a page or several."""
 
 
 def text_in(value: str | dict[str, str], language: str) -> str:

@@ -16,13 +16,13 @@ from study_app.app import preflight
 from study_app.app.preflight import Appraisal, Preflight
 from study_app.errors import DeviceLost
 from study_app.evaluation.appraised import Costs, Errors
-from study_app.evaluation.fastest import Stroke
 from study_app.gui.beginning import Ready
 from study_app.gui.choices import NewSession
 from study_app.gui.theme import LIGHT
 from study_app.haptics.dynamics import UNKNOWN, Dynamics
 from study_app.haptics.telemetry import Timing
 from study_app.protocol.load import load
+from study_app.protocol.tasks import Stroke
 from study_app.session.preflight import Facts, Screen
 
 CHOSEN = NewSession("demo", "P001", 1, 7, "AK", "en", "mouse", True, None, Path("nowhere"))

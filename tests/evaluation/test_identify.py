@@ -232,10 +232,10 @@ def test_ranges_are_those_of_the_scenes_models():
     assert ranges == {
         "drag_coefficient": (0, 10, False, False),
         "wake.length": (1, 100_000, False, True),
-        "scaling": (0, 1e9, True, False),
-        "decay": (0, 1, True, False),
-        "body.density_kg_m3": (0, 25_000, True, False),
-        "density_kg_m3": (0, 25_000, True, False),
+        "scaling": (1, 1e9, False, False),
+        "decay": (0.5, 1, False, False),
+        "body.density_kg_m3": (0.01, 25_000, False, False),
+        "density_kg_m3": (0.01, 25_000, False, False),
     }
     assert (found["body.density_kg_m3"].table, found["density_kg_m3"].table) == ("body", "liquid")
 
@@ -301,11 +301,12 @@ def test_effects_left_to_choice_are_chosen_once_and_named():
     assert found.values["density_kg_m3"] == pytest.approx(900)
 
 
-def test_what_has_no_greatest_value_is_searched_within_finite_numbers():
+def test_every_number_has_a_range_to_be_searched_in():
     tail = LocalWake(length=300, scaling=400)
-    liquid = Liquid(id="tank", density_kg_m3=1000, effects=("drag", "local_wake"), local_wake=tail)
-    (reach,) = parameters.find(Scene(liquids=(liquid,)), "tank", ["reach_m"])
-    least, most = search.u_range(reach)
-    assert reach.most == math.inf
-    assert search.coordinate(reach).to_value(most) == pytest.approx(1e6 * reach.value)
-    assert least < most < math.inf
+    liquid = Liquid(
+        id="tank", density_kg_m3=1000, viscosity_pa_s=1, effects=("drag", "local_wake", "history"), local_wake=tail
+    )
+    names = ["reach_m", "viscosity_pa_s", "density_kg_m3", "scaling", "exponent", "spreading_m2ps", "drag_coefficient"]
+    for found in parameters.find(Scene(liquids=(liquid,)), "tank", names):
+        least, most = search.u_range(found)
+        assert -math.inf < least < most < math.inf

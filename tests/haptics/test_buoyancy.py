@@ -30,7 +30,7 @@ def test_the_displaced_weight_less_the_own(density, own, diameter):
 
 
 def test_in_water_a_ball_of_68_mm_is_carried_by_a_newton_and_a_half():
-    light = scene(floating(998.2), body=Body(density_kg_m3=1e-9))
+    light = scene(floating(998.2), body=Body(density_kg_m3=0.01))
     assert simulate(light, moving([(0, 0, 0)])).fy_n[0] == pytest.approx(1.61, abs=0.005)
 
 

@@ -35,7 +35,7 @@ LIQUIDS = {
 }
 VOLUME_M3 = math.pi * 0.068**3 / 6
 STROKE_M = 0.04
-HOLLOW = Body(density_kg_m3=1e-3)
+HOLLOW = Body(density_kg_m3=0.01)
 
 
 def stirred(name, speed_mps, *, body=HOLLOW, **fields):

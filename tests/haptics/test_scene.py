@@ -34,7 +34,7 @@ def test_a_scene_never_changes():
         ({"effects": ("drag", "drag")}, "twice"),
         ({"effects": ("drag", "magnet")}, "'drag', 'wake', 'local_wake'"),
         ({"density_kg_m3": float("nan")}, "finite"),
-        ({"density_kg_m3": 0}, "greater than 0"),
+        ({"density_kg_m3": 0}, "greater than or equal to 0.01"),
         ({"viscosity": 1}, "Extra inputs are not permitted"),
         ({"effects": ("drag", "local_wake")}, "its table"),
         ({"effects": ("drag", "current")}, 'kind = "uniform", "channel" or "vortex"'),
@@ -47,7 +47,7 @@ def test_a_scene_never_changes():
         ({"effects": "automatic"}, "'auto'"),
         ({"id": "a-b"}, "should match pattern"),
         ({"region": {"kind": "sphere"}}, "'everywhere', 'box', 'cylinder'"),
-        ({"region": {"kind": "box", "size_m": (1, 0, 1)}}, "greater than 0"),
+        ({"region": {"kind": "box", "size_m": (1, 0, 1)}}, "greater than or equal to 0.001"),
     ],
 )
 def test_a_liquid_that_makes_no_sense_is_refused_with_a_reason(fields, message):

@@ -161,7 +161,7 @@ short = { en = "Icy", nl = "IJzig" }
 """
 
 MANY_LIQUIDS = (
-    "".join(f"[liquids.extra_{number}]\ndensity_kg_m3 = 1000\n" for number in range(9))
+    "".join(f"[liquids.extra_{number}]\ndensity_kg_m3 = {900 + number}\n" for number in range(9))
     + "[conditions.crowd]\n"
     + f"liquids = {[f'extra_{number}' for number in range(9)]}\n".replace("'", '"')
 )
@@ -250,9 +250,9 @@ CASES = (
     case("force limit", "force_limit_n = 8", "force_limit_n = 9",
          ("force_limit_n", "device.force_limit_n", "is 9, must be at most 8")),
     case("no force", "force_limit_n = 8", "force_limit_n = 0",
-         ("force_limit_n", "device.force_limit_n", "is 0, must be more than 0")),
+         ("force_limit_n", "device.force_limit_n", "is 0, must be at least 0.1")),
     case("density", "density_kg_m3 = 1400", "density_kg_m3 = -1",
-         ("density_kg_m3 = -1", "liquids.thick.density_kg_m3", "is -1, must be more than 0")),
+         ("density_kg_m3 = -1", "liquids.thick.density_kg_m3", "is -1, must be at least 0.01 (hydrogen has")),
     case("word not permitted", 'order = "shuffled"\nrepetitions', 'order = "shufled"\nrepetitions',
          ("shufled", "blocks.feel.order", '"williams" or "latin" (did you mean "shuffled"?)')),
     case("unknown kind of task", 'kind = "explore"', 'kind = "wander"',
@@ -415,7 +415,7 @@ CASES = (
     case("label of no name", "delay_ms = 120", 'delay_ms = 120\nlabel = "cold"',
          ('label = "cold"', "conditions.both.label", '"cold" is not among analysis.names')),
     case("bound of nothing", "[pages.hello]", DECIDED.replace("names", "equivalence_bound = 0\nnames") +
-         "[pages.hello]", ("equivalence_bound", "analysis.equivalence_bound", "is 0, must be more than 0")),
+         "[pages.hello]", ("equivalence_bound", "analysis.equivalence_bound", "is 0, must be at least 0.05")),
     # several at once
     Case(
         "all at once",

@@ -87,7 +87,7 @@ def test_what_only_some_protocols_have():
             ('[conditions.apart]\nliquid = "other"', '[conditions.practised]\nliquid = "syrup"'),
             (
                 "[liquids.other]",
-                "[liquids.spare]\ndensity_kg_m3 = 900\n[liquids.syrup]\ndensity_kg_m3 = 900\n[liquids.other]",
+                "[liquids.spare]\ndensity_kg_m3 = 950\n[liquids.syrup]\ndensity_kg_m3 = 900\n[liquids.other]",
             ),
         )
     )
@@ -139,7 +139,7 @@ def test_the_expected_duration_counts_every_trial():
 
 
 def test_a_task_never_lasts_longer_than_its_timeout():
-    long = edited(("count = 4", "count = 400"))
+    long = edited(("count = 4", "count = 100"))
     short = edited(("count = 4", "count = 4"))
     assert expected_duration_s(long) - expected_duration_s(short) == pytest.approx(2 * (60 - 4 * 2))
 

@@ -221,7 +221,7 @@ def slowly(task: Reach, rows: Any) -> tuple[list[tuple[int, int]], Any]:
 @given(
     st.lists(st.tuples(st.integers(1, 40), st.sampled_from([LEFT, RIGHT, AWAY])), min_size=1, max_size=40),
     st.sampled_from([0.0, 0.001, 0.013, 0.02]),
-    st.sampled_from([1, 2, 5, 20]),
+    st.sampled_from([1, 2, 5, 14]),
     st.lists(st.integers(1, 60), max_size=30),
 )
 def test_however_the_samples_are_cut_the_result_is_that_of_one_at_a_time(

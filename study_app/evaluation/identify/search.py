@@ -23,7 +23,6 @@ from study_app.haptics.motion import Floats
 from study_app.haptics.offline import simulate
 from study_app.haptics.scene import Scene
 
-_FURTHEST: Final = 1e6
 _LEAST_POSITIVE: Final = 1e-12
 _HIGHEST_EXPONENT: Final = 700.0
 _SHORTEST_START: Final = 5
@@ -65,17 +64,13 @@ def coordinate(parameter: Parameter) -> Coordinate:
 
 
 def u_range(parameter: Parameter) -> tuple[float, float]:
-    """Return the least and the greatest u that the parameter's own model permits.
-
-    What has no greatest value and is searched by its logarithm grows to a million times what it was, and no further.
-    """
+    """Return the least and the greatest u that the parameter's own model permits."""
     it = coordinate(parameter)
     if it is _RATE:
         return 0.0, 1e3
     if it is _LINEAR:
         return parameter.least, parameter.most
-    least = max(parameter.least, _LEAST_POSITIVE)
-    return it.to_u(least), it.to_u(min(parameter.most, _FURTHEST * max(parameter.value, least)))
+    return it.to_u(max(parameter.least, _LEAST_POSITIVE)), it.to_u(parameter.most)
 
 
 class Problem:

@@ -1,0 +1,31 @@
+"""Ranges of numbers that a file may give, each with its reason, which the message about a number beyond it repeats."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Final, TypeAlias
+
+from pydantic import Field
+
+REASON: Final = "reason"
+"""Where the JSON Schema of a number keeps why its range is what it is."""
+
+
+def within(least: float, most: float, why: str) -> Any:
+    """Return the annotation of a number from ``least`` to ``most``, both included."""
+    return Field(ge=least, le=most, json_schema_extra={REASON: why})
+
+
+Coordinate: TypeAlias = Annotated[float, within(-1000, 1000, "a scene is at most 1 km wide")]
+Extent: TypeAlias = Annotated[float, within(1e-3, 1000, "from 1 mm, below what a hand resolves, to 1 km")]
+Metres: TypeAlias = tuple[Coordinate, Coordinate, Coordinate]
+Flow: TypeAlias = Annotated[float, within(-100, 100, "no liquid flows faster than 100 m/s where a hand can be")]
+DensityKgM3: TypeAlias = Annotated[
+    float, within(0.01, 25_000, "hydrogen has 0.08 kg/m³, osmium, the densest element, 22 590")
+]
+ViscosityPaS: TypeAlias = Annotated[float, within(1e-6, 1e6, "gases have 1e-5 Pa·s, honey 10, tar 100")]
+DiameterM: TypeAlias = Annotated[float, within(1e-3, 1, "the ball is moved by a hand")]
+DragCoefficient: TypeAlias = Annotated[float, within(0, 10, "a wing has 0.04, a sphere 0.47, a plate 1.2")]
+Alpha: TypeAlias = Annotated[float, within(0.001, 1, "at 0.001 the velocity lags the hand by 1 s; 1 does not smooth")]
+ForceLimitN: TypeAlias = Annotated[float, within(0.1, 20, "below 0.1 N a hand feels little, above 20 N it may be hurt")]
+Decay: TypeAlias = Annotated[float, within(0.5, 1, "the share left after 1 ms: at 0.5 nothing is left after 10 ms")]
+Exponent: TypeAlias = Annotated[float, within(0.05, 10, "beyond, a wake is full at once, or never begins")]
