@@ -7,6 +7,7 @@ runs as fast as it computes. Both have what the loop takes: ``now``, ``sleep`` (
 from __future__ import annotations
 
 import sys
+import time
 from functools import cache
 from typing import Any, Protocol
 
@@ -45,6 +46,10 @@ class Clock(Protocol):
         """Return the time [ns]."""
         ...
 
+    def suspended_ns(self) -> int:
+        """Return how long this clock stood still while the machine was suspended, since its start [ns]."""
+        ...
+
 
 class SystemClock:
     """The monotonic clock of the machine, whose origin is the machine's own (often its start).
@@ -74,6 +79,20 @@ class SystemClock:
         """Return the time [ns]."""
         return int(self.now.ctypes(self.context))
 
+    def suspended_ns(self) -> int:
+        """Return how long the machine was suspended since its start [ns], at most a little too much.
+
+        The loop sleeps on CLOCK_MONOTONIC of Linux and ``mach_absolute_time`` of macOS, which stand still meanwhile: no
+        tick is late after a suspension. CLOCK_BOOTTIME and ``mach_continuous_time`` go on, so the difference is the
+        suspension. The counter of Windows goes on by itself: there a suspension is a late tick, and this is 0.
+        """
+        if sys.platform == "linux":
+            return _ahead_ns(time.CLOCK_BOOTTIME, time.CLOCK_MONOTONIC)
+        elif sys.platform == "darwin":
+            return _ahead_ns(time.CLOCK_MONOTONIC_RAW, time.CLOCK_UPTIME_RAW)
+        else:
+            return 0
+
     @property
     def spun_ns(self) -> int:
         """How long all sleeps together looked at the clock instead of sleeping [ns]."""
@@ -81,11 +100,15 @@ class SystemClock:
 
 
 class VirtualClock:
-    """A clock that stands still but for sleeps: each sets it to its deadline at once."""
+    """A clock that stands still but for sleeps: each sets it to its deadline at once.
+
+    ``suspension_ns`` is how long the machine is said to have been suspended.
+    """
 
     runs = False
 
     def __init__(self, start_ns: int = 0) -> None:
+        self.suspension_ns = 0
         self._memory = records(VIRTUAL, 1)
         self._memory[0].now_ns = start_ns
         self.now, self.sleep = _virtual_functions()
@@ -94,6 +117,10 @@ class VirtualClock:
     def now_ns(self) -> int:
         """Return the time [ns]."""
         return int(self._memory[0].now_ns)
+
+    def suspended_ns(self) -> int:
+        """Return ``suspension_ns``."""
+        return self.suspension_ns
 
 
 def raise_priority(blocks: Blocks = (), *, real_time: bool = True) -> Grant:
@@ -108,6 +135,13 @@ def raise_priority(blocks: Blocks = (), *, real_time: bool = True) -> Grant:
     if not (blocks and real_time):
         return grant
     return grant.with_memory(locked=platform.lock_memory(blocks), advice=platform.MEMORY)
+
+
+if sys.platform != "win32":
+
+    def _ahead_ns(clock: int, of: int) -> int:
+        """Return how far a clock is ahead of another [ns]: the least of several readings, one may be interrupted."""
+        return min(-time.clock_gettime_ns(of) + time.clock_gettime_ns(clock) for _ in range(3))
 
 
 @cache

@@ -40,6 +40,8 @@ CONTROL = np.dtype(
         ("deadline_ns", np.int64),  # when the next turn is due
         ("turns", np.int64),  # how many were taken
         ("overruns", np.int64),  # deadlines passed over because a turn did not fit
+        ("began_ns", np.int64),  # when the last tick began
+        ("worst_gap_ns", np.int64),  # the longest time between two ticks since the scene in force was handed over
         ("status", np.int64),  # STATUS_* of the last turn; any but STATUS_OK ended the loop
     ],
     align=True,
@@ -107,6 +109,8 @@ def run(control: Any, slots: Any, safety: Any, exchanged: Any, output: Any, devi
         if sample.buttons & BUTTON_STOP:
             host.stop = 1
         _take_scene(host, slots, safety[0], sample)
+        host.worst_gap_ns = max(host.worst_gap_ns, began_ns - host.began_ns)
+        host.began_ns = began_ns
         if sample.status == STATUS_OK:
             safety[0].stop = host.stop
             if host.taken % 2 == 0:
@@ -187,6 +191,7 @@ def _take_scene(host: Any, slots: Any, safety: Any, sample: Any) -> None:
     """Take the scene that was handed over last, if it is another one; or its numbers, with which it goes on."""
     request, numbers = host.request, host.numbers
     if request != host.taken:
+        host.worst_gap_ns = 0  # before the host sees that the scene was taken
         fence()
         host.taken = request
         begin_scene(safety)

@@ -177,6 +177,11 @@ class Servo:
         """How many deadlines were passed over because a turn did not fit."""
         return int(self._loop.control[0].overruns)
 
+    @property
+    def worst_gap_s(self) -> float:
+        """The longest time between two ticks since the newest scene was loaded, up to now [s]: a suspension counts."""
+        return self._loop.worst_gap_ns * 1e-9
+
     def check(self) -> None:
         """Raise ``DeviceLost`` or ``ServoFault`` if the servo has stopped itself."""
         fault = self.fault

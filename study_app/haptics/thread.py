@@ -38,7 +38,9 @@ from study_app.haptics.telemetry import Telemetry
 
 _FOREVER = -1
 _PATIENCE_S = 2.0  # for a loop that was told to end; it takes one turn
-_STUCK_NS = 75_000_000  # a turn late by this may never come: seen with the next frame, it is known within 100 ms
+_STUCK_NS = 75_000_000  # a tick late by this may never come: seen with the next frame, it is known within 100 ms
+_SUSPENDED_NS = 100_000_000  # less is the error of two clocks that are read one after the other
+_THAW_S = 0.25  # within which a loop goes on that stood still with the whole process
 
 
 class LoopThread:
@@ -72,6 +74,8 @@ class LoopThread:
         self._rest = rest
         self._real_time = real_time
         self._rate_hz = rest.rate_hz
+        self._suspended_ns = clock.suspended_ns()
+        self._stuck_at = -1  # the count of turns at which it was found stuck
         self._safety = self._new_safety()
         self._slots = (pack(rest, capacity=elements), pack(rest, capacity=elements))
         self._output = Output(telemetry.ring, telemetry.written)
@@ -94,9 +98,40 @@ class LoopThread:
 
     @property
     def stuck(self) -> bool:
-        """Whether the turn that is due, or under way, has been so for so long that something hangs."""
+        """Whether the tick that is due, or under way, has been so for so long that something hangs.
+
+        Where the whole process stood still, whoever asks may run before the loop: then the loop gets time to go on.
+        """
+        turns = int(self.control[0].turns)
+        late_ns = self._late_ns
+        if late_ns <= _STUCK_NS or turns == self._stuck_at:
+            return late_ns > _STUCK_NS
+        until_s = time.monotonic() + (_THAW_S if late_ns > 2 * _STUCK_NS else 0.0)
+        while self._late_ns > _STUCK_NS:
+            if time.monotonic() >= until_s:
+                self._stuck_at = turns
+                return True
+            time.sleep(1e-3)
+        return False
+
+    @property
+    def _late_ns(self) -> int:
+        """How long a tick is due while the loop runs [ns]."""
         running = self.thread is not None and self.live and self.control[0].run != 0
-        return bool(running and self.clock.now_ns() - int(self.control[0].deadline_ns) > _STUCK_NS)
+        return self.clock.now_ns() - int(self.control[0].deadline_ns) if running else 0
+
+    @property
+    def worst_gap_ns(self) -> int:
+        """The longest time between two ticks since the newest scene was handed over, up to now [ns].
+
+        The loop keeps it itself, whatever telemetry lost. The time that the machine was suspended counts, during which
+        the loop's clock stands still (`Clock.suspended_ns`).
+        """
+        host = self.control[0]
+        now_ns = self.clock.now_ns() - int(host.began_ns)
+        kept_ns = int(host.worst_gap_ns) if host.taken == host.request else 0
+        suspended_ns = self.clock.suspended_ns() - self._suspended_ns
+        return max(now_ns, kept_ns, suspended_ns if suspended_ns > _SUSPENDED_NS else 0)
 
     def start(self) -> None:
         """Turn in a thread of its own until `end`; until then Ctrl-Z does not stop it with its force on."""
@@ -126,6 +161,8 @@ class LoopThread:
             time.sleep(host.period_ns * 1e-9)
         spare = (int(host.request) + 1) % 2
         pack_into(self._slots[spare], scene, dynamics=self._driver.dynamics)
+        if not goes_on:
+            self._suspended_ns = self.clock.suspended_ns()
         (offer_numbers if goes_on else offer_scene)(self.control, spare, serial)
 
     @property
@@ -192,14 +229,16 @@ class LoopThread:
         self._safety[0] = self._new_safety()[0]
         host = self.control[0]
         host.status = STATUS_OK
-        host.deadline_ns = self.clock.now_ns() + host.period_ns
+        host.began_ns = self.clock.now_ns()
+        host.deadline_ns = host.began_ns + host.period_ns
         host.run = 1
         self.live = True
 
     def _turn(self, ready: threading.Event) -> None:
         try:
             self.grant = raise_priority(self._blocks(), real_time=self._real_time)
-            self.control[0].deadline_ns = self.clock.now_ns() + int(self.control[0].period_ns)
+            self.control[0].began_ns = self.clock.now_ns()
+            self.control[0].deadline_ns = self.control[0].began_ns + self.control[0].period_ns
         finally:
             ready.set()
         try:

@@ -66,7 +66,7 @@ class Submitted:
 
 @dataclass(frozen=True, slots=True)
 class PauseAsked:
-    """Esc, the operator's pause, or the program's when it is ended from outside."""
+    """Esc, the operator's pause, or the program's when it is ended from outside or stood still."""
 
     at_s: float
     by: Literal["participant", "operator", "program"]

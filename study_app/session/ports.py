@@ -20,6 +20,8 @@ class ServoPort(Protocol):
 
     @property
     def fault(self) -> str | None: ...  # noqa: D102
+    @property
+    def worst_gap_s(self) -> float: ...  # noqa: D102
     def load(self, scene: Scene) -> int: ...  # noqa: D102
     def rest(self) -> None: ...  # noqa: D102
     def stop_force(self) -> None: ...  # noqa: D102

@@ -7,6 +7,8 @@ it in one thread; a window that answers a page while it is being presented is he
 A trial begins with the first ``frame_shown`` after its page was presented: then its force fades in, its task's clock
 starts and its recording begins (see ``trial``).
 
+Where the program or the machine stood still within a trial, the session pauses, and the trial comes again.
+
 Where the disk takes nothing, the session stalls: zero force, a calm page, and what was to be done is kept and tried
 again until it is done, in order and once. Then the session is paused, and goes on when somebody asks for it.
 """
@@ -38,7 +40,7 @@ from study_app.session.commands import (
     Write,
     WriteTables,
 )
-from study_app.session.events import Broke, Continue, EndAsked, Event, ForceStopped, TaskDone
+from study_app.session.events import Broke, Continue, EndAsked, Event, ForceStopped, PauseAsked, TaskDone
 from study_app.session.machine import advance, open_session
 from study_app.session.ports import Ports
 from study_app.session.recording import Recording
@@ -166,7 +168,9 @@ class Runner:
             self._hear_buttons(samples)
             self._follow(samples)
         running = self._running
-        if running is not None and (outcome := running.outcome()) is not None:
+        if running is not None and running.frozen:
+            self.post(PauseAsked(self._ports.clock(), "program"))
+        elif running is not None and (outcome := running.outcome()) is not None:
             self.post(TaskDone(self._ports.clock(), outcome, running.summary()))
 
     def view(self, now_ns: int) -> TankView | None:

@@ -77,14 +77,28 @@ class TrialStatistics:
         self._painted_ns = painted_ns
         self._ages_ns.append(painted_ns - shown_ns)
 
-    def summary(self, samples_dropped: int) -> dict[str, Any]:
-        """Return the measured columns of the trial row, to six decimals; None where nothing was measured."""
+    def frame_gap_ns(self, until_ns: int) -> int:
+        """Return the longest time that a frame stood, the newest one until a moment [ns]; 0 before the second frame.
+
+        Whoever paints no second frame has no window: only a trial's beginning is reported then.
+        """
+        return max(self._frame_gap_ns, until_ns - self._painted_ns) if len(self._ages_ns) > 1 else 0
+
+    def summary(self, *, samples_dropped: int, worst_gap_s: float, until_ns: int) -> dict[str, Any]:
+        """Return the measured columns of the trial row, to six decimals; None where nothing was measured.
+
+        Parameters
+        ----------
+        samples_dropped : how many samples of the trial nobody read
+        worst_gap_s : the longest time between two ticks, as the servo kept it
+        until_ns : when the trial ended: until then the last frame stood [ns]
+        """
         return {
             name: round(value, 6) if isinstance(value, float) else value
-            for name, value in self._columns(samples_dropped).items()
+            for name, value in self._columns(samples_dropped, worst_gap_s, until_ns).items()
         }
 
-    def _columns(self, samples_dropped: int) -> dict[str, Any]:
+    def _columns(self, samples_dropped: int, worst_gap_s: float, until_ns: int) -> dict[str, Any]:
         times = np.concatenate([np.empty(0, _TIMES), *self._times]).view(np.recarray)
         timed = timing(times, self._rate_hz)
         ticks = timed.ticks
@@ -93,7 +107,7 @@ class TrialStatistics:
             "ticks": ticks,
             "tick_rate_hz": timed.rate_hz if ticks > 1 else None,
             "lateness_p99_ms": timed.lateness_p99_s * 1e3 if ticks else None,
-            "worst_gap_ms": timed.worst_gap_s * 1e3 if ticks > 1 else None,
+            "worst_gap_ms": worst_gap_s * 1e3 if ticks else None,
             "overruns": timed.overruns,
             "samples_dropped": samples_dropped,
             "path_length_m": self._path_m,
@@ -104,7 +118,7 @@ class TrialStatistics:
             "loop_delay_ticks": self._most_delay_ticks if ticks else None,
             "loop_delay_changes": self._delay_changes if ticks else None,
             **{f"limiter_{name}": int(count) for name, count in zip(LIMITER_NAMES, self._limited, strict=True)},
-            **self._frames(),
+            **self._frames(until_ns),
         }
 
     def _move(self, positions: NDArray[np.float64]) -> None:
@@ -126,7 +140,7 @@ class TrialStatistics:
         self._most_delay_ticks = max(self._most_delay_ticks, int(delay_ticks.max()))
         self._delay_ticks = int(delay_ticks[-1])
 
-    def _frames(self) -> dict[str, Any]:
+    def _frames(self, until_ns: int) -> dict[str, Any]:
         errors_s = np.asarray(self._ages_ns, np.float64) * 1e-9 - self._delay_s
         seen = errors_s.size > 0
         return {
@@ -136,5 +150,5 @@ class TrialStatistics:
             "delay_error_p95_ms": float(np.percentile(errors_s, 95)) * 1e3 if seen else None,
             "delay_error_max_ms": float(errors_s.max()) * 1e3 if seen else None,
             "first_frame_gap_ms": self._first_gap_ns * 1e-6 if seen else None,
-            "worst_frame_gap_ms": self._frame_gap_ns * 1e-6 if errors_s.size > 1 else None,
+            "worst_frame_gap_ms": self.frame_gap_ns(until_ns) * 1e-6 if errors_s.size > 1 else None,
         }

@@ -25,6 +25,9 @@ from study_app.session.tasks import Outcome, TargetReached, TaskView, track
 # delay, and the error of the delay would tell such trials from all others. Two ticks at 1 kHz.
 SETTLED_S = 0.002
 
+FROZEN_S = 1.0
+"""A tick or a frame that does not come for longer ends the attempt: no limit of a study permits more. [choice]"""
+
 
 @dataclass(frozen=True, slots=True)
 class TankView:
@@ -112,7 +115,26 @@ class RunningTrial:
             return None
         return self._tracker.outcome
 
+    @property
+    def frozen(self) -> bool:
+        """Whether the program or the machine stood still for so long that nobody felt or saw the trial as it is.
+
+        Telemetry cannot tell: it knows no tick that did not come. The servo does, and the frames say it of the window.
+        """
+        if self._serial is None:
+            return False
+        gap_s = max(self._servo.worst_gap_s, self._statistics.frame_gap_ns(self._until_ns) * 1e-9)
+        return gap_s > FROZEN_S
+
+    @property
+    def _until_ns(self) -> int:
+        """When the task ended, or now [ns, servo's clock]."""
+        return self._servo.now_ns() if self._tracker.end_ns is None else self._tracker.end_ns
+
     def summary(self) -> dict[str, Any]:
         """Return what its row records until now (``store.columns``)."""
-        dropped = 0 if self._serial is None else self._reader.dropped - self._dropped_before
-        return self._tracker.summary() | self._statistics.summary(dropped)
+        return self._tracker.summary() | self._statistics.summary(
+            samples_dropped=0 if self._serial is None else self._reader.dropped - self._dropped_before,
+            worst_gap_s=self._servo.worst_gap_s,
+            until_ns=self._until_ns,
+        )

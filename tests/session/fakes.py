@@ -40,6 +40,7 @@ class FakeServo:
     """Its time is that of the last sample; ``run`` makes samples at 1 kHz under the scene loaded."""
 
     rate_hz = 1000.0
+    worst_gap_s = 0.001
 
     def __init__(self, log: list[Any]) -> None:
         self.telemetry = FakeTelemetry()

@@ -150,6 +150,73 @@ def test_a_task_is_followed_on_the_device_and_drawn_from_its_history(bench: Benc
     assert row["limiter_stop"] == 0
 
 
+def late(bench: Bench, clock: VirtualClock) -> None:
+    clock._memory[0].now_ns += 5_000_000_000  # the process was stopped
+
+
+def late_before_the_first_tick(bench: Bench, clock: VirtualClock) -> None:
+    bench.runner.post(RepeatAsked(bench.clock(), "once more"))
+    clock._memory[0].now_ns += 5_000_000_000  # between the first painted frame and the first tick of the scene
+
+
+def late_where_nobody_reads(bench: Bench, clock: VirtualClock) -> None:
+    bench.servo.advance(10)
+    clock._memory[0].now_ns += 5_000_000_000
+    bench.servo.advance(40_000)  # all that telemetry held of it is overwritten
+
+
+def suspended(bench: Bench, clock: VirtualClock) -> None:
+    clock.suspension_ns += 5_000_000_000  # the loop's own clock stood still meanwhile
+
+
+@pytest.mark.parametrize("freeze", [late, late_before_the_first_tick, late_where_nobody_reads, suspended])
+def test_a_freeze_within_a_trial_interrupts_it_and_it_comes_again(bench: Bench, freeze: Any) -> None:
+    clock = bench.servo._loop.clock
+    assert isinstance(clock, VirtualClock)
+    bench.run(800)
+    freeze(bench, clock)
+    bench.run(16)
+    assert bench.runner.state.phase is Phase.PAUSED
+    assert bench.journal.of("paused")[-1]["by"] == "program"
+    row = bench.journal.of("trial_ended")[-1]
+    assert (row["trial"], row["outcome"]) == (1, "interrupted")
+    assert row["worst_gap_ms"] == pytest.approx(5000, abs=2)
+    bench.run(500)
+    bench.runner.post(ResumeAsked(bench.clock(), "participant"))
+    bench.run(3500)
+    row = bench.journal.of("trial_ended")[-1]
+    assert (row["trial"], row["attempt"], row["outcome"]) == (
+        1,
+        bench.journal.of("trial_started")[-2]["attempt"],
+        "complete",
+    )
+    assert row["worst_gap_ms"] == pytest.approx(1)
+
+
+def test_a_freeze_while_a_page_is_read_interrupts_nothing(bench: Bench) -> None:
+    clock = bench.servo._loop.clock
+    assert isinstance(clock, VirtualClock)
+    bench.runner.post(PauseAsked(bench.clock(), "participant"))
+    bench.run(100)
+    clock._memory[0].now_ns += 5_000_000_000
+    clock.suspension_ns += 5_000_000_000
+    bench.run(100)
+    bench.runner.post(ResumeAsked(bench.clock(), "participant"))
+    bench.run(3500)
+    assert bench.journal.of("trial_ended")[-1]["outcome"] == "complete"
+
+
+def test_a_window_that_paints_nothing_for_the_rest_of_a_trial_has_it_interrupted(bench: Bench) -> None:
+    for _ in range(20):
+        bench.run(16)
+        bench.runner.frame_shown(bench.servo.now_ns(), bench.servo.now_ns())
+    bench.run(5000)  # the task's time is over meanwhile
+    row = bench.journal.of("trial_ended")[-1]
+    assert row["outcome"] == "interrupted"
+    assert row["worst_frame_gap_ms"] == pytest.approx(3000 - 320, abs=20)
+    assert row["worst_gap_ms"] == pytest.approx(1)
+
+
 class Judged:
     """A whole practice trial on the real servo, kept in a real session: what its row says of it."""
 

@@ -22,6 +22,7 @@ class World:
         self.force_is_on = True
         self.overruns = 0
         self.rate_hz = 1000.0
+        self.worst_gap_s = 0.001
         self.full = False
         self.broken_clock = False
         self.fingerprint = ""

@@ -1,0 +1,59 @@
+"""A program that stands still within a trial: the trial is interrupted, its row says why, and it comes again."""
+
+from __future__ import annotations
+
+import csv
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from study_app.store import journal
+from study_app.store.layout import StudyFolder
+from study_app.store.verify import verify
+from tests.compiled import needs_servo
+
+FROZEN_S = 1.5
+
+pytestmark = [
+    needs_servo,
+    pytest.mark.skipif(not hasattr(signal, "SIGSTOP"), reason="needs a system that stops processes"),
+]
+
+
+def held_with_a_freeze(folder: Path) -> None:
+    """Hold a session that stops itself in its first trial; let it go on after a while."""
+    program = subprocess.Popen(
+        [sys.executable, "-m", "tests.faults.frozen", str(folder)],
+        cwd=Path(__file__).parents[2],
+        env=os.environ | {"QT_QPA_PLATFORM": "offscreen"},
+    )
+    try:
+        _, status = os.waitpid(program.pid, os.WUNTRACED)
+        assert os.WIFSTOPPED(status), status
+        time.sleep(FROZEN_S)
+        program.send_signal(signal.SIGCONT)
+        assert program.wait(150) == 0
+    finally:
+        program.kill()
+        program.wait()
+
+
+def test_a_process_that_is_stopped_in_a_trial_has_it_interrupted_and_presents_it_again(tmp_path: Path) -> None:
+    held_with_a_freeze(tmp_path)
+    (session,) = StudyFolder(tmp_path / "results").sessions()
+    lines = journal.read(session.journal)
+    assert [line["by"] for line in lines if line["event"] == "paused"] == ["program"]
+    assert not any(line["event"] == "broke" for line in lines)
+    with session.table("demo", "trials").open(newline="", encoding="utf-8") as file:
+        frozen, again = csv.DictReader(file)
+    assert (frozen["trial"], frozen["attempt"], frozen["outcome"]) == ("1", "1", "interrupted")
+    assert float(frozen["worst_gap_ms"]) > 1000 * FROZEN_S
+    assert frozen["valid"] == "false"
+    assert (again["trial"], again["attempt"], again["outcome"]) == ("1", "2", "complete")
+    assert float(again["worst_gap_ms"]) < 1000
+    assert verify(tmp_path / "results").errors == ()
