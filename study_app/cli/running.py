@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 from click.core import ParameterSource
 
-from study_app.cli.words import FILE, RESULTS, SESSION
+from study_app.cli.words import FILE, RESULTS, SESSION, Target
 
 SEED = click.IntRange(0, 2**31 - 1)
 WINDOWED = click.option("--windowed", is_flag=True, help="Show the participant's window in a frame, not full-screen.")
@@ -128,7 +128,7 @@ def run(
 )
 @click.option(
     "--results",
-    type=click.Path(path_type=Path),
+    type=Target(),
     metavar="DIR",
     help="Study folder; default a new results/<study>-rehearsal-1.",
 )

@@ -8,14 +8,14 @@ from pathlib import Path
 
 import click
 
-from study_app.cli.words import EXIT_FOUND
+from study_app.cli.words import EXIT_FOUND, Target
 
 
 @click.command("validate-report")
 @click.option("--studies", type=click.IntRange(1, 1_000_000), default=1000, show_default=True, help="Of each cell.")
 @click.option("--jobs", type=click.IntRange(-1), default=-1, metavar="N", help="At once; default: one a core.")
 @click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True)
-@click.option("--to", type=click.Path(path_type=Path), metavar="DIR", help="Folder for rates.md and rates.csv.")
+@click.option("--to", type=Target(), metavar="DIR", help="Folder for rates.md and rates.csv.")
 def validate_report(studies: int, jobs: int, seed: int, to: Path | None) -> None:
     """Simulate empty, partially empty and full studies, and say how often the report's verdicts are wrong.
 

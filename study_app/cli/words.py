@@ -29,7 +29,7 @@ class Target(click.Path):
 SESSION = click.argument("session", type=click.Path(path_type=Path))
 RESULTS = click.option(
     "--results",
-    type=click.Path(path_type=Path),
+    type=Target(),
     metavar="DIR",
     help="Study folder; default results/<study>.",
 )

@@ -123,9 +123,16 @@ def write(path: Path, table: np.recarray[Any, Any]) -> None:
     Raises
     ------
     StudyError
-        The file cannot be written; one that was there is untouched.
+        A number is not finite, or the file cannot be written; one that was there is untouched.
     """
     names = table.dtype.names or ()
+    for name in names:
+        if not (finite := np.isfinite(table[name])).all():
+            row = int(np.argmin(finite))
+            raise StudyError(
+                f"{path} is not written: {name} is {table[name][row]} in row {row + 1}; it must be finite: "
+                "lower places, speeds or parameters"
+            )
     unfinished = path.with_name(f".{path.name}.{os.getpid()}.unfinished")
     try:
         with unfinished.open("x", newline="", encoding="utf-8") as file:
