@@ -37,7 +37,8 @@ class Block(Table):
     )
     replicates: bool = Field(
         default=False,
-        description="Whether equal conditions of the block are meant: they are analysed as presentations of one.",
+        description="Whether conditions of equal delay are meant, in a block that compares delays: they are analysed "
+        "as replicates of one.",
     )
     order: Order = Field(
         default="fixed",

@@ -156,14 +156,16 @@ def equal_liquids(parts: Draft) -> Iterator[Fault]:
 def equal_conditions(parts: Draft) -> Iterator[Fault]:
     """Check that the conditions of a block differ, unless the block says that some are replicates."""
     for name, block in parts.blocks.items():
+        presented = {one: parts.conditions[one] for one in block.conditions if one in parts.conditions}
+        delays = compared(list(presented.values())) == "delays"  # which the analysis pools
         first: dict[tuple[tuple[str, ...], float], str] = {}
-        for index, condition in enumerate(() if block.replicates else block.conditions):
-            if (presented := parts.conditions.get(condition)) is None:
+        for index, condition in enumerate(() if delays and block.replicates else block.conditions):
+            if (one := presented.get(condition)) is None:
                 continue
-            earlier = first.setdefault((presented.liquid_ids, presented.delay_ms), condition)
+            earlier = first.setdefault((one.liquid_ids, one.delay_ms), condition)
             if earlier != condition:
                 message = f'"{condition}" presents the same as "{earlier}"'
-                hint = "change it, use repetitions, or write replicates = true if that is meant"
+                hint = "change it, or use repetitions" + (", or write replicates = true" if delays else "")
                 yield Fault(("blocks", name, "conditions", index), message, hint)
 
 

@@ -184,9 +184,15 @@ def test_shipped_studies_are_possible(name: str) -> None:
     assert load(name)
 
 
-def test_equal_conditions_that_are_meant_are_replicates() -> None:
-    text = SOUND.replace(DELAYED, "delay_ms = 0").replace('code_prefix = "D"', 'code_prefix = "D"\nreplicates = true')
-    assert parse(text.encode(), "file.toml").blocks["look"].replicates
+def test_equal_delays_that_are_meant_are_replicates_and_equal_liquids_are_not() -> None:
+    again = '[conditions.again]\nliquids = ["thin", "thick"]\ndelay_ms = 120\n\n[conditions.apart]'
+    text = SOUND.replace("[conditions.apart]", again).replace('["on_time", "both"]', '["on_time", "both", "again"]')
+    with pytest.raises(ProtocolError, match=r'"again" presents the same as "both" .* or write replicates = true'):
+        parse(text.encode(), "file.toml")
+    meant = text.replace('code_prefix = "D"', 'code_prefix = "D"\nreplicates = true')
+    assert parse(meant.encode(), "file.toml").blocks["look"].replicates
+    with pytest.raises(ProtocolError, match=r'presents the same as "on_time" \(change it, or use repetitions\)'):
+        parse(meant.replace(DELAYED, "delay_ms = 0").encode(), "file.toml")
 
 
 @pytest.mark.parametrize(

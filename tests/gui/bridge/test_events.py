@@ -75,9 +75,9 @@ def test_force_and_task_begin_when_the_tank_is_painted_and_not_while_a_page_asks
     assert world.done[-1] == "load"
     world.samples = tick(world, 3.0)
     bridge._frame()
-    world.samples = tick(world, 4.5)
+    world.samples = tick(world, 3.75)
     bridge._frame()
-    assert bridge.runner.task.elapsed_s == 1.5
+    assert bridge.runner.task.elapsed_s == 0.75
 
 
 def test_painted_frames_are_counted_on_the_servos_clock(bridge, world):
