@@ -319,3 +319,13 @@ def test_macos_time_and_sleep_go_by_the_timebase_of_apple_silicon():
     woken = sleep_until.ctypes(context, deadline)
     assert deadline <= woken < deadline + 42
     assert len(state["waits"]) == 2
+
+
+def test_a_machine_that_runs_is_not_suspended_meanwhile() -> None:
+    clock = SystemClock()
+    before_ns, began_ns = clock.suspended_ns(), clock.now_ns()
+    wait_ns = 20_000_000
+    while clock.now_ns() - began_ns < wait_ns:
+        pass
+    assert before_ns >= 0
+    assert abs(clock.suspended_ns() - before_ns) < wait_ns / 2
