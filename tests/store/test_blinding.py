@@ -301,7 +301,7 @@ def test_a_line_that_is_no_reveal_is_told_and_the_others_count(
     path.write_bytes(line + b"\n")
     assert revealed(folder) is None
     unblind(folder, "AB", "done")
-    assert unreadable_reveals(folder) == ((1, True),)
+    assert unreadable_reveals(folder) == (1,)
     assert [one["by"] for one in reveals(folder)] == ["AB"]
     findings = verify(folder)
     assert [str(one) for one in findings.warnings] == [
