@@ -181,7 +181,8 @@ def reveals(folder: Path) -> tuple[dict[str, str], ...]:
 def unreadable_reveals(folder: Path) -> tuple[tuple[int, bool], ...]:
     """Return the numbers of the lines that record no reveal, and whether a power cut may have torn them."""
     lines = [(number, line, record) for number, line, record in _reveal_lines(folder) if record is None]
-    return tuple((number, not line.rstrip().endswith(b"}")) for number, line, _ in lines)
+    begins = b'{"at": "'
+    return tuple((number, line[:8] == begins[: len(line)] and not line.endswith(b"}")) for number, line, _ in lines)
 
 
 def _reveal_lines(folder: Path) -> Iterator[tuple[int, bytes, dict[str, str] | None]]:
