@@ -9,11 +9,14 @@ import numpy as np
 
 from study_app.errors import StoreError
 from study_app.haptics.scene import Scene
+from study_app.session.events import Begin, Chosen, Continue, Submitted
 from study_app.session.pages import TaskPage
 from study_app.session.ports import Ports
 from study_app.session.runner import Runner
-from study_app.session.state import SessionState
+from study_app.session.state import Phase, SessionState
 from tests.session import small
+
+LEFT, RIGHT, AWAY = (-0.02, 0.0, 0.0), (0.02, 0.0, 0.0), (0.0, 0.01, 0.0)
 
 
 class FakeTelemetry:
@@ -158,3 +161,31 @@ class World:
         if self.paints and isinstance(page, TaskPage):
             self.runner.frame_shown(self.servo.now_ns(), self.servo.now_ns())
         self.on_page(page)
+
+
+def at_block(block: str, *, delayed: bool = False, seed: int = 1) -> World:
+    """Return a world at the beginning of a trial of ``block``."""
+    world = World(seed)
+    world.runner.post(Begin(0.0))
+    for _ in range(200):
+        state = world.state
+        there = state.phase is Phase.TASK and state.trial.block == block
+        if there and (not delayed or state.plan.protocol.delay_s(state.plan.condition(state.trial)) > 0):
+            return world
+        step(world)
+    raise AssertionError(block)
+
+
+def step(world: World) -> None:
+    """Take the session one page further, or one target in a reaching task."""
+    state = world.state
+    if state.phase is Phase.READING:
+        world.runner.post(Continue(world.clock()))
+    elif state.phase is Phase.ANSWERING:
+        for item in state.trial.items:
+            world.runner.post(Chosen(world.clock(), item, 4))
+        world.runner.post(Submitted(world.clock()))
+    else:
+        world.run(0.3, LEFT)
+        if (world.state.phase, world.state.index) == (state.phase, state.index):
+            world.run(0.3, RIGHT)

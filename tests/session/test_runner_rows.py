@@ -1,0 +1,143 @@
+"""The row of a trial that the runner writes: what was measured, and nothing that tells the condition."""
+
+from __future__ import annotations
+
+import pytest
+
+from study_app.haptics.layout import LIMITER_GLITCH
+from study_app.session.events import (
+    Begin,
+    PauseAsked,
+    RepeatAsked,
+    ResumeAsked,
+)
+from study_app.session.trial import SETTLED_S
+from tests.session.fakes import LEFT, RIGHT, World, at_block, step
+
+
+def test_a_sample_that_was_refused_at_the_door_changes_nothing_but_its_own_count() -> None:
+    worlds = at_block("seeing"), at_block("seeing")
+    for world, position_m, limiters in zip(worlds, (LEFT, (1.0, 1.0, 1.0)), (0, LIMITER_GLITCH), strict=True):
+        world.servo.run(0.1, LEFT)
+        world.servo.run(0.001, position_m, limiters=limiters)
+        world.run(0.199, LEFT)
+        world.run(0.5, RIGHT)
+    spared, glitched = worlds
+    assert [line["t_task_s"] for line in glitched.journal.of("target_reached")] == [
+        line["t_task_s"] for line in spared.journal.of("target_reached")
+    ]
+    spared_row, row = (world.journal.of("trial_ended")[-1] for world in worlds)
+    assert row["path_length_m"] == pytest.approx(0.04)
+    assert row == spared_row | {"limiter_glitch": 1}
+
+
+def test_the_row_of_a_trial_holds_the_error_of_the_delay_and_never_the_delay() -> None:
+    world = at_block("seeing", delayed=True)
+    for error_ms in (0, 5, 10, 40):
+        world.servo.run(0.05, LEFT)
+        now = world.servo.now_ns()
+        world.runner.frame_shown(now + error_ms * 1_000_000, world.runner.view(now).sample_time_ns)
+    world.run(0.1, LEFT)
+    world.run(0.5, RIGHT)
+    row = world.journal.of("trial_ended")[-1]
+    assert (row["frames"], row["frames_late"]) == (5, 1)  # the study allows 25 ms
+    assert row["delay_error_mean_ms"] == pytest.approx((4 * (13.75 + 1000 * SETTLED_S) - 137) / 5)
+    assert row["delay_error_max_ms"] == pytest.approx(40 + 1000 * SETTLED_S)
+    assert 137 not in [round(value) for value in row.values() if isinstance(value, float)]
+
+
+def test_no_line_of_a_delayed_trial_names_condition_liquid_or_delay(world: World) -> None:
+    world.runner.post(Begin(0.0))
+    while not world.runner.finished:
+        step(world)
+    text = repr(world.journal.lines) + repr(world.pages) + repr(world.state)
+    assert [word for word in ("is_late", "on_time", "is_thin", "is_thick", "0.137", "1013.7") if word in text] == []
+
+
+def test_the_row_of_a_trial_sums_up_force_path_and_limiters(practising: World) -> None:
+    practising.servo.run(1.0, (0.0, 0.0, 0.0), device_force_n=(3.0, 0.0, 4.0), limiters=0b1001)
+    practising.servo.run(1.0, (0.03, 0.04, 0.0), device_force_n=(0.0, 0.0, 1.0), lateness_ns=2_000_000)
+    practising.run(1.2, (0.0, 0.0, 0.0))
+    (row,) = practising.journal.of("trial_ended")
+    assert row["ticks"] == 3001
+    assert row["tick_rate_hz"] == pytest.approx(1000)
+    assert row["path_length_m"] == pytest.approx(0.1)
+    assert row["mean_speed_mps"] == pytest.approx(0.1 / 3, abs=1e-6)
+    assert row["force_mean_n"] == pytest.approx((5 * 1000 + 1 * 1000) / 3001, abs=1e-6)
+    assert row["force_peak_n"] == pytest.approx(5)
+    assert (row["limiter_slope"], row["limiter_norm"], row["limiter_slew"]) == (1000, 1000, 0)
+    assert row["lateness_p99_ms"] == pytest.approx(2)
+    assert (row["frames"], row["first_frame_gap_ms"], row["worst_frame_gap_ms"]) == (1, 0.0, None)
+
+
+def test_the_row_of_a_trial_holds_the_share_of_the_force_withheld_in_its_task(practising: World) -> None:
+    practising.servo.scene = 0
+    practising.servo.run(0.5, permitted_n=9.0, withheld_n=9.0)  # before the task
+    practising.servo.scene = 1
+    practising.servo.run(1.0, permitted_n=4.0, withheld_n=0.5)
+    practising.servo.run(1.0, permitted_n=2.0)
+    practising.servo.run(1.001)
+    practising.run(0.2, permitted_n=9.0, withheld_n=9.0)  # after it
+    (row,) = practising.journal.of("trial_ended")
+    assert row["withheld_share"] == pytest.approx(0.5 / 6, abs=1e-6)
+
+
+def test_a_trial_without_force_has_no_share_withheld(practising: World) -> None:
+    practising.run(3.2)
+    assert practising.journal.of("trial_ended")[0]["withheld_share"] is None
+
+
+def test_the_row_of_a_trial_says_that_the_loops_delay_changed(practising: World) -> None:
+    practising.run(0.5, delay_ticks=1)
+    for _ in range(2):
+        practising.run(0.5, delay_ticks=3)
+        practising.run(0.5, delay_ticks=2)
+    practising.run(0.7, delay_ticks=2)
+    practising.run(3.2, delay_ticks=2)
+    rows = practising.journal.of("trial_ended")
+    assert [(row["loop_delay_ticks"], row["loop_delay_changes"]) for row in rows] == [(3, 4), (2, 0)]
+
+
+def test_samples_that_were_lost_are_counted_for_their_trial_alone(practising: World) -> None:
+    practising.servo.telemetry.dropped = 7
+    practising.run(3.2)
+    assert practising.journal.of("trial_ended")[0]["samples_dropped"] == 7
+    practising.run(3.2)
+    assert practising.journal.of("trial_ended")[1]["samples_dropped"] == 0
+
+
+def test_an_interrupted_attempt_keeps_what_was_measured_and_the_trial_starts_again(practising: World) -> None:
+    practising.run(0.8)
+    practising.runner.post(PauseAsked(0.8, "operator"))
+    (first,) = practising.journal.of("trial_ended")
+    assert (first["attempt"], first["outcome"], first["ticks"]) == (1, "interrupted", 800)
+    practising.run(5.0)  # a pause is no exploration
+    practising.runner.post(ResumeAsked(5.8, "operator"))
+    assert practising.servo.scene == 2
+    practising.run(3.2)
+    second = practising.journal.of("trial_ended")[-1]
+    assert (second["attempt"], second["outcome"], second["ticks"]) == (2, "complete", 3001)
+
+
+def test_a_repeated_trial_keeps_both_attempts(practising: World) -> None:
+    practising.run(0.5)
+    practising.runner.post(RepeatAsked(0.5, "a sneeze"))
+    practising.run(3.2)
+    ended = practising.journal.of("trial_ended")
+    assert [(line["attempt"], line["outcome"]) for line in ended] == [(1, "interrupted"), (2, "complete")]
+    assert practising.journal.of("repeat") == [
+        {"event": "repeat", "t_s": 0.5, "trial": 1, "reason": "a sneeze"},
+    ]
+
+
+def test_a_trial_with_a_late_screen_or_a_late_servo_says_so(practising: World) -> None:
+    for _ in range(20):
+        now = practising.servo.now_ns()
+        practising.runner.frame_shown(now + 90_000_000, now)
+    practising.run(1.0)
+    practising.servo.ticks += 150  # the servo stood still
+    practising.run(2.2, lateness_ns=5_000_000)
+    (row,) = practising.journal.of("trial_ended")
+    assert row["delay_error_p95_ms"] == pytest.approx(90)
+    assert row["frames_late"] == 20
+    assert row["lateness_p99_ms"] == pytest.approx(5)
