@@ -18,6 +18,7 @@ from PySide6.QtCore import QEventLoop, QObject, Qt, QTimer, Signal
 from PySide6.QtGui import QScreen
 from PySide6.QtWidgets import QApplication
 
+from study_app.app.crash_trace import CrashTrace
 from study_app.app.devices import diagnosis
 from study_app.app.machine import described, screen_number, settings_here, text_scale_on
 from study_app.devices import is_falcon, kind_of
@@ -99,6 +100,7 @@ class LiveSession(QObject):
         self.note: OpeningWindow | None = None
         self._machine: Machine | None = None
         self._store: SessionStore | None = None
+        self._crash_trace: CrashTrace | None = None
         self._closed = False
         self._ending = threading.Event()
         self._working = False
@@ -217,6 +219,7 @@ class LiveSession(QObject):
         self._pass_checks(found)
         screens = described(self.settings, shown_on, operated_on)
         self._store = open_store(chosen, protocol, source, machine, screens)
+        self._crash_trace = CrashTrace(self._store.folder.crash)
         self._store.append("preflight", checks=[check.entry for check in found])
         start = FIRST if chosen.resumes is None else resume_at(protocol, schedule, self._store.lines)
         text_scale = text_scale_on(self.settings, shown_on)
@@ -313,9 +316,12 @@ class LiveSession(QObject):
     def _let_go(self) -> None:
         machine, self._machine = self._machine, None
         store, self._store = self._store, None
+        crash_trace, self._crash_trace = self._crash_trace, None
         try:
             if machine is not None:
                 machine.stop()
         finally:
+            if crash_trace is not None:
+                crash_trace.close()
             if store is not None:
                 store.close()

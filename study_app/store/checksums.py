@@ -106,13 +106,14 @@ def read_checksums(session: SessionFolder) -> dict[str, str]:
 
 
 def files(session: SessionFolder) -> tuple[str, ...]:
-    """Return the session's files, by path in its folder; not the list itself, nor what is hidden or half-written."""
+    """Return the session's files, by path in its folder; not the list itself, a crash's trace, hidden or half ones."""
+    left_out = {session.checksums.name, session.crash.name}
     found = (path.relative_to(session.path) for path in session.path.rglob("*") if path.is_file())
     return tuple(
         sorted(
             name.as_posix()
             for name in found
-            if name.name != session.checksums.name and not any(part.startswith(".") for part in name.parts)
+            if name.name not in left_out and not any(part.startswith(".") for part in name.parts)
         )
     )
 

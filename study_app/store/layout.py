@@ -66,6 +66,11 @@ class SessionFolder:
         return self.path / REBUILT
 
     @property
+    def crash(self) -> Path:
+        """Where the program stood when it crashed; there while the session runs, and after a crash."""
+        return self.path / "crash.txt"
+
+    @property
     def recordings(self) -> Path:
         """Samples and frames of the trials."""
         return self.path / "recordings"

@@ -95,6 +95,8 @@ def _look(place: Place, key: Key | None, found: Gathered) -> Checked:
         found.warning(path, "was left half-written by a program that was ended; rebuild takes it away")
     if running:
         found.warning(folder.path, "runs in another program")
+    elif is_there(folder.crash) and folder.crash.stat().st_size:
+        found.warning(folder.crash, "tells where the program crashed: send it to the developers")
     contents = _journal(folder, found, running=running)
     lines = contents.lines
     _receipt(folder, lines, key.hash if key else None, found, running=running)

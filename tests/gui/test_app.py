@@ -133,7 +133,9 @@ def rows(results: Path, name: str):
 
 @pytest.mark.parametrize("device", ["scripted", "falcon-emulated"])
 def test_a_session_runs_from_the_first_page_to_the_last_in_its_windows(short_demo, results, device):
-    person = Person()
+    folder = results / "data" / "sub-P001" / "ses-01"
+    traced = []
+    person = Person(once=lambda _participant: traced.append((folder / "crash.txt").read_bytes()))
     lines = []
     code = app.run(
         short_demo,
@@ -167,6 +169,9 @@ def test_a_session_runs_from_the_first_page_to_the_last_in_its_windows(short_dem
     assert receipt["device"]["name"] == device
     assert ("The Falcon is ready (green light)." in lines) == (device == "falcon-emulated")
     assert receipt["status"] == "completed"
+    assert traced == [b""]
+    assert not (folder / "crash.txt").exists()
+    assert "crash.txt" not in (folder / "checksums.sha256").read_text()
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])

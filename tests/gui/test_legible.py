@@ -88,9 +88,10 @@ def luminances(image: QImage) -> np.ndarray:
     """Return the relative luminance of WCAG 2.2 of every pixel (height, width)."""
     image = image.convertToFormat(QImage.Format.Format_RGB32)
     raw = np.frombuffer(image.constBits(), np.uint8).reshape(image.height(), image.bytesPerLine() // 4, 4)
-    shares = raw[:, : image.width(), 2::-1] / 255.0
+    shares = np.arange(256) / 255.0
     linear = np.where(shares <= 0.04045, shares / 12.92, ((shares + 0.055) / 1.055) ** 2.4)
-    return np.asarray(linear @ np.array([0.2126, 0.7152, 0.0722]))
+    red, green, blue = (linear[raw[:, : image.width(), channel]] for channel in (2, 1, 0))
+    return np.asarray(0.2126 * red + 0.7152 * green + 0.0722 * blue)
 
 
 def contrast(light: np.ndarray, place: QRect) -> float:

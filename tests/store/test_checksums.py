@@ -13,12 +13,18 @@ from study_app.store.layout import SessionFolder
 @pytest.fixture
 def session(tmp_path: Path) -> SessionFolder:
     (tmp_path / "recordings").mkdir()
-    for name in ("journal.jsonl", "recordings/trial-001.parquet", ".open-0123abcd.json", "recordings/.x.0123abcd.tmp"):
+    for name in (
+        "journal.jsonl",
+        "recordings/trial-001.parquet",
+        ".open-0123abcd.json",
+        "recordings/.x.0123abcd.tmp",
+        "crash.txt",
+    ):
         (tmp_path / name).write_text(name)
     return SessionFolder(tmp_path, "P007", 1)
 
 
-def test_every_file_is_listed_but_hidden_ones_and_the_list(session: SessionFolder) -> None:
+def test_every_file_is_listed_but_hidden_ones_the_list_and_a_crashs_trace(session: SessionFolder) -> None:
     write_checksums(session, {})
     write_checksums(session, {})
     assert files(session) == ("journal.jsonl", "recordings/trial-001.parquet")

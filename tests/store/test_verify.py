@@ -263,6 +263,16 @@ def test_what_should_be_known_is_a_warning(study: Path, start: Callable[..., Ses
     assert told(findings) == ""
 
 
+def test_the_trace_of_a_crash_is_told_and_an_empty_one_is_not(study: Path) -> None:
+    trace = study / SESSION / "crash.txt"
+    trace.touch()
+    assert "crash" not in warned(verify(study))
+    trace.write_text("Fatal Python error: Segmentation fault")
+    findings = verify(study)
+    assert findings.errors == ()
+    assert "sub-P007/ses-01/crash.txt: tells where the program crashed" in warned(findings)
+
+
 def test_what_a_running_session_is_just_recording_is_not_said_to_be_left(
     study: Path, start: Callable[..., SessionStore]
 ) -> None:

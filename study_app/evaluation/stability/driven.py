@@ -212,7 +212,9 @@ def _follow(
     for k in range(trace.shape[0]):
         if k == released:
             handle.held = 0
-        if run(control, models, safety, exchanged, output, device, clock, np.int64(1)) < 1:  # a literal is another signature
+        if (
+            run(control, models, safety, exchanged, output, device, clock, np.int64(1)) < 1
+        ):  # a literal is another signature
             return k
         sample = output.ring[(output.written[0] - 1) % output.ring.shape[0]]
         row, model = trace[k], models[0]
