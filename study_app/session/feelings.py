@@ -8,14 +8,13 @@ again for answers without a servo and for power analysis.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, Final, TypeAlias
+from typing import Final, TypeAlias
 
 from study_app.protocol.answers import Felt
 from study_app.protocol.model import Protocol
 from study_app.protocol.schedule import build_schedule, draw_key, stream
 from study_app.session.rehearsal import Machine, Rehearsal
-from study_app.store.blinding import Key
-from study_app.store.journal import SessionClock
+from study_app.session.unkept import Unkept
 
 Where: TypeAlias = tuple[str, str]
 """A block, whose task is done, and a condition."""
@@ -50,30 +49,7 @@ def feelings(
             found.setdefault(places[trial], []).append(felt)
 
         with Machine(protocol, person, seed, "scripted") as machine:
-            Rehearsal(protocol, schedule, machine, _Unkept(machine.servo.now_ns, codes), felt=feel).run()
+            Rehearsal(protocol, schedule, machine, Unkept(machine.servo.now_ns, codes), felt=feel).run()
         if progress is not None:
             progress(f"{number} of {people} sessions felt")
     return {where: tuple(felt) for where, felt in found.items()}
-
-
-class _Unkept:
-    """A session that is kept nowhere."""
-
-    recorder = None
-    fingerprint = ""
-
-    def __init__(self, now_ns: Callable[[], int], codes: dict[str, dict[str, str]]) -> None:
-        self.clock = SessionClock(now_ns)
-        self.key = Key(hash="", drawn="seed", codes=codes, tables={}, tables_hash="", nonce=b"")
-
-    def append(self, event: str, *, t_s: float | None = None, **fields: Any) -> None:
-        """Keep nothing."""
-
-    def check_flushed(self) -> None:
-        """Do nothing: nothing is kept."""
-
-    def write_tables(self) -> None:
-        """Keep nothing."""
-
-    def finish(self, status: str, reason: str = "") -> None:
-        """Keep nothing."""

@@ -4,14 +4,14 @@ The machine, the runner, the servo's compiled loop, the store and the checks of 
 the device, the clock, the screen and the participant are simulated. Time is the servo's virtual clock, so that the same
 call into another folder gives the same tables but for wall-clock times. Every row says that it is simulated.
 
-What a participant does and answers in a trial is drawn from streams of that trial, so that a rehearsal that was killed
-and resumed answers as one that was not.
+What a participant does and answers in a trial is drawn from streams of that trial. A rehearsal that was killed and
+resumed answers as one that was not: from what is felt in the whole session, which is computed again for that.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from datetime import datetime
 from pathlib import Path
 from types import TracebackType
@@ -36,6 +36,7 @@ from study_app.session.resume import FIRST, REHEARSED_SCREENS, Start, find_proto
 from study_app.session.runner import Runner
 from study_app.session.simulated import Draw, Explorer, Reacher, Senses, filled_in, reading_s
 from study_app.session.trial import TankView
+from study_app.session.unkept import Unkept
 from study_app.store import journal
 from study_app.store.description import check_study
 from study_app.store.journal import SessionClock
@@ -193,9 +194,20 @@ class Machine:
 def _run(study: Protocol, schedule: Schedule, machine: Machine, store: SessionStore, start: Start) -> tuple[float, int]:
     """Run an open session to its end; return how long it lasted in its own time [s], and its answers."""
     with store:
-        rehearsal = Rehearsal(study, schedule, machine, store, start)
+        known = {} if start is FIRST else _felt_in_whole_session(study, schedule, machine.device.name, store.key.codes)
+        rehearsal = Rehearsal(study, schedule, machine, store, start, known=known)
         rehearsal.run()
     return store.clock.seconds(), rehearsal.answers
+
+
+def _felt_in_whole_session(
+    study: Protocol, schedule: Schedule, device: str, codes: dict[str, dict[str, str]]
+) -> dict[int, Felt]:
+    """Return what is felt in each trial (by number) of a session that is not interrupted."""
+    felt: dict[int, Felt] = {}
+    with Machine(study, schedule.participant, schedule.seed, device) as machine:
+        Rehearsal(study, schedule, machine, Unkept(machine.servo.now_ns, codes), felt=felt.__setitem__).run()
+    return felt
 
 
 class Rehearsal:
@@ -205,6 +217,7 @@ class Rehearsal:
     ----------
     store : where it is kept
     felt : is told of every trial what was felt in it
+    known : what is answered by instead, by trial number
     """
 
     def __init__(
@@ -215,8 +228,10 @@ class Rehearsal:
         store: KeptSession,
         start: Start = FIRST,
         felt: Callable[[int, Felt], object] | None = None,
+        known: Mapping[int, Felt] | None = None,
     ) -> None:
         self.answers = 0
+        self._known = known or {}
         self._tell_felt = felt
         self._study = study
         self._machine = machine
@@ -323,7 +338,8 @@ class Rehearsal:
         """Answer every statement by what was felt, and confirm."""
         for item in page.items:
             self._post(ItemShown(self._now_s(), item.id))
-        for choice in filled_in(page, self._felt, self._person, self._stream(f"{page.trial}/answers")):
+        felt = self._known.get(page.trial, self._felt)
+        for choice in filled_in(page, felt, self._person, self._stream(f"{page.trial}/answers")):
             self._pass(choice.after_s)
             if page is not self._page:
                 return

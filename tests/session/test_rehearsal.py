@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,7 @@ from study_app.session.simulated import Reacher, Senses, choices, reading_s
 from study_app.session.strokes import RATE_HZ, exploration
 from study_app.session.tasks import TaskView
 from study_app.session.trial import TankView
+from study_app.store import journal
 from study_app.store.description import write_description
 from study_app.store.layout import StudyFolder
 from study_app.store.session import SessionStore
@@ -207,3 +209,37 @@ def test_a_servo_that_is_ended_from_outside_ends_the_rehearsal(monkeypatch: Any)
     monkeypatch.setattr(Servo, "advance", ended)
     with pytest.raises(SessionError, match="ended from outside"):
         feelings(small.protocol(), seed=1, people=1)
+
+
+def confirmed(lines: Iterable[Any]) -> dict[tuple[int, str], int]:
+    """Return the answers by trial and item, those of the last attempt."""
+    return {
+        (line["trial"], item["item"]): item["value"]
+        for line in lines
+        if line["event"] == "responses"
+        for item in line["items"]
+    }
+
+
+@needs_servo
+@pytest.mark.parametrize(("seed", "page"), [(8, 1), (5, 2), (9, 4)])
+def test_a_rehearsal_that_was_interrupted_and_resumed_answers_like_one_that_was_not(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, seed: int, page: int
+) -> None:
+    """With these seeds another noise of the hand in the repeated trial gives other answers."""
+    whole, parted = StudyFolder(tmp_path / "whole"), StudyFolder(tmp_path / "parted")
+    rehearsal.rehearse("demo", participants=1, seed=seed, results=whole.path, recordings=False)
+    kept, pages = SessionStore.append, count(1)
+
+    def interrupted(self: SessionStore, event: str, **fields: Any) -> None:
+        if event == "responses" and next(pages) == page:
+            raise KeyboardInterrupt
+        kept(self, event, **fields)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(SessionStore, "append", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            rehearsal.rehearse("demo", participants=1, seed=seed, results=parted.path, recordings=False)
+    rehearsal.resume(parted.session("P001", 1).path)
+    answers, others = (confirmed(journal.read(folder.session("P001", 1).journal)) for folder in (whole, parted))
+    assert answers == others

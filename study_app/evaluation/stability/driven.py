@@ -209,12 +209,11 @@ def _follow(
     released: int,
 ) -> int:
     """Take a tick of the servo's loop for each row of ``trace``; let go before row ``released``; return how many."""
+    one: Any = np.int64(1)  # with a literal the loop is compiled a second time
     for k in range(trace.shape[0]):
         if k == released:
             handle.held = 0
-        if (
-            run(control, models, safety, exchanged, output, device, clock, np.int64(1)) < 1
-        ):  # a literal is another signature
+        if run(control, models, safety, exchanged, output, device, clock, one) < 1:
             return k
         sample = output.ring[(output.written[0] - 1) % output.ring.shape[0]]
         row, model = trace[k], models[0]
