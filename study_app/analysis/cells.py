@@ -1,4 +1,7 @@
-"""A frame as CSV, a column at a time: the same cells as ``store.tables`` writes, row by row, and much sooner."""
+"""A frame as CSV, a column at a time: the same cells as ``store.tables`` writes, row by row, and much sooner.
+
+Only texts that a spreadsheet would compute have an apostrophe before them (``store.formulas``).
+"""
 
 from __future__ import annotations
 
@@ -9,6 +12,7 @@ import pandas as pd
 
 from study_app.analysis.delivered import Delivered
 from study_app.store.columns import header
+from study_app.store.formulas import guarded
 from study_app.store.tables import cell_text
 
 ROWS_AT_ONCE: Final = 20_000
@@ -32,5 +36,9 @@ def _parts(table: Delivered) -> Iterator[bytes]:
 def _texts(column: pd.Series[Any]) -> list[str]:
     """Return the cells of a column; every value that occurs is written once and used again."""
     values = column.tolist()
-    written = {value: cell_text(None if value is pd.NA else value) for value in dict.fromkeys(values)}
+    written = {value: _text(value) for value in dict.fromkeys(values)}
     return [written[value] for value in values]
+
+
+def _text(value: Any) -> str:
+    return cell_text(guarded(value) if isinstance(value, str) else None if value is pd.NA else value)

@@ -13,6 +13,7 @@ from study_app.analysis.questions import Block
 from study_app.analysis.tables import Study
 from study_app.store import blinding
 from study_app.store.columns import MISSING, SEALED, Column
+from study_app.store.formulas import COMPUTED
 
 
 def codebook_bytes(study: Study, files: Mapping[str, Iterable[Column]]) -> bytes:
@@ -41,7 +42,8 @@ def _codebook(study: Study, files: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "study": head(study),
         "program": f"liquid-study {__version__}",
-        "format": "CSV: UTF-8, comma, decimal point, RFC 4180 quoting",
+        "format": "CSV: UTF-8, comma, decimal point, RFC 4180 quoting; a text that begins with "
+        f"{COMPUTED} has an apostrophe before it",
         "missing": MISSING,
         "blinded": not study.revealed,
         "sealed_columns": [] if study.revealed else sorted(SEALED),

@@ -13,6 +13,7 @@ from study_app.errors import StoreError
 from study_app.store import journal
 from study_app.store.atomic import cannot_read, write_file
 from study_app.store.columns import EXCLUSIONS, MISSING, header
+from study_app.store.formulas import guarded, unguarded
 from study_app.store.layout import StudyFolder
 from study_app.store.opening import open_alone
 from study_app.store.progress import attempts
@@ -114,12 +115,15 @@ def without_mark(content: bytes) -> bytes:
 
 def exclusion_bytes(rows: tuple[Exclusion, ...]) -> bytes:
     """Return ``exclusions.csv``."""
-    return csv_bytes(EXCLUSIONS, [{name: getattr(row, name) for name in header(EXCLUSIONS)} for row in rows])
+    cells = [{name: getattr(row, name) for name in header(EXCLUSIONS)} for row in rows]
+    texts = ("rule_or_person", "reason")
+    return csv_bytes(EXCLUSIONS, [row | {name: guarded(row[name]) for name in texts} for row in cells])
 
 
 def _exclusion(path: Path, number: int, row: list[str]) -> Exclusion:
     try:
         participant, session, trial, by, reason, at = row
+        by, reason = unguarded(by), unguarded(reason)
         return Exclusion(participant, int(session), None if trial == MISSING else int(trial), by, reason, at)
     except ValueError as error:
         raise StoreError(f"{path}, row {number}: {','.join(row)!r} is no exclusion: mend or remove the row") from error

@@ -2,12 +2,16 @@ import csv
 import json
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
+from study_app.analysis.cells import table_bytes
+from study_app.analysis.delivered import Delivered
 from study_app.analysis.export import export
 from study_app.analysis.output import write_files
 from study_app.errors import AnalysisError
-from study_app.store.columns import RESPONSES, SEALED, TRIALS, header, unsealed
+from study_app.store.columns import RESPONSES, SEALED, TRIALS, Column, header, unsealed
+from study_app.store.formulas import unguarded
 from tests.analysis.conftest import CANNOT_JUDGE, DELAY_ERROR_MS, HIDDEN, Results
 
 NAMES = {
@@ -57,9 +61,9 @@ def test_cells_are_those_of_the_sessions_own_tables(rek: Results, to: Path) -> N
     with rek.trials("P001").open(encoding="utf-8", newline="") as file:
         own = list(csv.DictReader(file, strict=True))
     exported = rows(to, "trials")
-    assert [{name: row[name] for name in header(TRIALS)} for row in exported] == own
+    assert [{name: unguarded(row[name]) for name in header(TRIALS)} for row in exported] == own
     assert exported[0]["force_mean_n"] == "0.30000000000000004"
-    assert exported[0]["notes"] == '=1+1, "so"\nnew line π 😀'
+    assert exported[0]["notes"] == "'" + '=1+1, "so"\nnew line π 😀'
 
 
 def test_what_earlier_versions_wrote_in_clear_is_not_handed_out_sealed(rek: Results, to: Path) -> None:
@@ -140,6 +144,18 @@ def test_what_is_excluded_is_exported_with_its_reason_and_not_counted(rek: Resul
         "reason": "spilled tea",
         "excluded_at": "2026-01-06T10:00:00.000+01:00",
     }
+
+
+def test_a_text_is_no_formula_in_a_spreadsheet_and_a_negative_number_a_number(rek: Results, to: Path) -> None:
+    rek.add("P001", lambda *_: 6)
+    rek.exclude("P001", reason="=1+1")
+    export(rek.folder, to)
+    found = rows(to, "trials")
+    assert {row["exclusion_reason"] for row in found} == {"'=1+1"}
+    assert {unguarded(row["exclusion_reason"]) for row in found} == {"=1+1"}
+    frame = pd.DataFrame({"text": ["-1"], "number": [-1.5]})
+    columns = (Column("text", "text", ""), Column("number", "number", ""))
+    assert table_bytes(Delivered("numbers", columns, frame)) == b"text,number\n'-1,-1.5\n"
 
 
 def test_nothing_hidden_is_in_any_blinded_file(small: Results, to: Path) -> None:

@@ -49,6 +49,13 @@ def test_a_session_and_a_trial_are_left_out_with_their_reasons(folder: Path) -> 
     )
 
 
+def test_a_reason_is_no_formula_in_a_spreadsheet_and_comes_back(folder: Path) -> None:
+    exclude(folder, "P007", 1, by="@AB", reason="=1+1", now=NOW)
+    assert "P007,1,n/a,'@AB,'=1+1," in (folder / "exclusions.csv").read_text(encoding="utf-8")
+    (row,) = exclusions(folder)
+    assert (row.rule_or_person, row.reason) == ("@AB", "=1+1")
+
+
 def test_no_data_are_touched(folder: Path) -> None:
     before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
     exclude(folder, "P007", 1, by="AB", reason="tired")
