@@ -9,12 +9,14 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from study_app.errors import AnalysisError
+from study_app.store.atomic import sweep_old
 
 
 def write_files(to: Path, files: Mapping[str, bytes]) -> tuple[Path, ...]:
     """Put ``files`` (name to content) into the folder ``to``, which is created; older files of these names give way.
 
     All are written beside and flushed to the disk before the first takes its name, so that a full disk changes nothing.
+    What a killed program left half-written there is taken away at the end, when it is old.
 
     Raises
     ------
@@ -50,4 +52,6 @@ def write_files(to: Path, files: Mapping[str, bytes]) -> tuple[Path, ...]:
         raise AnalysisError(
             f"{to} cannot be written ({why}): choose another folder with --to, free space, or mend the permissions"
         ) from error
+    for folder in {path.parent for path in staged.values()}:
+        sweep_old(folder)
     return tuple(to / name for name in files)

@@ -9,12 +9,14 @@ import secrets
 import shutil
 import stat
 import sys
+import time
 from collections.abc import Mapping
 from pathlib import Path
 from typing import BinaryIO
 
 from study_app.errors import StoreError
 
+OLD_S = 3600.0  # no program takes so long from the last write to a half to its name
 _TEMPORARY = re.compile(r"\.[^.].*\.[0-9a-f]{8}\.tmp")  # not those of hidden files: markers come and go
 
 
@@ -115,6 +117,17 @@ def beside(path: Path) -> Path:
 def temporaries(folder: Path) -> tuple[Path, ...]:
     """Return what is half-written in ``folder`` itself, by a program that writes now or one that was killed."""
     return tuple(sorted(path for path in folder.glob(".*.tmp") if _TEMPORARY.fullmatch(path.name)))
+
+
+def sweep_old(folder: Path) -> None:
+    """Take away what a killed program left half-written in ``folder``, into which others may write now.
+
+    Only what is older than any such moment; what cannot be taken away stays.
+    """
+    for path in temporaries(folder):
+        with contextlib.suppress(OSError):
+            if not path.is_dir() and time.time() - path.stat().st_mtime > OLD_S:
+                path.unlink()
 
 
 def sweep(folder: Path) -> tuple[Path, ...]:

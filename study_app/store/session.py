@@ -15,7 +15,7 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.schedule import stream
 from study_app.store import receipt
 from study_app.store.abandoned import sweep_claims, take_over
-from study_app.store.atomic import beside, cannot_write, is_there, sync_folder
+from study_app.store.atomic import beside, cannot_write, is_there, sweep_old, sync_folder
 from study_app.store.blinding import Key, open_or_draw_key, reveals
 from study_app.store.description import check_study, write_description
 from study_app.store.journal import FORMAT, Journal, SessionClock
@@ -246,5 +246,7 @@ def _open(
             raise store.behind
         write_participants(place.study_folder, place.study)
         write_description(place.study_folder, protocol.study)
+        for folder in (place.study_folder.path, place.study_folder.data):
+            sweep_old(folder)
         failing.pop_all()
     return store

@@ -1,5 +1,6 @@
 import csv
 import json
+import os
 from pathlib import Path
 
 import pandas as pd
@@ -250,6 +251,16 @@ def test_a_file_in_the_place_of_the_folder_is_refused(rek: Results, tmp_path: Pa
     with pytest.raises(AnalysisError, match=r"taken cannot be written .*--to"):
         export(rek.folder, tmp_path / "taken")
     assert (tmp_path / "taken").read_text() == "x"
+
+
+def test_halves_of_a_killed_export_go_with_the_next_one(rek: Results, to: Path) -> None:
+    rek.add("P001", lambda *_: 6)
+    to.mkdir(parents=True)
+    half = to / ".codebook.json.0123abcd.tmp"
+    half.touch()
+    os.utime(half, (0, 0))
+    export(rek.folder, to)
+    assert {path.name for path in to.iterdir()} == NAMES
 
 
 def test_where_one_file_cannot_be_written_the_others_stay_as_they_were(tmp_path: Path) -> None:

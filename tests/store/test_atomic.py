@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import os
+import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from pathlib import Path
@@ -7,13 +9,36 @@ from pathlib import Path
 import pytest
 
 from study_app.errors import StoreError
-from study_app.store.atomic import append_line, beside, create_folder, is_there, probe, sweep, temporaries, write_file
+from study_app.store.atomic import (
+    OLD_S,
+    append_line,
+    beside,
+    create_folder,
+    is_there,
+    probe,
+    sweep,
+    sweep_old,
+    temporaries,
+    write_file,
+)
 
 FullDisk = Callable[[int], AbstractContextManager[None]]
 
 
 def names_in(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.iterdir())
+
+
+def test_only_old_halves_are_swept_where_others_may_write(tmp_path: Path) -> None:
+    old, new, other = (tmp_path / name for name in (".x.csv.0123abcd.tmp", ".y.csv.0123abcd.tmp", ".z.csv"))
+    for path in (old, new, other):
+        path.touch()
+    for path in (old, other):
+        os.utime(path, (0, time.time() - OLD_S - 1))
+    sweep_old(tmp_path)
+    assert not old.exists()
+    assert new.exists()
+    assert other.exists()
 
 
 def test_a_file_is_written_and_replaced_whole(tmp_path: Path) -> None:

@@ -324,6 +324,17 @@ for line in sys.stdin:
 """
 
 
+def test_halves_of_a_killed_program_go_when_the_next_session_begins(start: Callable[..., SessionStore]) -> None:
+    with start("P007") as store:
+        study = store.place.study_folder
+    halves = [folder / ".table.csv.0123abcd.tmp" for folder in (study.path, study.data)]
+    for half in halves:
+        half.touch()
+        os.utime(half, (0, 0))
+    start("P008").close()
+    assert not any(half.exists() for half in halves)
+
+
 def test_of_two_programs_racing_for_one_id_one_gets_it_and_both_share_the_key(
     tmp_path: Path, tables_of_study: Callable[..., dict[str, Any]]
 ) -> None:
