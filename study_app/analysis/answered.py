@@ -40,6 +40,9 @@ MANY: Final = DRAWN_UP_TO
 FEWER_DRAWS: Final = 1999
 """So many rearrangements are drawn for the test over all statements above ``MANY``, which has no approximation."""
 
+FEWEST_DRAWS: Final = 999
+"""So many for each of thousands of simulated studies."""
+
 MOST_DRAWS: Final = 199_999
 FLOOR: Final = 0.05
 """The smallest p that draws can give, corrected for its family, is this share of alpha at most."""
@@ -51,7 +54,7 @@ class Asked:
 
     ``values`` (participants, settings) are the medians of ``single`` answers (participants, settings, presentations);
     ``sessions`` of the same shape are the sessions in which these were given. ``verdicts_only``: leave out what decides
-    no verdict, for thousands of simulated studies.
+    no verdict, for thousands of simulated studies; and without ``equivalence`` also what decides only that.
     """
 
     block: Block
@@ -65,6 +68,7 @@ class Asked:
     sessions: Mapping[str, Array]
     planning: bool = True
     verdicts_only: bool = False
+    equivalence: bool = True
 
     @property
     def n(self) -> int:
@@ -82,6 +86,11 @@ class Asked:
         return (empty, (Waiting(what, found.why),)) if isinstance(found, Failure) else (found, ())
 
     @property
+    def intervals(self) -> int | None:
+        """The seed of bootstrap intervals; None: leave them out."""
+        return None if self.verdicts_only else self.seed
+
+    @property
     def draws(self) -> int:
         """How many rearrangements are drawn for one statement where not all can be gone through.
 
@@ -91,7 +100,9 @@ class Asked:
 
     @property
     def draws_over_all(self) -> int:
-        """How many are drawn for the one test over all statements."""
+        """How many are drawn for the one test over all statements; the error rate holds with any number."""
+        if self.verdicts_only:
+            return FEWEST_DRAWS
         return self._draws(DRAWS if self.n <= MANY else FEWER_DRAWS, 1)
 
     def _draws(self, usual: int, members: int) -> int:
@@ -128,6 +139,7 @@ def of_tables(
     failures: Failures | None = None,
     planning: bool = True,
     verdicts_only: bool = False,
+    equivalence: bool = True,
 ) -> Asked:
     """Return a block's answers from tables of single answers (participants, settings, presentations) of each item.
 
@@ -145,6 +157,7 @@ def of_tables(
         {item: np.ones_like(answers) for item, answers in single.items()} if sessions is None else sessions,
         planning,
         verdicts_only,
+        equivalence,
     )
 
 
@@ -251,7 +264,7 @@ def _omnibus(values: Array, of: Asked) -> Outcome:
 
 def over_all(of: Asked) -> Outcome | None:
     """Test once over all statements whether the settings are answered alike."""
-    if of.k < 2 or of.verdicts_only:
+    if of.k < 2:
         return None
     of.each("all statements")
     return global_permutation(np.array(list(of.values.values())), draws=of.draws_over_all, seed=of.seed)

@@ -13,7 +13,7 @@ from study_app.analysis.answered import AGAIN, MANY, OVER_ALL, Asked, asked_agai
 from study_app.analysis.judging import judged
 from study_app.analysis.measures import Array
 from study_app.analysis.results import Against, BlockFound, Lowest, Tested, Waiting
-from study_app.analysis.statistics.equivalence import SAME, Equivalence, tost
+from study_app.analysis.statistics.equivalence import SAME, Equivalence, p_unseen, tost
 from study_app.analysis.statistics.equivalence_power import participants_needed
 from study_app.analysis.statistics.families import holm
 from study_app.analysis.statistics.paired import signed, signed_p
@@ -67,7 +67,7 @@ def _trends(of: Asked) -> tuple[tuple[Tested, ...], tuple[Waiting, ...]]:
         direction = of.decided.direction(item.id)
         if direction is not None:
             of.each(item.short)
-            outcomes[item.id] = page(of.values[item.id], direction, seed=of.seed)
+            outcomes[item.id] = page(of.values[item.id], direction, seed=of.intervals)
     undirected = [item.short for item in of.block.items if item.id not in outcomes]
     why = f"the protocol does not say whether answers should rise or fall with delay ({', '.join(undirected)})"
     found = judged(outcomes, of.decided, f"{of.block.id}: trend over delay")
@@ -117,25 +117,31 @@ def _against(of: Asked, delays_ms: list[float]) -> tuple[tuple[Against, ...], tu
 
 def _tost(of: Asked, differences: Array, bound: float) -> Equivalence:
     """Compare one delay with the shortest; where verdicts alone are asked for, only as far as they need it."""
-    not_equal = _not_equivalent(differences, bound, of.decided.alpha) if of.verdicts_only else None
-    if not_equal is not None:
-        return not_equal
+    found = _at_once(of, differences, bound) if of.verdicts_only else None
+    if found is not None:
+        return found
     return tost(differences, bound, alpha=of.decided.alpha, seed=of.seed, checks=of.n <= MANY)
 
 
-def _not_equivalent(differences: Array, bound: float, alpha: float) -> Equivalence | None:
-    """Return a comparison that the t tests do not show to be equivalent, without what its verdict does not need.
+def _at_once(of: Asked, differences: Array, bound: float) -> Equivalence | None:
+    """Return a comparison without what its verdict does not need; None where it needs all tests.
 
-    None where it may be equivalent: all tests are then needed.
+    That is so where it may be equivalent; where equivalence is not asked for, only if it may be different, too.
     """
-    n, sd = len(differences), float(np.std(differences, ddof=1)) if len(differences) > 1 else 0.0
+    n, sd, alpha = (
+        len(differences),
+        float(np.std(differences, ddof=1)) if len(differences) > 1 else 0.0,
+        of.decided.alpha,
+    )
     if np.isnan(differences).any() or sd <= SAME:
         return None
     mean, error = float(differences.mean()), sd / np.sqrt(n)
-    p = float(stdtr(n - 1, (abs(mean) - bound) / error))
+    p: float | None = float(stdtr(n - 1, (abs(mean) - bound) / error))
     p_different = 2 * float(stdtr(n - 1, -abs(mean) / error))
-    if p <= alpha:
-        return None
+    if p <= alpha and p_unseen(n, equal=False) <= alpha:
+        if of.equivalence or p_different <= alpha:
+            return None
+        p = None
     by_ranks = None
     if p_different <= alpha:
         ranks, signs = signed(differences)

@@ -100,6 +100,6 @@ def _recognised(of: Asked) -> tuple[Named | None, tuple[Waiting, ...]]:
         return None, (Waiting(RECOGNITION, f"it needs 2 to {MOST} settings and two names"),)
     ratings = np.stack([of.values[label] for label in labels], axis=2)
     truth = [None if label is None else labels.index(label) for label in right]
-    found = recognition(named(ratings), truth, len(labels), seed=of.seed)
+    found = recognition(named(ratings), truth, len(labels), seed=of.intervals)
     said = verdict(found.p, found.smallest_p, of.decided.alpha, primary=of.decided.binding)
     return Named(labels, of.block.codes, right, found, said), ()

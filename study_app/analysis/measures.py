@@ -139,6 +139,8 @@ def presentations(
 
 def medians(values: Array) -> Array:
     """Return the medians (participants, settings) of (participants, settings, presentations), NaN where none is."""
+    if values.shape[2] == 1:
+        return values[..., 0]
     there = ~np.isnan(values)
     found = np.full(values.shape[:2], np.nan)
     some = there.any(axis=2)

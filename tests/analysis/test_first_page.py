@@ -18,7 +18,7 @@ from tests.analysis.made_up import DECIDED, ITEMS, delays, everybody, liquids, s
 DELAYS = (0.0, 50.0, 100.0, 150.0)
 
 
-def of_delays(answer: object, people: int = 12) -> Results:
+def of_delays(answer: object, people: int = 16) -> Results:
     settings = delays(DELAYS)
     return evaluate(study(settings, list(everybody(settings, people, answer))), planning=False)
 
@@ -115,3 +115,23 @@ def test_the_page_holds_pictures_limits_and_how_often_it_is_wrong() -> None:
 @pytest.mark.parametrize(("participants", "n"), [(1, 5), (10, 12), (200, 24)])
 def test_the_measured_rate_is_that_of_the_nearest_size(participants: int, n: int) -> None:
     assert f"with {n} participants" in empty_studies(participants)
+
+
+def test_a_claim_needs_the_test_over_all_statements_corrected_over_the_blocks() -> None:
+    results = rising(3)
+    assert results.blocks[0].overall is not None
+
+    def with_p(*ps: float) -> list[bool]:
+        blocks = tuple(
+            replace(results.blocks[0], overall=replace(results.blocks[0].overall, p=p))  # type: ignore[type-var]
+            for p in ps
+        )
+        return [one.claims for one in answers(replace(results, blocks=blocks)) if one.question == "noticed from"]
+
+    assert with_p(0.05) == [True]
+    assert with_p(0.051) == [False]
+    assert with_p(0.03, 0.9) == [False, False]
+    assert with_p(0.02, 0.04) == [True, True]
+    none = replace(results, blocks=(replace(results.blocks[0], overall=None),))
+    assert named(none, "noticed from").told.startswith("Nothing is claimed here")
+    assert named(none, "noticed from").sizes == ()

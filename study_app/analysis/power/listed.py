@@ -11,6 +11,7 @@ from study_app import __version__
 from study_app.analysis.power.counting import EFFECTS
 from study_app.analysis.power.drawn import DRAWS
 from study_app.analysis.power.found import WANTED, Curve, Powers, Question, interval
+from study_app.analysis.report.words import enough
 from study_app.store.columns import Column
 from study_app.store.tables import csv_bytes
 
@@ -148,7 +149,8 @@ def _explained(question: Question, found: Powers) -> list[str]:
         case "equivalence":
             return [
                 f"Two one-sided t tests within ±{found.plan.decided.equivalence_bound} points, with which changing "
-                "signs and signed ranks must agree. Where the model's difference is near the bound or beyond it, "
+                "signs, signed ranks and the bootstrap-t must agree, and with "
+                f"{enough(found.plan.decided.alpha)}. Where the model's difference is near the bound or beyond it, "
                 "finding equivalence would be wrong, and few should."
             ]
 

@@ -6,13 +6,14 @@ An answer is a sentence, then directions, sizes and intervals; the p that decide
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Final, Literal, TypeAlias
 
 from study_app.analysis.decided import Decided
 from study_app.analysis.report.words import all_of, beyond, counted, interval, listed, ms, name, number, percent, short
 from study_app.analysis.results import Against, BlockFound, Named, Results, Tested
+from study_app.analysis.statistics.families import holm
 from study_app.analysis.statistics.outcome import Interval
 from study_app.analysis.statistics.paired import Paired
 
@@ -45,11 +46,31 @@ class Answer:
 
 
 def answers(results: Results) -> tuple[Answer, ...]:
-    """Return the answers that a study gives, block by block."""
-    return tuple(one for found in results.blocks for one in of_block(found, results.decided))
+    """Return the answers that a study gives, block by block.
+
+    They claim something about a block only where the one test over all its statements finds a difference, corrected
+    by Holm over the blocks: in a study where nothing differs they then claim anything at most so often as alpha says.
+    """
+    overall = holm([None if found.overall is None else found.overall.p for found in results.blocks])
+    return tuple(
+        _unless_claimed_alone(one, p, results.decided.alpha)
+        for found, p in zip(results.blocks, overall, strict=True)
+        for one in _of_block(found, results.decided)
+    )
 
 
-def of_block(found: BlockFound, decided: Decided) -> tuple[Answer, ...]:
+def _unless_claimed_alone(answer: Answer, p_over_all: float | None, alpha: float) -> Answer:
+    """Return an answer without its claim where the test over all statements does not find a difference."""
+    if not answer.claims or (p_over_all is not None and p_over_all <= alpha):
+        return answer
+    told = (
+        "Nothing is claimed here: single tests in the sections below find something, but the test over all statements "
+        f"does not find a difference. {NO_EVIDENCE}"
+    )
+    return replace(answer, told=told, sizes=(), claims=False, exploratory=False)
+
+
+def _of_block(found: BlockFound, decided: Decided) -> tuple[Answer, ...]:
     """Return the answers that a block gives: none before anybody's answers count."""
     if not found.n:
         return ()

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from study_app.analysis.report.meaning import VERDICTS, by_delay, tempting_ms
 from study_app.analysis.report.meaning import meaning as paragraphs_on_delay
 from study_app.analysis.report.page import box, heading, paragraph, table
-from study_app.analysis.report.words import beyond, counted, interval, ms, number, p_value, percent, short
+from study_app.analysis.report.words import beyond, counted, enough, interval, ms, number, p_value, percent, short
 from study_app.analysis.results import Against, BlockFound, Results
 from study_app.analysis.statistics.equivalence import Equivalence
 from study_app.analysis.statistics.equivalence_power import MOST, STUDIES
@@ -106,9 +106,11 @@ def _about_against(against: Sequence[Against]) -> Iterator[str]:
         f"Two one-sided t tests with a bound of ±{first.bound:g}, intervals of {percent(1 - 2 * first.alpha)}. "
         "Equivalent: the t tests, changes of signs, signed ranks and the bootstrap-t (for answers that lean to one "
         "side) all show that the mean lies within the bound; each comparison stands for itself, so that a single one "
-        "among many is weak. It is about the mean: people beyond the bound are counted beside it, with a 95 % "
-        "Clopper-Pearson interval of their share. Different: the larger p of a two-sided t test and of exact signed "
-        f"ranks, Holm-adjusted over the {len(against)} comparisons of this table, is at most {first.alpha:g}. Where "
+        "among many is weak. "
+        f"It needs {enough(first.alpha)}. It is about the mean: the table also states how many people differ by more "
+        "than the bound, with a 95 % Clopper-Pearson interval of their share. Different: the larger p of a two-sided "
+        f"t test and of exact signed ranks, Holm-adjusted over the {len(against)} comparisons of this table, is at "
+        f"most {first.alpha:g}. Where "
         "all differences are equal, signs and ranks decide. Inconclusive: neither. Out of reach: no answers of so "
         "many participants could have given either. n for 80 %: participants with whom all these tests would show "
         f"equivalence in 80 % of simulated studies ({STUDIES} for each number, differences about 0 with this spread, "

@@ -10,6 +10,7 @@ from study_app.analysis.measures import QUARTILES
 from study_app.analysis.report.words import (
     all_of,
     counted,
+    enough,
     listed,
     percent,
     said_of_presentations,
@@ -143,7 +144,8 @@ def _delays(found: BlockFound, results: Results) -> Iterator[str]:
         yield (
             f"Equivalence to {found.delays_ms[0]:g} ms was tested by two one-sided t tests on paired differences with "
             f"a bound of ±{bound:g} {points}{_beforehand(results)}, and {level} intervals, and called equivalent only "
-            "where changes of signs, signed ranks and the bootstrap-t agreed; it was called different where "
+            "where changes of signs, signed ranks and the bootstrap-t agreed, and with "
+            f"{enough(results.decided.alpha)}; it was called different where "
             "the larger p of a t test and of exact signed ranks, Holm-adjusted over all these comparisons, was at most "
             "alpha, and otherwise inconclusive."
         )

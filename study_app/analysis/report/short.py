@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from study_app.analysis.report.words import (
     all_of,
     counted,
+    enough,
     higher,
     interval,
     lead,
@@ -20,6 +21,7 @@ from study_app.analysis.report.words import (
     short,
 )
 from study_app.analysis.results import BlockFound, Results, Tested
+from study_app.analysis.statistics.equivalence import fewest
 from study_app.analysis.statistics.outcome import FEW
 from study_app.analysis.tables import Study
 
@@ -107,6 +109,8 @@ def _mixed_up(found: BlockFound, results: Results) -> Iterator[str]:
 
 
 def _of_equivalence(found: BlockFound) -> Iterator[str]:
+    if found.against and found.n < fewest(found.against[0].found.alpha):
+        yield f"{lead(found)}: equivalence needs {enough(found.against[0].found.alpha)}. This study has {found.n}."
     undecided = [one for one in found.against if one.verdict in ("inconclusive", "out of reach")]
     if undecided:
         yield (
@@ -121,8 +125,8 @@ def _of_block(found: BlockFound, alpha: float) -> Iterator[str]:
     if overall is not None and overall.p is not None:
         yield (
             f"{lead(found)}: one test over {all_of(len(found.items), 'statement')} "
-            f"{'tells' if overall.p <= alpha else 'does not tell'} the {noun}s apart ({p_equals(overall.p)}, "
-            f"n = {overall.n})."
+            f"{'finds' if overall.p <= alpha else 'does not find'} a difference between the {noun}s "
+            f"({p_equals(overall.p)}, n = {overall.n})."
         )
     told = _shown(found, found.omnibus)
     if told:

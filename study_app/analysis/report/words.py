@@ -7,7 +7,7 @@ from typing import Final
 
 from study_app.analysis.questions import Block
 from study_app.analysis.results import BlockFound
-from study_app.analysis.statistics.equivalence import Equivalence
+from study_app.analysis.statistics.equivalence import UNSEEN, UNSEEN_EQUAL, Equivalence, fewest
 from study_app.analysis.statistics.outcome import Interval, Outcome
 from study_app.analysis.statistics.paired import Paired
 
@@ -140,6 +140,16 @@ def said_of_presentations(found: BlockFound) -> tuple[str, ...]:
             "and are a factor of the mixed model; the other tests pool them."
         )
     return tuple(lines)
+
+
+def enough(alpha: float) -> str:
+    """Return how many participants equivalence takes at least, and why."""
+    one_in, one_in_equal = (NUMBERS[round(1 / share)] for share in (UNSEEN, UNSEEN_EQUAL))
+    return (
+        f"at least {fewest(alpha)} participants ({fewest(alpha, equal=True)} where all differences are equal): more "
+        f"than {percent(alpha)} of smaller samples contain nobody from a group of one person in {one_in} (one in "
+        f"{one_in_equal})"
+    )
 
 
 def higher(found: BlockFound, outcome: Outcome) -> str:

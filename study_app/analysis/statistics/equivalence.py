@@ -13,10 +13,11 @@ from typing import Any, Final, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.stats import binomtest, ttest_1samp
+from scipy.special import stdtr
+from scipy.stats import ttest_1samp
 
 from study_app.analysis.statistics.bootstrap_t import p_within, resamples_for
-from study_app.analysis.statistics.outcome import DRAWS, Array, Interval, Outcome, checked, told
+from study_app.analysis.statistics.outcome import DRAWS, Array, Interval, Outcome, checked, clopper_pearson, told
 from study_app.analysis.statistics.paired import Alternative, signed, signed_p
 from study_app.errors import AnalysisError
 
@@ -27,6 +28,11 @@ ALL_SIGNS_UP_TO: Final = 14
 
 SAME: Final = 1e-9
 """Differences that spread less than this are equal."""
+
+UNSEEN: Final = 1 / 5
+UNSEEN_EQUAL: Final = 1 / 4
+"""A group of this share of all people, who differ strongly, must not be missed by chance; the second where all
+differences are equal."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,7 +52,8 @@ class Equivalence(Outcome):
     Three more tests ask the same without normality: ``p_permutation`` (signs of the shifted differences), ``p_ranks``
     (signed ranks, which bound the pseudo-median), both for differences that lie symmetrically, and ``p_bootstrap``
     (bootstrap-t), for those that lean to one side. Where all differences are equal there is no t, and the signs and
-    ranks alone decide: ``p`` is the larger of theirs.
+    ranks alone decide: ``p`` is the larger of theirs. No test sees people who are not in the sample: ``p_unseen`` is
+    the probability that it holds nobody of a group of the share ``UNSEEN`` of all people.
 
     ``verdict`` is "equivalent" where every p is at most alpha; else "different" where the larger p of a t test against
     0 (``p_different``) and of signed ranks (``p_different_ranks``) is; else "out of reach" where no answers of so many
@@ -68,6 +75,7 @@ class Equivalence(Outcome):
     p_permutation: float | None = None
     p_ranks: float | None = None
     p_bootstrap: float | None = None
+    p_unseen: float | None = None
     smallest_check_p: float | None = None
     checks_agree: bool | None = None
     sd: float | None = None
@@ -76,8 +84,8 @@ class Equivalence(Outcome):
 
     @property
     def equal(self) -> bool:
-        """Whether every test for equivalence shows it."""
-        asked = (self.p, self.p_permutation, self.p_ranks, self.p_bootstrap)
+        """Whether every test for equivalence shows it, by enough participants."""
+        asked = (self.p, self.p_permutation, self.p_ranks, self.p_bootstrap, self.p_unseen)
         return self.p is not None and all(p is None or p <= self.alpha for p in asked)
 
     @property
@@ -91,7 +99,7 @@ class Equivalence(Outcome):
             return replace(self, verdict="equivalent")
         if p_adjusted is not None and p_adjusted <= self.alpha:
             return replace(self, verdict="different")
-        hopeless = min(0.5**self.n, 2 * members * 0.5**self.n) > self.alpha
+        hopeless = min(p_unseen(self.n, equal=True), 2 * members * 0.5**self.n) > self.alpha
         return replace(self, verdict="out of reach" if hopeless else "inconclusive")
 
 
@@ -117,8 +125,30 @@ def tost(
     if not (bound > 0.0 and math.isfinite(bound)):
         raise AnalysisError(f"a bound of equivalence of {bound} means nothing; give one above 0 in points of the scale")
     array = checked(differences, "participants")
-    kept = array[~np.isnan(array)]
-    found = _described(kept, len(array) - len(kept), bound, alpha)
+    kept = np.sort(array[~np.isnan(array)])
+    found = _compared(tuple(kept.tolist()), float(bound), alpha, seed, checks)
+    return replace(found, dropped=len(array) - len(kept))
+
+
+def p_unseen(n: int, *, equal: bool) -> float:
+    """Return the probability that a group of the share ``UNSEEN`` is not among ``n`` participants at all.
+
+    The Clopper-Pearson upper bound of the share of people who differ strongly, where none of ``n`` does, is below
+    that share where this is at most alpha. ``equal``: all differences are equal.
+    """
+    return float((1 - (UNSEEN_EQUAL if equal else UNSEEN)) ** n)
+
+
+def fewest(alpha: float, *, equal: bool = False) -> int:
+    """Return how many participants it takes at least to show equivalence."""
+    return math.ceil(math.log(alpha) / math.log(p_unseen(1, equal=equal)) - 1e-9)
+
+
+@lru_cache(maxsize=4096)
+def _compared(differences: tuple[float, ...], bound: float, alpha: float, seed: int, checks: bool) -> Equivalence:
+    """Return the comparison of ascending ``differences``: answers in whole points repeat."""
+    kept = np.array(differences)
+    found = _described(kept, bound, alpha)
     if not len(kept):
         return found
     if found.sd is not None and found.sd > SAME:
@@ -130,18 +160,20 @@ def tost(
         asked = (found.p_permutation, found.p_ranks, found.p_bootstrap)
         by_t = found.p is not None and found.p <= alpha
         found = replace(found, checks_agree=all((p is None or p <= alpha) == by_t for p in asked))
+    if found.p is not None:
+        found = replace(found, p_unseen=p_unseen(found.n, equal=found.t is None))
     found = found.judged(found.p_difference, 1)
     return replace(found, note=_note(found)) if found.p is not None else found
 
 
-def _described(kept: Array, dropped: int, bound: float, alpha: float) -> Equivalence:
+def _described(kept: Array, bound: float, alpha: float) -> Equivalence:
     """Return what can be said before any test."""
     n = len(kept)
     reason = f"all {n} differences are equal: no spread for an interval" if n > 1 else f"{told(n)}: no spread"
     return Equivalence(
         test="equivalence, two one-sided t tests",
         n=n,
-        dropped=dropped,
+        dropped=0,
         statistic_name="t",
         statistic=None,
         p=None,
@@ -153,7 +185,7 @@ def _described(kept: Array, dropped: int, bound: float, alpha: float) -> Equival
         note=reason,
         bound=bound,
         alpha=alpha,
-        verdict="inconclusive" if 0.5**n <= alpha else "out of reach",
+        verdict="out of reach",
         smallest_check_p=_smallest(n) if n else None,
         sd=float(kept.std(ddof=1)) if n > 1 else None,
         beyond=_beyond(kept, bound) if n else None,
@@ -162,28 +194,26 @@ def _described(kept: Array, dropped: int, bound: float, alpha: float) -> Equival
 
 def _beyond(kept: Array, bound: float) -> Beyond:
     count, n = int((np.abs(kept) > bound + SAME).sum()), len(kept)
-    ends = binomtest(count, n).proportion_ci(0.95, method="exact")
-    interval = Interval(float(ends.low), float(ends.high), 0.95, "Clopper-Pearson")
-    return Beyond(count=count, n=n, share=count / n, interval=interval)
+    return Beyond(count=count, n=n, share=count / n, interval=clopper_pearson(count, n))
 
 
 def _by_t(kept: Array, sd: float, bound: float, alpha: float) -> dict[str, Any]:
     """Return what the t tests say."""
-    lower = ttest_1samp(kept, -bound, alternative="greater")
-    upper = ttest_1samp(kept, bound, alternative="less")
     different = ttest_1samp(kept, 0.0)
     ends = different.confidence_interval(1 - 2 * alpha)
+    lower, upper = (float((kept.mean() + side * bound) / (sd / math.sqrt(len(kept)))) for side in (1, -1))
+    p_lower, p_upper = float(stdtr(len(kept) - 1, -lower)), float(stdtr(len(kept) - 1, upper))
     return {
-        "statistic": float(min(lower.statistic, -upper.statistic)),
-        "p": float(max(lower.pvalue, upper.pvalue)),
+        "statistic": min(lower, -upper),
+        "p": max(p_lower, p_upper),
         "method": f"t({len(kept) - 1}), bound ±{bound:g} points",
         "interval": Interval(float(ends.low), float(ends.high), 1 - 2 * alpha, "t"),
         "t": float(different.statistic),
-        "t_lower": float(lower.statistic),
-        "t_upper": float(upper.statistic),
+        "t_lower": lower,
+        "t_upper": upper,
         "p_different": float(different.pvalue),
-        "p_lower": float(lower.pvalue),
-        "p_upper": float(upper.pvalue),
+        "p_lower": p_lower,
+        "p_upper": p_upper,
         "smallest_check_p": None,
     }
 
@@ -219,6 +249,10 @@ def _note(found: Equivalence) -> str:
         return "different from 0, but within the bound" if differs else ""
     if found.verdict == "different":
         return "the difference is shown, and it is not shown to stay within the bound"
+    if max(p for p in (found.p, found.p_permutation, found.p_ranks, found.p_bootstrap, 0.0) if p is not None) <= (
+        found.alpha
+    ):
+        return f"too few participants to call it equivalent: {fewest(found.alpha)} are needed"
     return "neither a difference nor equivalence is shown"
 
 
@@ -239,14 +273,16 @@ def _all_signs(n: int) -> Array:
     return np.asarray(1.0 - 2.0 * (np.arange(2**n)[:, None] >> np.arange(n) & 1), dtype=np.float64)
 
 
+@lru_cache(maxsize=4)
+def _drawn_signs(n: int, seed: int) -> Array:
+    """Return random signs (draws, n)."""
+    return np.random.default_rng(seed).choice([-1.0, 1.0], (DRAWS, n))
+
+
 def _signs(shifted: Array, seed: int) -> float:
     """Return the one-sided p that the mean of ``shifted`` (n,) is above 0, by changing signs."""
     n, found = len(shifted), shifted.sum()
     rounding = 1e-9 * np.abs(shifted).sum()
     if n <= ALL_SIGNS_UP_TO:
         return float((_all_signs(n) @ shifted >= found - rounding).mean())
-    rng = np.random.default_rng(seed)
-    sums = np.zeros(DRAWS)
-    for value in shifted:
-        sums += np.where(rng.random(DRAWS) < 0.5, value, -value)
-    return (1 + int((sums >= found - rounding).sum())) / (1 + DRAWS)
+    return (1 + int((_drawn_signs(n, seed) @ shifted >= found - rounding).sum())) / (1 + DRAWS)

@@ -16,7 +16,7 @@ from scipy.stats import norm
 from scipy.stats import t as t_distribution
 
 from study_app.analysis.statistics.bootstrap_t import p_within
-from study_app.analysis.statistics.equivalence import SAME
+from study_app.analysis.statistics.equivalence import SAME, fewest, p_unseen
 from study_app.analysis.statistics.lattice import doubled_ranks
 from study_app.analysis.statistics.outcome import Array
 
@@ -48,7 +48,8 @@ def equivalent(
     mean = np.abs(differences.mean(axis=1))
     flat = spread <= SAME
     reach = float(t_distribution.ppf(1 - alpha, n - 1)) * spread / math.sqrt(n) if n > 1 else spread
-    shown = np.asarray(np.where(flat, (mean < bound - SAME) & (0.5**n <= alpha) & (n > 1), mean + reach <= bound))
+    many, many_equal = p_unseen(n, equal=False) <= alpha, p_unseen(n, equal=True) <= alpha
+    shown = np.asarray(np.where(flat, (mean < bound - SAME) & many_equal, (mean + reach <= bound) & many))
     held = np.flatnonzero(shown & ~flat)
     up = (rng.random((draws, n)) < 0.5).astype(np.float32)
     for part in np.array_split(held, max(1, math.ceil(len(held) / AT_ONCE))):
@@ -101,7 +102,7 @@ def _needed(place: int, step: float, bound: float, alpha: float) -> int | None:
     def enough(n: int) -> bool:
         return power(n, normal, step, bound, alpha) >= POWER
 
-    least = max(2, math.ceil(-math.log2(alpha)))
+    least = fewest(alpha, equal=True)
     by_t = math.ceil((float(norm.ppf([1 - alpha, (1 + POWER) / 2]).sum()) * sd / bound) ** 2)
     low, high = least - 1, max(least, by_t)
     while high <= MOST and not enough(high):

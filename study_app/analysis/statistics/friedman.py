@@ -14,8 +14,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.stats import chi2 as chi_square
-from scipy.stats import f as f_distribution
+from scipy.special import chdtrc, fdtrc
 
 from study_app.analysis.statistics.lattice import doubled_ranks
 from study_app.analysis.statistics.outcome import DRAWS, NO_VARIATION, Array, Outcome, Whole, complete
@@ -28,6 +27,9 @@ DRAWN_UP_TO: Final = 200
 cannot fall below 1 / (1 + draws)."""
 
 APPROXIMATE: Final = f"chi-square approximation, corrected for ties, as always above {DRAWN_UP_TO} participants"
+
+DENSE: Final = 50_000
+"""Up to so many codes of rank sums are counted in a table, which is quicker than sorting them."""
 
 TABLED: Final = 7
 """Up to so many settings all their orders fit into a table."""
@@ -76,7 +78,7 @@ def friedman(values: ArrayLike, *, draws: int = DRAWS, seed: int = 1) -> Friedma
     statistic = (k - 1) * squares / spread
     w = statistic / (n * (k - 1))
     p, smallest, method = _p(ranks, int(squares), draws, seed)
-    approximate = float(chi_square.sf(statistic, k - 1))
+    approximate = float(chdtrc(k - 1, statistic))
     f, p_f = _f(w, n, k)
     return Friedman(
         test="Friedman",
@@ -115,7 +117,7 @@ def _f(w: float, n: int, k: int) -> tuple[float | None, float | None]:
         return None, None
     f = (n - 1) * w / (1 - w)
     df = k - 1 - 2 / n
-    return float(f), float(f_distribution.sf(f, df, (n - 1) * df))
+    return float(f), float(fdtrc(df, (n - 1) * df, f))
 
 
 def _without(n: int, dropped: int, k: int, note: str) -> Friedman:
@@ -166,6 +168,7 @@ def distribution(patterns: tuple[tuple[int, ...], ...]) -> tuple[Whole, Array] |
     if k > TABLED or base**k >= 2**62:
         return None
     powers = base ** np.arange(k, dtype=np.int64)
+    dense = base ** (k - 1) <= DENSE
     states = np.zeros((1, k), dtype=np.int64)
     weights: Array = np.ones(1)
     work = 0
@@ -175,8 +178,16 @@ def distribution(patterns: tuple[tuple[int, ...], ...]) -> tuple[Whole, Array] |
         if work > WORK:
             return None
         sums = np.sort((states[:, None, :] + orders[None, :, :]).reshape(-1, k), axis=1)
+        given = np.repeat(weights / len(orders), len(orders))
+        if dense:  # the last sum follows from the others: without it the codes are few enough to be counted
+            counted = np.bincount(sums[:, :-1] @ powers[:-1], given)
+            codes = np.flatnonzero(counted)
+            weights = counted[codes]
+            states = codes[:, None] // powers[:-1] % base
+            states = np.column_stack([states, sums[0].sum() - states.sum(axis=1)])
+            continue
         codes, place = np.unique(sums @ powers, return_inverse=True)
-        weights = np.bincount(place.ravel(), np.repeat(weights / len(orders), len(orders))).astype(np.float64)
+        weights = np.bincount(place.ravel(), given).astype(np.float64)
         states = codes[:, None] // powers % base
     support, place = np.unique(_squares(states, n), return_inverse=True)
     chances = np.bincount(place.ravel(), weights=weights)

@@ -117,10 +117,10 @@ def _p(scores: Array, found: float, draws: int, seed: int) -> tuple[float, float
         p = float((reached >= found * (1 - ROUNDING)).mean())
         return p, float((reached >= highest * (1 - ROUNDING)).mean()), "exact permutation"
     rng = np.random.default_rng(seed)
-    sums = np.zeros((draws, items, k))
+    sums = np.zeros((items, draws, k))
     for person in people:
-        sums += person[:, shuffles(rng, draws, k)].transpose(1, 0, 2)
-    p = (1 + int((_statistic(sums) >= found * (1 - ROUNDING)).sum())) / (1 + draws)
+        sums += person[:, shuffles(rng, draws, k)]
+    p = (1 + int((_statistic(sums.transpose(1, 0, 2)) >= found * (1 - ROUNDING)).sum())) / (1 + draws)
     least = max(1 / (1 + draws), math.exp((1 - n) * math.log(orders)))
     return p, least, f"Monte Carlo permutation, {draws} draws, seed {seed}"
 

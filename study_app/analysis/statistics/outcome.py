@@ -7,10 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.stats import binomtest
 
 from study_app.errors import AnalysisError
 
@@ -112,6 +114,13 @@ def complete(values: ArrayLike, *, at_least: int, why: str) -> tuple[Array, int]
 def told(count: int, noun: str = "participant") -> str:
     """Return "1 participant", "5 participants"."""
     return f"{count} {noun}" + ("" if count == 1 else "s")
+
+
+@lru_cache(maxsize=4096)
+def clopper_pearson(count: int, n: int) -> Interval:
+    """Return the exact 95 % interval of a share of ``count`` in ``n``."""
+    ends = binomtest(count, n).proportion_ci(0.95, method="exact")
+    return Interval(float(ends.low), float(ends.high), 0.95, "Clopper-Pearson")
 
 
 def resamples(n: int, seed: int) -> Iterator[Whole]:

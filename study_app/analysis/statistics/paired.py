@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.stats import norm, rankdata
+from scipy.stats import norm
 
-from study_app.analysis.statistics.lattice import Lattice, total
+from study_app.analysis.statistics.lattice import Lattice, doubled_ranks
 from study_app.analysis.statistics.outcome import Array, Interval, Outcome, Whole, checked
 from study_app.errors import AnalysisError
 
@@ -105,9 +106,7 @@ def signed(differences: Array, zeros: Zeros = "wilcox") -> tuple[Whole, Array]:
     kept = differences != 0.0
     ranked = differences[kept] if zeros == "wilcox" else differences
     # Differences of decimals that should tie differ in the last bit: 0.3 - 0.1 and 0.2.
-    ranks = (
-        np.rint(2 * rankdata(np.round(np.abs(ranked), 9))).astype(np.int64) if len(ranked) else np.zeros(0, np.int64)
-    )
+    ranks = doubled_ranks(np.round(np.abs(ranked), 9)[None])[0]
     return (ranks if zeros == "wilcox" else ranks[kept]), np.sign(differences[kept])
 
 
@@ -124,14 +123,19 @@ def signed_p(ranks: Whole, v: int, alternative: Alternative = "two-sided") -> tu
     if n > EXACT_UP_TO:
         deviation = (tail - ranks.sum() / 2) / math.sqrt(float((ranks.astype(float) ** 2).sum()) / 4)
         return min(1.0, both * float(norm.sf(deviation))), None, "normal approximation, corrected for ties"
-    sums = total(_coin(int(rank)) for rank in ranks)
+    sums = _sums(tuple(sorted(ranks.tolist())))
     return min(1.0, both * sums.at_least(tail)), min(1.0, both * sums.highest), "exact permutation of signs"
 
 
-def _coin(rank: int) -> Lattice:
-    chances = np.zeros(rank + 1)
-    chances[[0, -1]] = 0.5
-    return Lattice(0, chances)
+@lru_cache(maxsize=4096)
+def _sums(ranks: tuple[int, ...]) -> Lattice:
+    """Return the distribution of the sum of the ranks that are positive, each of them with probability 1/2."""
+    ways, highest = np.zeros(sum(ranks) + 1), 0
+    ways[0] = 1.0
+    for rank in ranks:
+        ways[rank : highest + rank + 1] += ways[: highest + 1].copy()
+        highest += rank
+    return Lattice(0, ways / 2.0 ** len(ranks))
 
 
 def _fisher(effect: float | None, n: int) -> tuple[Interval | None, str]:

@@ -9,6 +9,7 @@ so that it does not depend on starting values.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import product
 from typing import Final, Literal, TypeAlias
 
@@ -16,7 +17,7 @@ import numpy as np
 from scipy.optimize import minimize
 from scipy.special import expit, ndtr, ndtri
 
-from study_app.analysis.statistics.outcome import MINIMISER, Array
+from study_app.analysis.statistics.outcome import MINIMISER, Array, Whole
 
 Shape: TypeAlias = Literal["logistic", "normal"]
 Bounds: TypeAlias = tuple[float, float]
@@ -45,10 +46,13 @@ RATES: Final = (0.0, 0.02, 0.06, 0.12, 0.2, 0.3, 0.4, 0.5)
 STEPS: Final = np.array(list(product((0.0, -1.0, 1.0), repeat=3)))
 FIRST_STEP: Final = np.array([0.3, 0.03, 0.03])
 ROUNDS: Final = 40
-"""A node moves to its best neighbour (log width, guesses, lapses), or halves its steps, so many times."""
+"""A node moves to its best neighbour (log width, guesses, lapses), or halves its steps, so many times at most."""
+
+FINEST: Final = 1e-3
+"""The search ends where all steps of the log width are smaller."""
 
 POLISHED: Final = 3
-"""The best curve is refined from so many nodes of the profile."""
+"""The best curve is refined from so many local maxima of the profile at most."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,31 +110,59 @@ def places(counts: Counts) -> Array:
     return np.linspace(counts.levels.min() - counts.span, counts.levels.max() + counts.span, PLACES)
 
 
-def profile(counts: Counts, shape: Shape, guess: Bounds, lapse: Bounds, thresholds: Array) -> Profile:
-    """Return the curves of maximum likelihood at ``thresholds`` (places,), with rates within bounds.
+def profile(counts: Counts, shape: Shape, guess: Bounds, lapse: Bounds) -> Profile:
+    """Return the curves of maximum likelihood at the thresholds of the grid, with rates within bounds.
 
     Equal bounds hold a rate fixed.
     """
+    nodes, yes, no = _grid(tuple(counts.levels.tolist()), shape, guess, lapse)
+    best = (yes @ counts.yes + no @ (counts.asked - counts.yes)).argmax(axis=1)
+    return _refined(counts, shape, guess, lapse, places(counts), nodes[best])
+
+
+def profile_at(
+    counts: Counts, shape: Shape, guess: Bounds, lapse: Bounds, coarse: Profile, thresholds: Array
+) -> Profile:
+    """Return the curves of maximum likelihood at any ``thresholds`` (places,) within the grid.
+
+    ``coarse`` is the profile over the grid: the search begins at both of its neighbours.
+    """
+    after = np.clip(np.searchsorted(coarse.thresholds, thresholds), 1, len(coarse.thresholds) - 1)
+    near = coarse.others[np.stack([after - 1, after], axis=1)]
+    best = _at(counts, shape, thresholds[:, None], near).argmax(axis=1)
+    return _refined(counts, shape, guess, lapse, thresholds, near[np.arange(len(best)), best])
+
+
+@lru_cache(maxsize=4)
+def _grid(levels: tuple[float, ...], shape: Shape, guess: Bounds, lapse: Bounds) -> tuple[Array, Array, Array]:
+    """Return the nodes (nodes, 3) and the logs of the shares of yes and no there (places, nodes, levels)."""
+    counts = Counts(np.array(levels), np.zeros(len(levels)), np.ones(len(levels)))
+    nodes = np.array(list(product(np.linspace(*_log_widths(counts), WIDTHS), _rates(guess), _rates(lapse))))
+    expected = np.clip(_expected(counts, shape, places(counts)[:, None], nodes[None]), TINY, 1 - TINY)
+    return nodes, np.log(expected), np.log1p(-expected)
+
+
+def _refined(counts: Counts, shape: Shape, guess: Bounds, lapse: Bounds, thresholds: Array, found: Array) -> Profile:
+    """Search on from the nodes ``found`` (places, 3)."""
     low, high = _log_widths(counts)
-    nodes = np.array(list(product(np.linspace(low, high, WIDTHS), _rates(guess), _rates(lapse))))
-    values = _at(counts, shape, thresholds[:, None], nodes[None])
-    best = values.argmax(axis=1)
-    found, reached = nodes[best], values[np.arange(len(best)), best]
     lows, highs = np.array([low, guess[0], lapse[0]]), np.array([high, guess[1], lapse[1]])
     step = np.tile(np.minimum(FIRST_STEP, highs - lows), (len(thresholds), 1))
     rows = np.arange(len(thresholds))
+    reached = _at(counts, shape, thresholds, found)
     for _ in range(ROUNDS):
         near = np.clip(found[:, None] + step[:, None] * STEPS, lows, highs)
         values = _at(counts, shape, thresholds[:, None], near)
         best = values.argmax(axis=1)
         found, reached = near[rows, best], values[rows, best]
         step[best == 0] /= 2
+        if step[:, 0].max() < FINEST:
+            break
     return Profile(thresholds, reached, found)
 
 
 def fit(counts: Counts, shape: Shape, guess: Bounds, lapse: Bounds, begun: Profile | None = None) -> Curve:
     """Return the curve of maximum likelihood; ``begun`` is the profile over the grid, where it is known already."""
-    start = profile(counts, shape, guess, lapse, places(counts)) if begun is None else begun
+    start = profile(counts, shape, guess, lapse) if begun is None else begun
     low, span = float(counts.levels.min()), counts.span
     bounds = [(-1.0, 2.0), _log_widths(counts), guess, lapse]
     results = [
@@ -143,11 +175,18 @@ def fit(counts: Counts, shape: Shape, guess: Bounds, lapse: Bounds, begun: Profi
             bounds=bounds,
             options={"ftol": 1e-11, "gtol": 1e-7, "maxfun": 500},
         )
-        for place in np.argsort(-start.log_likelihoods, kind="stable")[:POLISHED]
+        for place in _maxima(start.log_likelihoods)[:POLISHED]
     ]
     best = min(results, key=lambda result: float(result.fun))
     place, log_width, guessed, lapsed = (float(value) for value in best.x)
     return Curve(low + place * span, float(np.exp(log_width)) * span, guessed, lapsed, -float(best.fun))
+
+
+def _maxima(heights: Array) -> Whole:
+    """Return the places that no neighbour exceeds, the highest first."""
+    fenced = np.pad(heights, 1, constant_values=-np.inf)
+    found = np.flatnonzero((heights >= fenced[:-2]) & (heights > fenced[2:]))
+    return np.asarray(found[np.argsort(-heights[found], kind="stable")])
 
 
 def at_bounds(counts: Counts, curve: Curve, guess: Bounds, lapse: Bounds) -> tuple[str, ...]:
@@ -177,11 +216,17 @@ def _rates(bounds: Bounds) -> tuple[float, ...]:
 
 def _at(counts: Counts, shape: Shape, thresholds: Array, others: Array) -> Array:
     """Return the log-likelihoods (…) at ``thresholds`` (…) and ``others`` (…, 3)."""
+    return _log_likelihoods(counts, _expected(counts, shape, thresholds, others))
+
+
+def _expected(counts: Counts, shape: Shape, thresholds: Array, others: Array) -> Array:
+    """Return the shares of yes answers (…, levels) at ``thresholds`` (…) and ``others`` (…, 3)."""
     factor = LOGISTIC if shape == "logistic" else NORMAL
     scale = factor / (np.exp(others[..., 0]) * counts.span)
     z = (counts.levels - thresholds[..., None]) * scale[..., None]
     grown = expit(z) if shape == "logistic" else ndtr(z)
-    return _log_likelihoods(counts, others[..., 1, None] + (1 - others[..., 1] - others[..., 2])[..., None] * grown)
+    found: Array = others[..., 1, None] + (1 - others[..., 1] - others[..., 2])[..., None] * grown
+    return found
 
 
 def _objective(values: Array, counts: Counts, shape: Shape, low: float, span: float) -> tuple[float, Array]:

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import permutations
 from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.stats import binomtest
 
 from study_app.analysis.statistics.agreement import kappa
 from study_app.analysis.statistics.lattice import Lattice, of_values, total
@@ -25,6 +25,7 @@ from study_app.analysis.statistics.outcome import (
     Outcome,
     Whole,
     checked,
+    clopper_pearson,
     percentiles,
     resamples,
 )
@@ -83,7 +84,7 @@ def named(ratings: ArrayLike) -> Whole:
     return np.where(missing, UNANSWERED, np.where(tied, UNDECIDED, filled.argmax(axis=2))).astype(np.int64)
 
 
-def recognition(names: ArrayLike, truth: Sequence[int | None], labels: int, *, seed: int = 1) -> Recognition:
+def recognition(names: ArrayLike, truth: Sequence[int | None], labels: int, *, seed: int | None = 1) -> Recognition:
     """Test whether settings were named for what they were, more often than by chance.
 
     Parameters
@@ -94,8 +95,8 @@ def recognition(names: ArrayLike, truth: Sequence[int | None], labels: int, *, s
         The right label's place for each setting; None where there is no label for it.
     labels : int
         How many labels there were to choose from.
-    seed : int
-        For the bootstrap interval of kappa, from ten participants.
+    seed : int, optional
+        For the bootstrap interval of kappa, from ten participants; None: no interval.
 
     Raises
     ------
@@ -106,7 +107,7 @@ def recognition(names: ArrayLike, truth: Sequence[int | None], labels: int, *, s
     used = (given != UNANSWERED).any(axis=1)
     right = np.array([UNANSWERED - 1 if label is None else label for label in truth])
     hits = int((given == right).sum())
-    chance = total(_chance(row, right) for row in given)
+    chance = total(_chance(tuple(row), tuple(right.tolist())) for row in given.tolist())
     effect, interval, reason = _kappa(given, right, labels, seed)
     n = int(used.sum())
     return Recognition(
@@ -147,17 +148,18 @@ def _columns(labels: int) -> list[int]:
     return [*range(labels), UNDECIDED, UNANSWERED]
 
 
-def _chance(row: Whole, right: Whole) -> Lattice:
+@lru_cache(maxsize=1024)
+def _chance(row: tuple[int, ...], right: tuple[int, ...]) -> Lattice:
     """Return the distribution of one participant's hits when the names change places among answered settings."""
-    answered = row != UNANSWERED
-    names, wanted = row[answered], right[answered]
+    answered = np.array(row) != UNANSWERED
+    names, wanted = np.array(row)[answered], np.array(right)[answered]
     if not len(names):
         return of_values([0])
     orders = np.array(list(permutations(range(len(names)))))
     return of_values((names[orders] == wanted).sum(axis=1).tolist())
 
 
-def _kappa(given: Whole, right: Whole, labels: int, seed: int) -> tuple[float | None, Interval | None, str]:
+def _kappa(given: Whole, right: Whole, labels: int, seed: int | None) -> tuple[float | None, Interval | None, str]:
     """Return kappa over decided answers, its interval by resampling participants, or why there is none."""
     used = (given >= 0) & (right >= 0)
     tables = np.zeros((len(given), labels, labels))
@@ -167,6 +169,8 @@ def _kappa(given: Whole, right: Whole, labels: int, seed: int) -> tuple[float | 
     whole = kappa(tables.sum(axis=0))
     if whole.kappa is None:
         return None, None, f"no interval: {whole.note}"
+    if seed is None:
+        return whole.kappa, None, "no interval: none was asked for"
     if len(tables) < FEW:
         return whole.kappa, None, TOO_FEW
     samples = np.concatenate([_kappas(tables, rows) for rows in resamples(len(tables), seed)])
@@ -192,8 +196,7 @@ def _rate(given: Whole, setting: int, label: int) -> HitRate:
     n, hits = len(answers), int((answers == label).sum())
     if not n:
         return HitRate(setting, 0, 0, None, None)
-    bounds = binomtest(hits, n).proportion_ci(0.95, method="exact")
-    return HitRate(setting, hits, n, hits / n, Interval(float(bounds.low), float(bounds.high), 0.95, "Clopper-Pearson"))
+    return HitRate(setting, hits, n, hits / n, clopper_pearson(hits, n))
 
 
 def _note(n: int, undecided: int, smallest: float) -> str:

@@ -7,6 +7,7 @@ however participants differ from each other.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -22,9 +23,9 @@ CELLS: Final = 2_000_000
 """So many answers are rearranged at most, and fewer times than ``DRAWS`` where there are many participants."""
 
 FEWEST: Final = 199
-PLACES: Final = 15
-WIDTHS: Final = (0.02, 0.1, 0.3, 0.7, 1.5, 4.0)
-RATES: Final = (0.0, 0.05, 0.2, 0.4)
+PLACES: Final = 11
+WIDTHS: Final = (0.05, 0.2, 0.5, 1.2, 3.0)
+RATES: Final = (0.0, 0.1, 0.35)
 
 
 def p_of_rise(yes: Array, asked: Array, levels: Array, shape: Shape, seed: int) -> float:
@@ -37,19 +38,28 @@ def p_of_rise(yes: Array, asked: Array, levels: Array, shape: Shape, seed: int) 
     levels : (levels,) array
         Ascending.
     """
-    span = float(np.ptp(levels))
+    slope, no = _curves(tuple(levels.tolist()), shape)
+    flat = no @ asked.sum(axis=0)
+    found = float((slope @ yes.sum(axis=0) + flat).max())
+    drawn = _rearranged(yes, asked, seed)
+    different, times = np.unique(drawn, axis=0, return_counts=True)
+    reached = (different @ slope.T + flat).max(axis=1) >= found - 1e-9 * abs(found)
+    return (1 + int(times[reached].sum())) / (1 + len(drawn))
+
+
+@lru_cache(maxsize=8)
+def _curves(levels: tuple[float, ...], shape: Shape) -> tuple[Array, Array]:
+    """Return the log odds of yes, and the log of the share of no, of all curves (curves, levels)."""
+    at = np.array(levels)
     place, width, guess, lapse = (
         axis.reshape(-1, 1)
-        for axis in np.meshgrid(np.linspace(levels[0], levels[-1], PLACES), np.array(WIDTHS) * span, RATES, RATES)
+        for axis in np.meshgrid(np.linspace(at[0], at[-1], PLACES), np.array(WIDTHS) * np.ptp(at), RATES, RATES)
     )
-    z = (levels - place) / width
+    z = (at - place) / width
     grown = expit(LOGISTIC * z) if shape == "logistic" else ndtr(NORMAL * z)
     expected = np.clip(guess + (1 - guess - lapse) * grown, 1e-9, 1 - 1e-9)
-    flat = np.log1p(-expected) @ asked.sum(axis=0)
-    slope = np.log(expected) - np.log1p(-expected)
-    found = float((slope @ yes.sum(axis=0) + flat).max())
-    drawn = (_rearranged(yes, asked, seed) @ slope.T + flat).max(axis=1)
-    return (1 + int((drawn >= found - 1e-9 * abs(found)).sum())) / (1 + len(drawn))
+    no = np.log1p(-expected)
+    return np.log(expected) - no, no
 
 
 def _rearranged(yes: Array, asked: Array, seed: int) -> Array:

@@ -28,8 +28,8 @@ from study_app.analysis.statistics.psychometric import (
     Shape,
     at_bounds,
     fit,
-    places,
     profile,
+    profile_at,
     share,
 )
 from study_app.analysis.statistics.rise import NO_RISE, p_of_rise
@@ -193,13 +193,13 @@ def _found(counts: Counts, shape: Shape, rates: tuple[Bounds, Bounds], yes: Arra
     participants, with t in place of the normal quantile: the scaled likelihood ratio of pooled answers that belong to
     clusters (Chandler & Bate 2007, Biometrika 94, 167–183).
     """
-    coarse = profile(counts, shape, *rates, places(counts))
+    coarse = profile(counts, shape, *rates)
     best = fit(counts, shape, *rates, coarse)
     naive = _crossings(counts, shape, rates, coarse, best.log_likelihood - DROP)
     people = len(yes)
     if people < 2:
         return _Found(best, _ends(naive), 1.0)
-    dispersion = _dispersion(counts, shape, rates, naive, (yes, asked))
+    dispersion = _dispersion(counts, shape, rates, coarse, naive, (yes, asked))
     drop = dispersion * float(t_distribution.ppf((1 + SURE) / 2, people - 1)) ** 2 / 2
     return _Found(best, _ends(_crossings(counts, shape, rates, coarse, best.log_likelihood - drop)), dispersion)
 
@@ -222,7 +222,7 @@ def _crossings(
         cells.append((inside, outside if there else inside, there))
     at = coarse.thresholds
     fine = [np.linspace(at[outside], at[inside], FINER) for inside, outside, _ in cells]
-    values = profile(counts, shape, *rates, np.concatenate(fine)).log_likelihoods.reshape(2, FINER)
+    values = profile_at(counts, shape, *rates, coarse, np.concatenate(fine)).log_likelihoods.reshape(2, FINER)
     found = []
     for steps, heights, (_, _, there) in zip(fine, values, cells, strict=True):
         reached = np.flatnonzero(heights >= cut)
@@ -239,6 +239,7 @@ def _dispersion(
     counts: Counts,
     shape: Shape,
     rates: tuple[Bounds, Bounds],
+    coarse: Profile,
     naive: tuple[tuple[float, bool], tuple[float, bool]],
     answers: tuple[Array, Array],
 ) -> float:
@@ -248,7 +249,7 @@ def _dispersion(
     answers: unlike a derivative it exists for a curve that is as steep as the fit allows.
     """
     yes, asked = answers
-    at = profile(counts, shape, *rates, np.array([end for end, _ in naive]))
+    at = profile_at(counts, shape, *rates, coarse, np.array([end for end, _ in naive]))
     each = []
     for place, (log_width, guess, lapse) in zip(at.thresholds, at.others, strict=True):
         curve = Curve(float(place), float(np.exp(log_width)) * counts.span, float(guess), float(lapse), 0.0)

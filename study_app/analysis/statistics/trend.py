@@ -197,8 +197,14 @@ def _p(ranks: Whole, found: int) -> tuple[float, float | None, str]:
         mean = n * k * (k + 1) ** 2 / 2
         spread = ((ranks - (k + 1.0)) ** 2).sum() / (k - 1) * k * (k * k - 1) / 12
         return float(norm.sf((found - mean) / math.sqrt(spread))), None, "normal approximation, corrected for ties"
-    sums = total(_scores(tuple(sorted(row))) for row in ranks.tolist())
+    sums = _sums(tuple(sorted(tuple(sorted(row)) for row in ranks.tolist())))
     return sums.at_least(found), sums.highest, "exact permutation"
+
+
+@lru_cache(maxsize=256)
+def _sums(patterns: tuple[tuple[int, ...], ...]) -> Lattice:
+    """Return the distribution of the sum of all participants' scores."""
+    return total(_scores(pattern) for pattern in patterns)
 
 
 @lru_cache(maxsize=1024)

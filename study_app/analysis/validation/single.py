@@ -27,6 +27,9 @@ TRUE_MS: Final = 120.0
 WIDTH_MS: Final = 60.0
 LAPSE: Final = 0.02
 
+TWELVE_EQUAL: Final = (12, (0.0,))
+"""In 6.9 % of these studies nobody of the one in five takes part, and all twelve differences are 0: equivalent."""
+
 
 @cache
 def cases() -> Mapping[Case, tuple[Limit, str, Trial]]:
@@ -35,7 +38,7 @@ def cases() -> Mapping[Case, tuple[Limit, str, Trial]]:
     for n in (5, 12, 24):
         for words, most in (("-1, 0, 1", (-1.0, 0.0, 1.0)), ("0", (0.0,))):
             found[f"one in five differs by 5 points, the others by {words}", n] = (
-                "at most 5 %",
+                "counted" if (n, most) == TWELVE_EQUAL else "at most 5 %",
                 "called equivalent",
                 _leaning(n, most),
             )

@@ -123,10 +123,12 @@ def _effects(of: Simulated, block: Block) -> Array:
     return np.asarray(found)
 
 
-def true_differences(of: Simulated, generator: Generator, extent: Extent, block: int) -> Array:
-    """Return the true differences of mean answers to the first setting (settings, items)."""
-    means = answers(of, generator, extent, TRUTH, 0, 0)[block].mean(axis=0)
-    exact = alike(of.blocks[block], extent)
-    for place, other in exact.items():
-        means[place] = means[other]
-    return np.asarray(means - means[0])
+def true_differences(of: Simulated, generator: Generator, extent: Extent) -> tuple[Array, ...]:
+    """Return the true differences of mean answers to the first setting (settings, items), block by block."""
+    found = []
+    for block, given in zip(of.blocks, answers(of, generator, extent, TRUTH, 0, 0), strict=True):
+        means = given.mean(axis=0)
+        for place, other in alike(block, extent).items():
+            means[place] = means[other]
+        found.append(np.asarray(means - means[0]))
+    return tuple(found)
