@@ -100,7 +100,7 @@ def _bars(block: Block) -> list[str]:
         "Bars: number of answers, disagreement left and agreement right of the line; neutral answers apart in grey, on "
         "the same scale.",
         "Numbers: counts of answers; a segment too narrow for its number carries none (all counts are in the exported "
-        "aggregate table). n beside a bar: valid answers where some are missing.",
+        "aggregate table). n next to a bar: valid answers where some are missing.",
         f"Levels, from 1 to 7: {', '.join(block.labels)}.",
     ]
 
@@ -114,7 +114,7 @@ def _plots(study: Study, block: Block) -> list[str]:
             f"they coincide; thick line: median; band: {quartiles}",
             scale,
         ]
-    return ["Dots: participants, equal answers beside each other; ring: median; band: " + quartiles, scale]
+    return ["Dots: participants, equal answers side by side; ring: median; band: " + quartiles, scale]
 
 
 def _blinded(study: Study) -> str:

@@ -62,7 +62,7 @@ def pairs_of(of: Asked, omnibus: tuple[Tested, ...]) -> tuple[tuple[Pair, ...], 
         return (), (Waiting(PAIRS, why),)
     differing = [one.item for one in omnibus if one.verdict in ("shown", "suggested")]
     if not differing:
-        return (), (Waiting(PAIRS, "no statement tells the settings apart as a whole"),)
+        return (), (Waiting(PAIRS, "no statement shows a difference between the settings"),)
     return _over_all_pairs(of, differing), ()
 
 

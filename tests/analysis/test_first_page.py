@@ -85,11 +85,11 @@ def test_liquids_are_recognised_by_name_and_the_wrong_name_is_told() -> None:
             )
         ),
     )
-    told = named(evaluate(right, planning=False), "told apart")
+    told = named(evaluate(right, planning=False), "distinguished")
     assert told.claims
     assert told.told == "Liquid1 and liquid2 were recognised above chance."
     assert "liquid1 12 of 12 (74 to 100 %), 33 % by chance" in told.sizes[0]
-    wrong = named(evaluate(study(settings, list(everybody(settings, 12, answer))), planning=False), "told apart")
+    wrong = named(evaluate(study(settings, list(everybody(settings, 12, answer))), planning=False), "distinguished")
     assert "liquid2 was called liquid1 by 12 of 12" in wrong.told
 
 

@@ -1,4 +1,4 @@
-"""The three answers of the first page: what was told apart, from when on a delay is noticed, what changes nothing.
+"""The three answers of the first page: which liquids were distinguished, which delay is noticed, which is not relevant.
 
 An answer is a sentence, then directions, sizes and intervals; the p that decide stand in the sections that follow.
 """
@@ -17,12 +17,12 @@ from study_app.analysis.statistics.families import holm
 from study_app.analysis.statistics.outcome import Interval
 from study_app.analysis.statistics.paired import Paired
 
-Question: TypeAlias = Literal["told apart", "noticed from", "unchanged up to"]
+Question: TypeAlias = Literal["distinguished", "noticed from", "unchanged up to"]
 
 ASKED: Final[dict[Question, str]] = {
-    "told apart": "What was told apart?",
-    "noticed from": "From which delay on do people notice?",
-    "unchanged up to": "Up to which delay does nothing that matters change?",
+    "distinguished": "Which liquids were distinguished?",
+    "noticed from": "From which delay do participants notice a difference?",
+    "unchanged up to": "Up to which delay do answers not change by a relevant amount?",
 }
 NO_EVIDENCE: Final = "That is not evidence that there is nothing."
 FOUND: Final = ("shown", "suggested")
@@ -74,13 +74,15 @@ def _of_block(found: BlockFound, decided: Decided) -> tuple[Answer, ...]:
     """Return the answers that a block gives: none before anybody's answers count."""
     if not found.n:
         return ()
-    questions: tuple[Question, ...] = ("noticed from", "unchanged up to") if found.kind == "delays" else ("told apart",)
+    questions: tuple[Question, ...] = (
+        ("noticed from", "unchanged up to") if found.kind == "delays" else ("distinguished",)
+    )
     if not found.revealed:
         waits = "This waits for the key to be opened: until then settings are codes."
         return tuple(Answer(question, found.id, found.title, waits, ()) for question in questions)
     if found.kind == "delays":
         return _noticed_from(found, decided), _unchanged(found)
-    return (_told_apart(found),)
+    return (_distinguished(found),)
 
 
 def recognised(named: Named) -> tuple[int, ...]:
@@ -106,7 +108,7 @@ def given(named: Named, label: str) -> float:
     return sum(row[place] for row in named.found.table) / asked if asked else 0.0
 
 
-def _told_apart(found: BlockFound) -> Answer:
+def _distinguished(found: BlockFound) -> Answer:
     compared = _compared(found)
     apart = {pair: tests for pair, tests in compared.items() if tests}
     of_pairs = _of_pairs(found, apart)
@@ -121,7 +123,7 @@ def _told_apart(found: BlockFound) -> Answer:
     if not claims:
         told = f"{told} {NO_EVIDENCE}"
     sizes = (*(() if named is None else (_hits(found, named), of_pairs)), *_largest(found, apart))
-    return Answer("told apart", found.id, found.title, told, sizes, claims, claims and exploratory)
+    return Answer("distinguished", found.id, found.title, told, sizes, claims, claims and exploratory)
 
 
 def _of_names(found: BlockFound, named: Named, known: Sequence[int]) -> str:
@@ -169,7 +171,7 @@ def _share(of: Interval | None) -> str:
 
 
 def _compared(found: BlockFound) -> dict[tuple[str, str], list[Tested]]:
-    """Return in which statements each two settings (codes) were told apart."""
+    """Return in which statements each two settings (codes) were rated differently."""
     codes = [setting.code for setting in found.settings]
     if len(codes) == 2:
         return {(codes[0], codes[1]): [one for one in found.omnibus if one.verdict in FOUND]}
@@ -187,7 +189,7 @@ def _of_pairs(found: BlockFound, apart: dict[tuple[str, str], list[Tested]]) -> 
     """Return which settings were rated differently in some statement, and which were not."""
     pairs = list(combinations([setting.code for setting in found.settings], 2))
     if not pairs:
-        return "There is one setting, and nothing to tell it from."
+        return "There is only one setting, and nothing to compare it with."
     yes = [_pair(found, pair) for pair in pairs if pair in apart]
     no = [_pair(found, pair) for pair in pairs if pair not in apart]
     if not yes:
@@ -250,9 +252,9 @@ def _noticed_from(found: BlockFound, decided: Decided) -> Answer:
         )
     elif different:
         at = min(one.delay_ms for one in different)
-        told = f"A trend is not shown, but answers at {ms(at)} differ from those at {ms(different[0].control_ms)}."
+        told = f"No trend is shown, but answers at {ms(at)} differ from those at {ms(different[0].control_ms)}."
     elif fitted:
-        told = "Noticing rises with the delay, but for no single delay is it shown."
+        told = "More people notice a difference with longer delays, but no single delay is shown to be noticed."
     else:
         told = f"No delay was shown to be noticed. {NO_EVIDENCE}"
     sizes = [
@@ -269,7 +271,7 @@ def _noticed_from(found: BlockFound, decided: Decided) -> Answer:
         sizes[-1] += f". {_level(found.against)}"
     if threshold is not None and threshold.effect is not None:
         ends = "no interval" if threshold.interval is None else f"95 % interval {interval(threshold.interval, 0)} ms"
-        sizes.append(f"Half of the answers that can notice do at {threshold.effect:.0f} ms ({ends}).")
+        sizes.append(f"Detection threshold, half-way between guesses and lapses: {threshold.effect:.0f} ms ({ends}).")
     elif threshold is not None:
         sizes.append(f"No detection threshold: {threshold.note}.")
     primary = [decided.is_primary(item) for item in (*lowest, *(one.item for one in different))]

@@ -26,7 +26,7 @@ UNDECIDED: Final = "undecided"
 def draw(answer: Answer, found: BlockFound) -> tuple[bytes, str] | None:
     """Return the picture beside an answer as PNG, and what it shows in words; None where there is nothing to show."""
     sheet = Sheet(WIDTH_PT, HEIGHT_PT, style.fonts_for("png"))
-    if answer.question == "told apart":
+    if answer.question == "distinguished":
         words = _names(sheet, found.named, found) if found.named is not None else _ratings(sheet, found)
     elif answer.question == "noticed from":
         words = _noticed(sheet, found)

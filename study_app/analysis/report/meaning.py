@@ -83,8 +83,8 @@ def _as_number(found: BlockFound, results: Results, delay_ms: float) -> str:
     presented = listed([f"{delay:g}" for delay in found.delays_ms])
     return (
         f"As a number. {ms(delay_ms)} is what was asked for. {_achieved(at, control)} The display's own latency "
-        "comes on top of it and is not in these numbers; only a photodiode at the corner of the screen tells it. Only "
-        f"{presented} ms were presented: nothing was asked about delays between them."
+        "comes on top of it and is not in these numbers; only a photodiode at the corner of the screen measures it. "
+        f"Only {presented} ms were presented: nothing was asked about delays between them."
     )
 
 
@@ -189,7 +189,7 @@ def _said(found: BlockFound, here: list[Against]) -> str:
         return f"These data speak against the sentence “delays up to {delay} do not matter”: {'; '.join(reasons)}."
     return (
         f"So these data do not support the sentence “delays up to {delay} do not matter”, and do not refute it: they "
-        f"are too few or too scattered to tell.{_other_way(found, here[0].delay_ms)}"
+        f"are too few or too variable to decide.{_other_way(found, here[0].delay_ms)}"
     )
 
 

@@ -10,7 +10,7 @@ from study_app.analysis.measures import QUARTILES
 from study_app.analysis.report.words import (
     all_of,
     counted,
-    enough,
+    least,
     listed,
     percent,
     said_of_presentations,
@@ -145,7 +145,7 @@ def _delays(found: BlockFound, results: Results) -> Iterator[str]:
             f"Equivalence to {found.delays_ms[0]:g} ms was tested by two one-sided t tests on paired differences with "
             f"a bound of ±{bound:g} {points}{_beforehand(results)}, and {level} intervals, and called equivalent only "
             "where changes of signs, signed ranks and the bootstrap-t agreed, and with "
-            f"{enough(results.decided.alpha)}; it was called different where "
+            f"{least(results.decided.alpha)}; it was called different where "
             "the larger p of a t test and of exact signed ranks, Holm-adjusted over all these comparisons, was at most "
             "alpha, and otherwise inconclusive."
         )
@@ -154,7 +154,7 @@ def _delays(found: BlockFound, results: Results) -> Iterator[str]:
             "The detection threshold is the 50 % point between guesses and lapses of a logistic function fitted by "
             "maximum likelihood to agreement (5 to 7) in single answers, all participants pooled, with a profile "
             "interval that is scaled by how far participants differ. It is stated only where a permutation test "
-            "against a flat line shows a rise, and where the delays that were presented hold it."
+            "against a flat line shows a rise, and where it lies among the delays that were presented."
         )
 
 

@@ -104,7 +104,7 @@ def _mixed_up(found: BlockFound, results: Results) -> Iterator[str]:
             if count == counts.orders:
                 yield (
                     f"{lead(found)}: {name(found, code)} came at place {place} for everybody, so that what it did "
-                    "cannot be told from what that place did."
+                    "cannot be distinguished from the effect of that place."
                 )
 
 

@@ -142,13 +142,17 @@ def said_of_presentations(found: BlockFound) -> tuple[str, ...]:
     return tuple(lines)
 
 
+def least(alpha: float) -> str:
+    """Return how many participants equivalence needs at least."""
+    return f"at least {fewest(alpha)} participants ({fewest(alpha, equal=True)} where all differences are equal)"
+
+
 def enough(alpha: float) -> str:
-    """Return how many participants equivalence takes at least, and why."""
+    """Return how many participants equivalence needs at least, and why."""
     one_in, one_in_equal = (NUMBERS[round(1 / share)] for share in (UNSEEN, UNSEEN_EQUAL))
     return (
-        f"at least {fewest(alpha)} participants ({fewest(alpha, equal=True)} where all differences are equal): more "
-        f"than {percent(alpha)} of smaller samples contain nobody from a group of one person in {one_in} (one in "
-        f"{one_in_equal})"
+        f"{least(alpha)}: more than {percent(alpha)} of smaller samples contain nobody from a group of one person in "
+        f"{one_in} (one in {one_in_equal})"
     )
 
 

@@ -45,13 +45,13 @@ def report(
     Parameters
     ----------
     progress : callable, optional
-        Is told what is being done and which share of all is done (0 to 1).
+        Is called with what is being done and which share of all is done (0 to 1).
     cancelled : callable, optional
         Is asked again and again whether to give up.
     warn : callable, optional
-        Is told a line of every file that is not as it was recorded, and is used as it is.
+        Is called with a line for every file that is not as it was recorded, and is used as it is.
     failed : callable, optional
-        Is told a line of every section that could not be computed: the report says so in its place, and holds
+        Is called with a line for every section that could not be computed: the report says so in its place, and holds
         everything else.
 
     Raises

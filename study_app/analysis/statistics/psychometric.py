@@ -197,7 +197,7 @@ def at_bounds(counts: Counts, curve: Curve, guess: Bounds, lapse: Bounds) -> tup
         if least < most and found > most - NEAR:
             told.append(f"{what} are at the most that the fit allows ({most:g}) and may be more")
     if curve.width < narrow * (1 + NEAR):
-        told.append("the curve is as steep as the fit allows: the levels lie too far apart to tell how steep it is")
+        told.append("the curve is as steep as the fit allows: the levels lie too far apart to determine it")
     if curve.width > wide * (1 - NEAR):
         told.append("the curve is as flat as the fit allows")
     return tuple(told)

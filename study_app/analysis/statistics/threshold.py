@@ -273,7 +273,7 @@ def _outside(counts: Counts, found: _Found) -> str:
 def _beyond(counts: Counts, found: _Found) -> Iterator[str]:
     """Say where the interval reaches beyond what was asked about."""
     if any(end is not None and not counts.levels.min() <= end <= counts.levels.max() for end in found.ends):
-        yield "the interval reaches beyond the levels that were presented, where only the function's shape tells it"
+        yield "the interval reaches beyond the levels that were presented, where the function's shape alone gives it"
 
 
 def _of_whom(people: int | None, dispersion: float) -> Iterator[str]:
@@ -281,7 +281,7 @@ def _of_whom(people: int | None, dispersion: float) -> Iterator[str]:
         yield "the answers of one participant: the interval is about this person alone"
     elif people is not None:
         yield (
-            "answers of all participants are pooled, and the interval holds how far participants differ (they vary "
+            "answers of all participants are pooled, and the interval includes how far participants differ (they vary "
             f"{dispersion:.1f} times as much as independent answers)"
         )
 

@@ -123,7 +123,7 @@ def _in_delays(of: Simulated, asked: Asked, found: BlockFound, cell: Cell, place
         yield ("detection threshold printed", "at most 5 %"), _printed(found)
     if null:
         low = any(one.over_all_ms is not None and one.over_all_ms <= max(null) for one in found.lowest)
-        yield ("lowest delay falsely low", "at most 5 %"), low
+        yield ("lowest delay stated too low", "at most 5 %"), low
         differ = any(one.verdict == "different" and one.delay_ms <= max(null) for one in found.against)
         yield ("equal delays called different", "at most 5 %"), differ
     if cell.extent != "empty":
