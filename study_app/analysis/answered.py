@@ -40,9 +40,6 @@ MANY: Final = DRAWN_UP_TO
 FEWER_DRAWS: Final = 1999
 """So many rearrangements are drawn for the test over all statements above ``MANY``, which has no approximation."""
 
-FEWEST_DRAWS: Final = 999
-"""So many for each of thousands of simulated studies."""
-
 MOST_DRAWS: Final = 199_999
 FLOOR: Final = 0.05
 """The smallest p that draws can give, corrected for its family, is this share of alpha at most."""
@@ -100,9 +97,7 @@ class Asked:
 
     @property
     def draws_over_all(self) -> int:
-        """How many are drawn for the one test over all statements; the error rate holds with any number."""
-        if self.verdicts_only:
-            return FEWEST_DRAWS
+        """How many are drawn for the one test over all statements."""
         return self._draws(DRAWS if self.n <= MANY else FEWER_DRAWS, 1)
 
     def _draws(self, usual: int, members: int) -> int:
@@ -262,12 +257,12 @@ def _omnibus(values: Array, of: Asked) -> Outcome:
     return friedman(values, draws=of.draws, seed=of.seed)
 
 
-def over_all(of: Asked) -> Outcome | None:
-    """Test once over all statements whether the settings are answered alike."""
-    if of.k < 2:
+def over_all(of: Asked, draws: int | None = None) -> Outcome | None:
+    """Test once over all statements whether the settings are answered alike; ``draws`` of them if not as usual."""
+    if of.k < 2 or (of.verdicts_only and draws is None):
         return None
     of.each("all statements")
-    return global_permutation(np.array(list(of.values.values())), draws=of.draws_over_all, seed=of.seed)
+    return global_permutation(np.array(list(of.values.values())), draws=draws or of.draws_over_all, seed=of.seed)
 
 
 def asked_again(

@@ -22,7 +22,7 @@ def validate_report(studies: int, jobs: int, seed: int, to: Path | None) -> None
     Studies of rek2024 with 5, 12 and 24 participants, by the rehearsals' answer model and by an ordinal probit model
     with random effects, go through the report's own tests. Of every rate the Wilson interval is printed, and whether
     it keeps to its limit: "at most 5 %" holds if the interval reaches down to 5 % and ends below 7.5 %. Ctrl-C ends
-    with what was simulated until then. Ends with exit code 3 where a rate is beyond its limit.
+    with what was simulated until then. Ends with exit code 3 where a rate is beyond its limit by its 99.9 % interval.
     """
     if jobs == 0:
         raise click.BadParameter("0 jobs do nothing: give 1 or more, or -1 for one a core", param_hint="--jobs")

@@ -46,6 +46,7 @@ def rek() -> Simulated:
     [
         ("at most 5 %", 50, 1000, "yes"),
         ("at most 5 %", 62, 1000, "too few studies"),
+        ("at most 5 %", 66, 1000, "too few studies"),
         ("at most 5 %", 80, 1000, "no"),
         ("at most 5 %", 0, 20, "too few studies"),
         ("at least 93 %", 930, 1000, "yes"),
