@@ -9,10 +9,11 @@ import pytest
 
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.failures import Failures
-from study_app.analysis.report.answers import Answer, answers, common_ms
+from study_app.analysis.report.answers import Answer, answers, common_ms, given, recognised
 from study_app.analysis.report.first_page import first_page
-from study_app.analysis.report.measured import empty_studies
-from study_app.analysis.results import Results
+from study_app.analysis.report.measured import CLAIMS, STUDIES, empty_studies
+from study_app.analysis.results import Named, Results
+from study_app.analysis.statistics.recognition import recognition
 from tests.analysis.made_up import DECIDED, ITEMS, delays, everybody, liquids, study
 
 DELAYS = (0.0, 50.0, 100.0, 150.0)
@@ -114,7 +115,9 @@ def test_the_page_holds_pictures_limits_and_how_often_it_is_wrong() -> None:
 
 @pytest.mark.parametrize(("participants", "n"), [(1, 5), (10, 12), (200, 24)])
 def test_the_measured_rate_is_that_of_the_nearest_size(participants: int, n: int) -> None:
-    assert f"with {n} participants" in empty_studies(participants)
+    told = empty_studies(participants)
+    assert f"with {n} participants" in told
+    assert f"({CLAIMS[n]} of {STUDIES} studies, 95 % interval" in told
 
 
 def test_a_claim_needs_the_test_over_all_statements_corrected_over_the_blocks() -> None:
@@ -135,3 +138,19 @@ def test_a_claim_needs_the_test_over_all_statements_corrected_over_the_blocks() 
     none = replace(results, blocks=(replace(results.blocks[0], overall=None),))
     assert named(none, "noticed from").told.startswith("Nothing is claimed here")
     assert named(none, "noticed from").sizes == ()
+
+
+def test_a_liquid_is_recognised_where_its_interval_lies_above_the_share_of_its_name() -> None:
+    # Water 10 of 12, but 19 of all 36 names are water; honey 3 of 12, more than its share of names, but not surely so.
+    names = np.column_stack([[0] * 10 + [1] * 2, [1] * 3 + [0] * 9, [2] * 12])
+    named = Named(
+        ("water", "honey", "oil"),
+        ("L1", "L2", "L3"),
+        ("water", "honey", "oil"),
+        recognition(names, [0, 1, 2], 3),
+        "shown",
+    )
+    assert [given(named, label) for label in named.labels] == [19 / 36, 5 / 36, 12 / 36]
+    assert recognised(named) == (2,)
+    assert recognised(replace(named, verdict="suggested")) == (2,)
+    assert recognised(replace(named, verdict="not shown")) == ()
