@@ -18,10 +18,10 @@ from study_app.analysis.results import plain
 from study_app.analysis.tables import Study
 from tests.analysis.made_up import DECIDED, ITEMS, Presented, delays, liquids, study
 
-STUDIES = int(os.environ.get("LIQUID_STUDY_RANDOM_STUDIES", "40"))
+STUDIES = int(os.environ.get("LIQUID_STUDY_RANDOM_STUDIES", "12"))
 """So many studies in all; a full run has 2,000."""
 
-PARTS = 8
+PARTS = 4
 
 
 def drawn(rng: np.random.Generator) -> Study:

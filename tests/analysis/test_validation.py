@@ -8,7 +8,7 @@ import pytest
 from study_app.analysis.answered import of_tables
 from study_app.analysis.evaluate import found_in
 from study_app.analysis.power.planned import plan
-from study_app.analysis.validation import single
+from study_app.analysis.validation import single, studies
 from study_app.analysis.validation.counting import CLAIMED, LOST, Cell, count
 from study_app.analysis.validation.listed import markdown, table
 from study_app.analysis.validation.rates import Limit, Rate
@@ -68,8 +68,8 @@ def test_a_rate_holds_as_far_as_its_interval_tells(limit: Limit, hits: int, of: 
 def test_settings_that_are_alike_are_answered_alike_on_average(
     rek: Simulated, generator: Generator, extent: Extent
 ) -> None:
-    for block, given in zip(rek.blocks, answers(rek, generator, extent, 600, 3, 1), strict=True):
-        assert given.shape == (600, len(block.settings), len(block.items))
+    for block, given in zip(rek.blocks, answers(rek, generator, extent, 300, 3, 1), strict=True):
+        assert given.shape == (300, len(block.settings), len(block.items))
         assert set(np.unique(given)) <= set(range(1, 8))
         means = given.mean(axis=0)
         like = alike(block, extent)
@@ -104,7 +104,8 @@ def test_verdicts_alone_are_those_of_the_whole_evaluation(rek: Simulated, partic
 
 
 @pytest.mark.parametrize("generator", GENERATORS)
-def test_every_kind_of_study_is_counted(rek: Simulated, generator: Generator) -> None:
+def test_every_kind_of_study_is_counted(rek: Simulated, generator: Generator, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(studies, "TRUTH", 200)
     rates = [rate for extent in EXTENTS for rate in count(rek, Cell(generator, extent, 5), 1, 0, 2)]
     assert {rate.of for rate in rates} == {2}
     assert {rate.cell for rate in rates} == {f"{generator}, {extent}" for extent in EXTENTS}
