@@ -21,8 +21,8 @@ from tests.analysis.conftest import Results
 CALM = [1, 1, 0, 0, -1] * 6
 AWAY = [3, 4, 3, 4, 3] * 6
 SCATTERED = [3, -3, 2, -2, 0]
-DOUBTED = [-1, 0, 0, 0, 0]
-"""By t equivalent (p = .008) within a point; by signs not (p = .062)."""
+DOUBTED = [5] + [0] * 14
+"""By t equivalent (p = .033) within a point; by the bootstrap-t not."""
 
 
 def against(differences: Mapping[float, list[int]], expected: Direction | None) -> tuple[Against, ...]:
@@ -67,7 +67,7 @@ def claim(block: BlockFound) -> str:
 
 def test_a_difference_at_a_shorter_delay_speaks_against_the_longer_one() -> None:
     assert "do not support" in claim(delays({50: SCATTERED, 100: SCATTERED}))
-    block = delays({50: AWAY, 100: SCATTERED})
+    block = delays({50: AWAY, 100: SCATTERED * 2})
     assert tempting_ms(block) == 50
     (*verdicts, told) = by_delay(block)[1]
     assert verdicts == ["100 ms", "–", "–", "Different", "–"]
@@ -122,7 +122,7 @@ def test_five_people_cannot_make_a_single_comparison_different_by_taking_them_as
     assert certain.against[0].found.p_different is not None
     assert certain.against[0].found.p_different < 0.001
     assert certain.against[0].p_adjusted == 0.0625
-    assert certain.against[0].verdict == "inconclusive"
+    assert certain.against[0].verdict == "out of reach"
 
 
 def test_what_only_t_calls_equivalent_is_told_as_inconclusive(rek: Results) -> None:
@@ -159,3 +159,9 @@ def test_every_delay_has_its_own_sentence() -> None:
     assert rows[0][-1].startswith("What can be said: at 50 ms the mean answers")
     assert "do not support the sentence “delays up to 125 ms do not matter”, and do not refute it" in rows[1][-1]
     assert rows[2][-1].startswith("These data speak against the sentence “delays up to 300 ms do not matter”: ")
+
+
+def test_what_too_few_people_show_by_every_test_is_not_called_equivalent() -> None:
+    told = claim(delays({50: [0, 1, 0, -1] * 3}))
+    assert "within the bound by every test, but 14 participants are needed to call it so" in told
+    assert "by t alone" not in told

@@ -7,6 +7,7 @@ from typing import Final
 
 from study_app.analysis.report.words import beyond, counted, interval, listed, ms, number, p_equals, percent, short
 from study_app.analysis.results import Against, BlockFound, Delivered, Lowest, Results
+from study_app.analysis.statistics.equivalence import fewest
 
 VERDICTS: Final = ("equivalent", "different", "inconclusive", "out of reach")
 
@@ -159,6 +160,8 @@ def _only(one: Against) -> str:
     if one.verdict not in ("inconclusive", "out of reach"):
         return ""
     if found.p is not None and found.p <= found.alpha:
+        if found.checks_agree is not False:
+            return f", within the bound by every test, but {fewest(found.alpha)} participants are needed to call it so"
         return ", within the bound by t alone, which asks for normality"
     if found.p_difference is not None and found.p_difference <= found.alpha:
         return f", different only before Holm's correction for {one.members} comparisons"
