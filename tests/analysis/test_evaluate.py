@@ -214,16 +214,16 @@ def test_a_bound_that_was_not_decided_is_not_made_up(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("level", [1, 4, 7])
 def test_equal_answers_are_no_variation_and_no_evidence(rek: Folder, level: int) -> None:
-    for number in range(1, 9):
+    for number in range(1, 12):
         rek.add(f"P{number:03d}", lambda _condition, _item: level)
     rek.open()
     results = found(rek)
     json.dumps(plain(results), allow_nan=False)
     liquids, delays = results.blocks
     assert {one.verdict for one in (*liquids.omnibus, *delays.trends)} == {"not tested"}
-    assert {one.found.verdict for one in delays.against} == {"equivalent"}  # eight of eight did not move
+    assert {one.found.verdict for one in delays.against} == {"equivalent"}  # eleven of eleven did not move
     assert liquids.named is not None
-    assert liquids.named.found.undecided == 24
+    assert liquids.named.found.undecided == 33
 
 
 def test_levels_that_nobody_chose_change_nothing(rek: Folder, tmp_path: Path) -> None:
