@@ -182,7 +182,7 @@ def distribution(patterns: tuple[tuple[int, ...], ...]) -> tuple[Whole, Array] |
         if dense:  # the last sum follows from the others: without it the codes are few enough to be counted
             counted = np.bincount(sums[:, :-1] @ powers[:-1], given)
             codes = np.flatnonzero(counted)
-            weights = counted[codes]
+            weights = counted[codes].astype(np.float64)
             states = codes[:, None] // powers[:-1] % base
             states = np.column_stack([states, sums[0].sum() - states.sum(axis=1)])
             continue

@@ -170,12 +170,15 @@ def test_the_interval_covers_the_threshold_of_people_who_differ(n: int, spread_m
 @pytest.mark.parametrize("n", [5, 12])
 def test_where_nothing_is_noticed_a_threshold_is_seldom_stated(n: int) -> None:
     rng = np.random.default_rng(n)
-    stated = 0
+    stated = flat = 0
     for _ in range(25):
         answers = np.rint(3.5 + rng.normal(0, 1, (n, 1)) + rng.normal(0, 0.8, (n, 7)))
         found = noticed(answers, STUDY)
         stated += found.effect is not None
+        flat += found.note.startswith("noticing is not shown to rise with the level")
         assert found.effect is not None or found.note
+        assert found.effect is None or (found.p is not None and found.p <= 0.05)
+    assert flat >= 15
     assert stated <= binom.ppf(0.999, 25, 0.05)
 
 
