@@ -136,9 +136,10 @@ def _at_once(of: Asked, differences: Array, bound: float) -> Equivalence | None:
     if np.isnan(differences).any() or sd <= SAME:
         return None
     mean, error = float(differences.mean()), sd / np.sqrt(n)
-    p: float | None = float(stdtr(n - 1, (abs(mean) - bound) / error))
+    by_t = float(stdtr(n - 1, (abs(mean) - bound) / error))
+    p: float | None = by_t
     p_different = 2 * float(stdtr(n - 1, -abs(mean) / error))
-    if p <= alpha and p_unseen(n, equal=False) <= alpha:
+    if by_t <= alpha and p_unseen(n, equal=False) <= alpha:
         if of.equivalence or p_different <= alpha:
             return None
         p = None

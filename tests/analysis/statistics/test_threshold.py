@@ -264,3 +264,10 @@ def test_two_levels_are_too_few_and_unasked_levels_do_not_count() -> None:
 def test_counts_that_cannot_be_are_refused(yes: list[float], asked: list[float]) -> None:
     with pytest.raises(AnalysisError, match=r"cannot be|do not fit"):
         threshold([0, 50, 100], yes, asked)
+
+
+def test_people_who_never_agree_are_lapses_and_do_not_move_the_threshold() -> None:
+    answers = np.array([[2, 2, 2, 2, 6, 6, 6]] * 5 + [[2, 2, 2, 6, 6, 6, 6]] * 5 + [[2] * 7] * 2)
+    found = noticed(answers, STUDY)
+    assert found.lapse == pytest.approx(1 / 6, abs=0.02)
+    assert found.effect == pytest.approx(100, abs=13)
