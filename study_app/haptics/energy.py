@@ -15,12 +15,13 @@ filtered damper stores up to K τ P (`_filter_storage`). Without this term the l
 a debt.
 
 A loop that is late and a force held for too long show as E < 0. E is kept three times: for a force that acts at once,
-for one that acts as late as the loop is believed to be, and for one that acts a tick later still; the lowest counts. A
-force that is under way belongs to an earlier velocity: a late balance may hold what was stored then. The liquid may owe
-1 mJ; with D = -1 mJ - E, its debt beyond that:
+for one that acts as late as the loop is believed to be, a tick at least, and for one that acts a tick later still; the
+lowest counts. A force that is under way belongs to an earlier velocity: a late balance may hold what was stored then.
+The liquid may owe 1 mJ; with D = -1 mJ - E, its debt beyond that:
 
 - `weaken`: a debt of 0.125 mJ halves the force, one of 0.375 mJ halves it again, and it comes back at 50 % a second: a
-  loop that swings has its gain lowered until it does not, instead of being caught at every swing;
+  loop that swings has its gain lowered until it does not, instead of being caught at every swing. A debt of the fast
+  part of force and motion alone counts likewise (`incremental`);
 - `settle`: what pushes the hand along its way may not spend in 20 ms more than is left; in debt it is let go, and
   damping added until the next step would pay the debt, up to half the damping that the loop bears, weakened likewise.
   The way is taken from the last 2 ms; what is slower than 40 mm/s may be a count of the encoder, and is no way yet;
@@ -40,6 +41,14 @@ from study_app.haptics.compiled import kernel, part
 from study_app.haptics.dynamics import MOST_DELAY
 from study_app.haptics.effects.drag import resistance
 from study_app.haptics.effects.records import LAW_CONSTANT
+from study_app.haptics.incremental import (
+    ALLOWANCE_J as INCREMENTAL_ALLOWANCE_J,
+)
+from study_app.haptics.incremental import (
+    begin_incremental,
+    close_incremental,
+    observe_incremental,
+)
 from study_app.haptics.layout import (
     EFFECT_ADDED_MASS,
     EFFECT_HISTORY,
@@ -72,11 +81,14 @@ def open_account(account: Record) -> None:
     account.turn = 0
     for turn in range(MOST_DELAY + 2):
         clear(account.sent_n[turn])
+        clear(account.acted_n[turn])
         account.stored_j[turn] = 0.0
     clear(account.impulse_ns)
     clear(account.late_impulse_ns)
     clear(account.later_impulse_ns)
+    clear(account.acted_impulse_ns)
     account.impulse_s = 0.0
+    begin_incremental(account.fast)
     clear(account.velocity_mps)
     account.longest_m = 0.0
     account.strongest_n = 0.0
@@ -94,10 +106,13 @@ def observe(model: Any, safety: Record, interval_s: float) -> None:
     Where several forces were sent between two samples, their mean over time counts.
     """
     parameters, state, account = model.parameters[0], model.state[0], safety.account
+    delay_ticks = max(safety.delay_ticks, 1)
     sent_n = account.sent_n[account.turn]
-    late_n = account.sent_n[_row_before(account, safety.delay_ticks)]
-    later_n = account.sent_n[_row_before(account, safety.delay_ticks + 1)]
+    late_n = account.sent_n[_row_before(account, delay_ticks)]
+    later_n = account.sent_n[_row_before(account, delay_ticks + 1)]
+    acted_n = account.acted_n[_row_before(account, safety.delay_ticks)]
     for axis in range(3):
+        account.acted_impulse_ns[axis] += acted_n[axis] * safety.turn_s
         account.impulse_ns[axis] += sent_n[axis] * safety.turn_s
         account.late_impulse_ns[axis] += late_n[axis] * safety.turn_s
         account.later_impulse_ns[axis] += later_n[axis] * safety.turn_s
@@ -121,12 +136,15 @@ def observe(model: Any, safety: Record, interval_s: float) -> None:
         late_work_j -= account.late_impulse_ns[axis] * step_m
         later_work_j -= account.later_impulse_ns[axis] * step_m
         account.velocity_mps[axis] += weight * (step_m * per_s - account.velocity_mps[axis])
+        mean_n = account.later_impulse_ns[axis] / account.impulse_s
+        observe_incremental(account.fast, axis, mean_n, step_m * per_s, interval_s)
+    close_incremental(account.fast, interval_s)
     if square_m2 > account.longest_m * account.longest_m:
         account.longest_m = math.sqrt(square_m2)
     stored_j, forgiven_j = _filter_storage(model, account), FORGIVEN_W * interval_s
     account.stored_j[account.turn] = stored_j
-    late_j = max(stored_j, account.stored_j[_row_before(account, safety.delay_ticks)])
-    later_j = max(late_j, account.stored_j[_row_before(account, safety.delay_ticks + 1)])
+    late_j = max(stored_j, account.stored_j[_row_before(account, delay_ticks)])
+    later_j = max(late_j, account.stored_j[_row_before(account, delay_ticks + 1)])
     most_j = _liquid_storage(model, safety.delay_ticks)
     account.reserve_j = most_j + late_j
     per_time = 1.0 / account.impulse_s
@@ -140,6 +158,7 @@ def observe(model: Any, safety: Record, interval_s: float) -> None:
     clear(account.impulse_ns)
     clear(account.late_impulse_ns)
     clear(account.later_impulse_ns)
+    clear(account.acted_impulse_ns)
     account.impulse_s = 0.0
 
 
@@ -222,7 +241,7 @@ def _wake_power(liquid: Record, local: Record) -> float:
 @part
 def weaken(parameters: Record, account: Record, sample: Record) -> None:
     """Send a share of the force, halved by every halving debt, and all of it again only seconds after the last."""
-    left_j = _left_j(account)
+    left_j = min(_left_j(account), INCREMENTAL_ALLOWANCE_J + account.fast.balance_j)
     account.gain = min(account.gain * (1.0 + RECOVERY_PER_S * parameters.period_s), 1.0)
     if left_j < 0.0:
         account.gain = min(account.gain, HALVING_J / (HALVING_J - left_j))
@@ -328,5 +347,14 @@ def _log(account: Record, force_n: Any) -> None:
     sent_n = account.sent_n[account.turn]
     for axis in range(3):
         sent_n[axis] = force_n[axis] - account.lift_n[axis]
+    copy(sent_n, account.acted_n[account.turn])
     if square(sent_n) > account.strongest_n * account.strongest_n:
         account.strongest_n = norm(sent_n)
+
+
+@part
+def log_acted(account: Record, force_n: Any) -> None:
+    """Log what moved the hand in this tick, where it was not the force that this account is of."""
+    acted_n = account.acted_n[account.turn]
+    for axis in range(3):
+        acted_n[axis] = force_n[axis] - account.lift_n[axis]

@@ -72,12 +72,12 @@ def take_force(state: Record, safety: Record) -> None:
     """Take the mean force that acted since the last sample, as late as the loop is believed to be."""
     account, filtered = safety.account, state.kalman
     late = account.turn - safety.delay_ticks
-    late_n = account.sent_n[late if late >= 0 else late + account.sent_n.shape[0]]
+    late_n = account.acted_n[late if late >= 0 else late + account.acted_n.shape[0]]
     lasted_s = account.impulse_s + safety.turn_s
     for axis in range(3):
         filtered.force_n[axis] = late_n[axis]
         if lasted_s > 0.0:
-            filtered.force_n[axis] = (account.late_impulse_ns[axis] + late_n[axis] * safety.turn_s) / lasted_s
+            filtered.force_n[axis] = (account.acted_impulse_ns[axis] + late_n[axis] * safety.turn_s) / lasted_s
     filtered.believed_ticks = safety.delay_ticks
 
 

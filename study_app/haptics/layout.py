@@ -239,6 +239,20 @@ LIQUID_STATE = np.dtype(
     align=True,
 )
 
+# What of force and motion is fast, and the work in it, at the hand (haptics.incremental).
+INCREMENTAL = np.dtype(
+    [
+        ("force_n", np.float64, (3,)),  # mean force since the last sample
+        ("force_once_n", np.float64, (3,)),  # the same after one high-pass filter
+        ("force_twice_n", np.float64, (3,)),  # and after two
+        ("velocity_mps", np.float64, (3,)),  # mean velocity in the frame of the current
+        ("velocity_once_mps", np.float64, (3,)),
+        ("velocity_twice_mps", np.float64, (3,)),
+        ("balance_j", np.float64),  # B: 0 or below
+    ],
+    align=True,
+)
+
 # The energy that hand and liquid owe each other, at the hand (haptics.energy).
 ACCOUNT = np.dtype(
     [
@@ -247,12 +261,15 @@ ACCOUNT = np.dtype(
         ("later_balance_j", np.float64),  # the same, if they act one tick later still
         ("turn", np.int64),  # the row of the newest force below
         ("sent_n", np.float64, (MOST_DELAY + 2, 3)),  # forces of the last turns, without buoyancy and weight
+        ("acted_n", np.float64, (MOST_DELAY + 2, 3)),  # the same of what moved the hand: another liquid's, in a shadow
+        ("acted_impulse_ns", np.float64, (3,)),  # of such forces, as late as the loop is believed to be, times time
         ("reserve_j", np.float64),  # the most that liquids and estimator could give back at the last sample
         ("stored_j", np.float64, (MOST_DELAY + 2,)),  # what the velocity estimator stored then, at the hand
         ("impulse_ns", np.float64, (3,)),  # such a force times time, summed since the last sample [N·s]
         ("late_impulse_ns", np.float64, (3,)),  # the same of late forces
         ("later_impulse_ns", np.float64, (3,)),  # the same of forces one tick later still
         ("impulse_s", np.float64),  # the time since then
+        ("fast", INCREMENTAL),
         ("velocity_mps", np.float64, (3,)),  # the hand's in the frame of the current, smoothed over 2 ms
         ("longest_m", np.float64),  # the longest step so far
         ("strongest_n", np.float64),  # the strongest force so far

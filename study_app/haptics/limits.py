@@ -12,7 +12,7 @@ from importlib import resources
 from typing import Final, NamedTuple
 
 from study_app.errors import StudyError
-from study_app.haptics.scene import Ewma, Given, Velocity
+from study_app.haptics.scene import Ewma, Given, Kalman, Velocity
 
 SLOWEST_HZ: Final = 500.0
 """Slower servos are for trying out: what participants would feel there is the limits rather than the liquids."""
@@ -25,10 +25,16 @@ CUT_INERTIA_SHARE: Final = 0.15
 
 MEASURED_KG: Final = 0.1
 """The free handle that the table was measured with."""
-LIGHTER: Final = 1.15
-"""Power of the ratio of masses in which a lighter handle bears less: at 1, a freed handle of 30 g swung in honey."""
+LIGHTER: Final = 1.3
+"""Power of the ratio of masses in which a lighter handle bears less: at 1, a freed handle of 30 g swung in honey; at
+1.2 in a dense liquid, where the delay was one tick longer than believed."""
+LIGHTER_KALMAN: Final = 1.7
+"""The same with "kalman", which bears as much more at 0.1 kg: at 1.3, two of 2301 handles of 30 and 50 g were restless
+where the delay was one tick longer than believed."""
 SLEW_N: Final = 1.5
 """The most that the force on a handle of `MEASURED_KG` or more changes within a millisecond."""
+KALMAN_SLEW: Final = 0.8
+"""Share of it with "kalman": at 1, a freed handle in tar swung where the delay was one tick longer than believed."""
 SLEW_S: Final = 1e-3
 
 _THESIS: Final = Ewma()
@@ -84,12 +90,13 @@ def bearable(period_s: float, delay_ticks: int, velocity: Velocity = _THESIS) ->
     return Bearable(*(beyond * min(limits) for limits in zip(*found, strict=True)))
 
 
-def slew_limit_n(period_s: float, mass_kg: float) -> float:
+def slew_limit_n(period_s: float, mass_kg: float, velocity: Velocity = _THESIS) -> float:
     """Return the most that the force on a handle of this mass [kg] changes within a tick [N].
 
     A loop slower than 1 kHz gets as much a millisecond.
     """
-    return SLEW_N * min(mass_kg / MEASURED_KG, 1.0) * max(period_s / SLEW_S, 1.0)
+    share = KALMAN_SLEW if isinstance(velocity, Kalman) else 1.0
+    return share * SLEW_N * min(mass_kg / MEASURED_KG, 1.0) * max(period_s / SLEW_S, 1.0)
 
 
 def _rows(velocity: Velocity) -> tuple[tuple[str, float | None], ...]:

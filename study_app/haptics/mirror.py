@@ -13,7 +13,7 @@ import numpy as np
 
 from study_app.haptics.compiled import kernel, part
 from study_app.haptics.effects.wake import REST_MPS
-from study_app.haptics.energy import log_delivery
+from study_app.haptics.energy import log_acted, log_delivery
 from study_app.haptics.layout import (
     EFFECT_LOCAL_WAKE,
     EFFECT_WAKE,
@@ -64,15 +64,19 @@ def was_lost_at_read(sample: Record) -> bool:
 
 @part
 def take_sample(model: Any, safety: Record, sample: Record, delivered: bool) -> None:
-    """Recompute the tick of a sample from what it says of the servo's input: stop, delay, and what the device sent."""
+    """Recompute the tick of a sample from what it says of the servo's input: stop, delay, and what the device sent.
+
+    Where that was not ``delivered`` for this model's command, only the velocity estimator is told of it: the hand moved
+    under that force.
+    """
     sent_x, sent_y, sent_z = sample.device_force_n[0], sample.device_force_n[1], sample.device_force_n[2]
-    as_asked = (
-        sent_x == sample.command_n[0] and sent_y == sample.command_n[1] and sent_z == sample.command_n[2]
-    ) or not delivered
+    as_asked = sent_x == sample.command_n[0] and sent_y == sample.command_n[1] and sent_z == sample.command_n[2]
     safety.stop = 1 if sample.limiters & LIMITER_STOP else 0
     safety.delay_ticks = sample.delay_ticks
     tick(model, safety, sample)
-    if not as_asked:
+    if not delivered:
+        log_acted(safety.account, (sent_x, sent_y, sent_z))
+    elif not as_asked:
         log_delivery(safety, sample, (sent_x, sent_y, sent_z))
 
 

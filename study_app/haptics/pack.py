@@ -15,7 +15,15 @@ from study_app.haptics.dynamics import MOST_DELAY, UNKNOWN, Dynamics
 from study_app.haptics.effects import records
 from study_app.haptics.effects.fill import GRAVITY_MPS2, WAKE_RATE_HZ, Rows, fill, most_rows, rows_of, volume_m3
 from study_app.haptics.gate import resolve
-from study_app.haptics.limits import CUT_INERTIA_SHARE, LIGHTER, MEASURED_KG, Bearable, bearable, slew_limit_n
+from study_app.haptics.limits import (
+    CUT_INERTIA_SHARE,
+    LIGHTER,
+    LIGHTER_KALMAN,
+    MEASURED_KG,
+    Bearable,
+    bearable,
+    slew_limit_n,
+)
 from study_app.haptics.scene import MAX_LIQUIDS, MAX_WINDOW, Ewma, Foaw, Given, Kalman, Line, Scene
 
 _ESTIMATORS = {
@@ -172,7 +180,8 @@ def _rows_needed(scene: Scene) -> Rows:
 
 def _by_delay(scene: Scene, dynamics: Dynamics) -> Sequence[Bearable]:
     """Return what a loop of the scene's rate, estimator and device bears at each delay, 0 to `MOST_DELAY` ticks."""
-    lighter = min(dynamics.mass_kg / MEASURED_KG, 1.0) ** LIGHTER
+    power = LIGHTER_KALMAN if isinstance(scene.velocity, Kalman) else LIGHTER
+    lighter = min(dynamics.mass_kg / MEASURED_KG, 1.0) ** power
     found = (bearable(1 / scene.rate_hz, delay, scene.velocity) for delay in range(MOST_DELAY + 1))
     return [Bearable(lighter * limit.drag_nspm, lighter * limit.inertia_nspm) for limit in found]
 
@@ -209,7 +218,7 @@ def _fill_constants(model: Model, scene: Scene, limits: Sequence[Bearable], dyna
     parameters.knee_threshold_mps = scene.knee.threshold_mps
     parameters.slope_limit_nspm = [limit.drag_nspm / scene.scale for limit in limits]
     parameters.force_limit_n = scene.force_limit_n
-    parameters.slew_n = slew_limit_n(1 / scene.rate_hz, dynamics.mass_kg)
+    parameters.slew_n = slew_limit_n(1 / scene.rate_hz, dynamics.mass_kg, scene.velocity)
     parameters.count_m = dynamics.count_m
     parameters.mass_kg = dynamics.mass_kg
     first = Rows()

@@ -2,7 +2,8 @@
 
 Telemetry comes in batches; the servo's own tick (``haptics.mirror``) answers for A and for B, each with a state of its
 own. The felt side shares what survives a change of scene with the servo's safety layer, so that its forces are the
-servo's to the last bit; the other side goes on with a copy of it. Nothing here can hold the servo up.
+servo's to the last bit; the other side goes on with a copy of it. The velocity filters of both know the force that was
+sent: it moved the hand. Nothing here can hold the servo up.
 """
 
 from __future__ import annotations

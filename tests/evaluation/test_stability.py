@@ -176,9 +176,11 @@ def test_smoothing_halves_the_power_of_40_hz():
     trace = trace_of(Case())
     for axis in range(3):
         trace.position_m[:, axis] = np.sin(2 * np.pi * 40 * trace.t_s)
-    out = np.zeros((len(trace), 3))
-    smooth(trace, math.sqrt(math.log(2)) / (2 * math.pi * 40), out)
-    assert out[200:-200].std() == pytest.approx(math.sqrt(0.5) * trace.position_m[200:-200].std(), rel=0.02)
+        trace.sent_n[:, axis] = np.sin(2 * np.pi * 40 * trace.t_s)
+    out_m, out_n = np.zeros((len(trace), 3)), np.zeros((len(trace), 3))
+    smooth(trace, math.sqrt(math.log(2)) / (2 * math.pi * 40), out_m, out_n)
+    for out in (out_m, out_n):
+        assert out[200:-200].std() == pytest.approx(math.sqrt(0.5) * trace.position_m[200:-200].std(), rel=0.02)
 
 
 @compiled

@@ -9,7 +9,16 @@ import pytest
 
 from study_app.evaluation.stability.bench import new_bench, new_trace, trace_of
 from study_app.evaluation.stability.cases import PLANTS, Case, liquids, parse
-from study_app.evaluation.stability.groups import CASES, FIRST_RELEASE_S, HANDLES_KG, PHASES, groups
+from study_app.evaluation.stability.groups import (
+    CASES,
+    DISTURBED,
+    FIRST_RELEASE_S,
+    HANDLES_KG,
+    KALMAN_CASES,
+    PHASES,
+    groups,
+    sweep,
+)
 from study_app.evaluation.stability.loop import SLOWER_S, begin, play
 from study_app.evaluation.stability.verdict import MISJUDGED_ALLOWANCE_J, judge, windows
 from tests.haptics.scenes import COMPILED
@@ -23,7 +32,18 @@ def all_groups():
 
 
 def own_plants(all_groups):
-    return {name: cases for name, cases in all_groups.items() if not name.startswith("through")}
+    return {name: cases for name, cases in all_groups.items() if not name.startswith(("through", "kalman"))}
+
+
+def test_the_kalman_filter_is_judged_in_each_group_but_those_of_disturbed_samples(all_groups):
+    kalman = {name.removeprefix("kalman: "): it for name, it in all_groups.items() if name.startswith("kalman")}
+    others = dict(all_groups) | {"first plant": sweep()}
+    assert set(kalman) == set(others) - set(DISTURBED) - {name for name in others if name.startswith("kalman")}
+    for name, cases in kalman.items():
+        assert {case.estimator for case in cases} == {"kalman"}
+        assert len(cases) == len(set(cases)) == min(KALMAN_CASES, len(others[name]))
+        alike = {dataclasses.replace(case, estimator="kalman") for case in others[name]}
+        assert set(cases) <= alike
 
 
 def test_groups_have_both_plants_all_liquids_and_light_handles(all_groups):
@@ -138,19 +158,20 @@ def test_bursts_leave_twenty_milliseconds_without_a_sample():
 
 
 @compiled
+@pytest.mark.parametrize("estimator", ["ewma", "kalman"])
 @pytest.mark.parametrize("fault", [{"lost": 0.1}, {"duplicated": 0.05}, {"burst_ms": 20.0}, {"missed": 0.02}])
-def test_motion_is_played_with_the_samples_that_the_loop_had(fault):
-    case = Case(speed_mps=0.6, jitter=0.2, **fault)
+def test_motion_is_played_with_the_samples_and_the_forces_that_the_loop_had(fault, estimator):
+    case = Case(speed_mps=0.6, jitter=0.2, estimator=estimator, **fault)
     bench, trace = new_bench(case, safe=False), new_trace(case)
     begin(bench.loop, bench.handle)
     first = bench.run(trace, 0, 0.3)
     again = bench.copy()
     trace = trace[: bench.run(trace, first, 1.0)]
     played = trace[first:].copy()
-    played.sent_n[:] = 0.0
     records = again.model, again.safety[0], again.sample[0], again.handle, again.pace, again.loop
     play(*records, played, trace.position_m[first:].copy())
     assert np.abs(played.sent_n).max() > 0.1
+    assert again.model.state[0].kalman.distrusted == bench.model.state[0].kalman.distrusted
     assert np.abs(played.sent_n - trace.sent_n[first:]).max() == 0.0
 
 
@@ -162,6 +183,32 @@ def test_hand_that_breaks_the_wake_at_each_reversal_is_as_restless_without_feedb
     for case in (parse(released), held):
         verdict = judge(case, safe=True)
         assert verdict.stable, verdict
+
+
+SHORT = "hand=lets-go motion=sine viscous_nspm=0 plant=arm delay={} believed={} liquid={} scale={} mass_kg={} "
+TAR, THROWN_TAR = "speed_mps=0.1885 release_s=1.01667", "hand=thrown speed_mps=0.3 quantum_um=60 noise_um=30"
+
+
+@compiled
+@pytest.mark.parametrize(
+    "line",
+    [
+        SHORT.format(1, 0, "physical_tar", 3, 0.1) + TAR,  # accounted as a loop without delay
+        SHORT.format(2, 1, "light_oil", 10, 0.03) + "speed_mps=0.37699 release_s=0.85",  # a swing paid by the motion
+        SHORT.format(2, 1, "dense", 10, 0.1) + "speed_mps=0.1885 release_s=0.93333",
+        SHORT.format(2, 1, "dense", 10, 0.03) + "speed_mps=0.37699 release_s=0.93333",  # LIGHTER
+        SHORT.format(2, 1, "light_oil", 10, 0.05)
+        + "speed_mps=0.37699 release_s=1.05833 viscous_nspm=0.5 estimator=kalman",  # LIGHTER_KALMAN
+        SHORT.format(3, 2, "physical_tar", 3, 0.05)
+        + "rate_hz=500 estimator=kalman motion=reaches "
+        + THROWN_TAR,  # KALMAN_SHARE
+        SHORT.format(2, 1, "physical_tar", 1, 0.25) + "motion=stroke speed_mps=1 estimator=kalman",  # KALMAN_SLEW
+    ],
+)
+def test_a_delay_one_tick_longer_than_believed_leaves_the_loop_stable(line):
+    verdict = judge(parse(line), safe=True)
+    assert verdict.stable, verdict
+    assert verdict.balance_j > -MISJUDGED_ALLOWANCE_J
 
 
 @compiled

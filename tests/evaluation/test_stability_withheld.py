@@ -1,5 +1,7 @@
 """The share of force that passivity controller and slew limit withhold in quick motion."""
 
+import itertools
+
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -31,7 +33,9 @@ def played(case, path_m, *, rigid):
 
 @compiled
 def test_slow_strokes_lose_nothing_and_shares_lie_between_0_and_1():
-    for found in measure(["physical_water", "syrup"]):
+    shares = measure(["syrup"])
+    assert {(found.estimator, found.mode) for found in shares} == set(itertools.product(("ewma", "kalman"), MODES))
+    for found in shares:
         assert found.strokes[0] == pytest.approx(0.0, abs=1e-3)
         assert all(0.0 <= share <= 1.0 for share in (*found.strokes, *sum(found.after, ())))
 

@@ -16,7 +16,16 @@ from study_app.haptics.layout import (
     LIMITER_STOP,
     STATUS_NON_FINITE,
 )
-from study_app.haptics.limits import SLEW_N, bearable, refuses, slew_limit_n, slope_limit, table
+from study_app.haptics.limits import (
+    LIGHTER,
+    LIGHTER_KALMAN,
+    SLEW_N,
+    bearable,
+    refuses,
+    slew_limit_n,
+    slope_limit,
+    table,
+)
 from study_app.haptics.motion import Motion
 from study_app.haptics.offline import simulate
 from study_app.haptics.pack import pack, pack_into
@@ -228,9 +237,18 @@ def test_the_slew_limit_knows_rate_and_mass(period_s, mass_kg, expected):
     assert pack(felt, dynamics=Dynamics(0.0, 38e-6, mass_kg)).parameters[0].slew_n == pytest.approx(expected)
 
 
-def test_a_light_device_bears_less_damping_by_its_mass():
-    whole, half = (pack(HONEY, dynamics=Dynamics(0.0, 38e-6, kg)).parameters[0] for kg in (0.1, 0.05))
-    assert half.slope_limit_nspm == pytest.approx(0.5**1.15 * whole.slope_limit_nspm)
+@pytest.mark.parametrize(("velocity", "power"), [(Ewma(), LIGHTER), (Kalman(), LIGHTER_KALMAN)])
+def test_a_light_device_bears_less_damping_by_its_mass(velocity, power):
+    felt = HONEY.model_copy(update={"velocity": velocity})
+    whole, half = (pack(felt, dynamics=Dynamics(0.0, 38e-6, kg)).parameters[0] for kg in (0.1, 0.05))
+    assert power > 1
+    assert half.slope_limit_nspm == pytest.approx(0.5**power * whole.slope_limit_nspm)
+
+
+def test_the_kalman_filter_has_a_lower_slew_limit():
+    felt = HONEY.model_copy(update={"velocity": Kalman()})
+    assert pack(felt, dynamics=Dynamics(0.0, 38e-6, 0.1)).parameters[0].slew_n == pytest.approx(1.2)
+    assert pack(felt).parameters[0].slew_n == pytest.approx(1.5)  # a device that does not measure its delay gets EWMA
 
 
 def test_after_an_energy_debt_the_force_changes_more_slowly():

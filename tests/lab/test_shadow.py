@@ -68,6 +68,24 @@ def test_so_they_are_with_the_kalman_filter_on_a_light_handle() -> None:
     assert live.shadow.differing == 0
 
 
+def test_the_other_sides_kalman_filter_knows_the_force_that_was_sent() -> None:
+    """Both sides fill a wake by the same velocity, although their forces differ."""
+    device = scripted()
+    device._state.handle.mass_kg = 0.05
+    live = live_with(device)
+    thin = SCENES["water"].model_copy(update={"velocity": Kalman()})
+    thick = changed(thin, "liquid.density_kg_m3", 4000.0)
+    live.feel(Workbench(Setting("thin", thin, thin), Setting("thick", thick, thick)))
+    live.play("reach")
+    run(live, 1500)
+    trace = live.trace()
+    assert trace is not None
+    assert np.abs(trace.force_a_n - trace.force_b_n).max() > 0.5
+    assert trace.wake_a_mps.max() > 0.01
+    assert np.array_equal(trace.wake_a_mps, trace.wake_b_mps)
+    live.close()
+
+
 def test_the_other_side_is_what_it_would_be_were_it_felt() -> None:
     beside = live_with(scripted())
     quiet = changed(SCENES["water"], "liquid.density_kg_m3", 1.0)

@@ -38,6 +38,8 @@ PHASES: Final = 12
 FIRST_RELEASE_S: Final = 0.6
 CASES: Final = 1500
 """Of each group of misjudged delays and of disturbed samples."""
+KALMAN_CASES: Final = 250
+"""Of each group that is judged with the Kalman filter, too."""
 
 DRAWN: Final[Mapping[str, tuple[Any, ...]]] = {
     "estimator": ("ewma", "ewma", "ewma", "line", "foaw", "raw"),
@@ -104,7 +106,15 @@ def groups(seed: str = "stability", count: int | None = None) -> tuple[Group, ..
     found.append(Group(f"{driven}, held", driven_held))
     driven_free = (dataclasses.replace(case, delay=1) for case in _releases(f"{seed} {driven}", (FALCON,), FALCONS_KG))
     found.append(Group(f"{driven}, let go in mid-stroke", some(tuple(driven_free), count)))
+    known = [Group("first plant", sweep(seed)), *(group for group in found if group.name not in DISTURBED)]
+    found += [_with_kalman(group, min(KALMAN_CASES, count or KALMAN_CASES)) for group in known]
     return tuple(found)
+
+
+def _with_kalman(group: Group, count: int) -> Group:
+    """Return some cases of a group with the Kalman filter in place of their estimators."""
+    cases = (dataclasses.replace(case, estimator="kalman") for case in some(group.cases, count))
+    return Group(f"kalman: {group.name}", tuple(cases))
 
 
 def some(cases: Sequence[Case], count: int | None) -> tuple[Case, ...]:
@@ -141,6 +151,7 @@ CHANGES: Final[Mapping[str, Callable[[Case], Case | None]]] = {
     "no sample for 20 ms, again and again": lambda case: dataclasses.replace(case, burst_ms=20.0),
 }
 MISJUDGED: Final = tuple(CHANGES)[:3]
+DISTURBED: Final = tuple(CHANGES)[3:]
 
 
 def _grid(

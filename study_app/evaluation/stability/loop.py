@@ -14,13 +14,13 @@ import numpy as np
 from study_app.evaluation.stability.arm import ARM, advance, write_force
 from study_app.haptics.compiled import kernel
 from study_app.haptics.door import admit, watch
-from study_app.haptics.energy import log_command, observe, open_account
+from study_app.haptics.energy import log_acted, log_command, observe
 from study_app.haptics.kalman import take_force
 from study_app.haptics.loop import follow_delay
 from study_app.haptics.pace import next_turn, random
 from study_app.haptics.plant import measure, move, push
 from study_app.haptics.tick import report, respond, tick
-from study_app.haptics.vector import copy, is_finite
+from study_app.haptics.vector import clear, copy, is_finite
 
 REACHES, CIRCLES, STROKE, SINE = range(4)
 
@@ -216,7 +216,8 @@ def _write_down(model: Any, safety: Any, sample: Any, handle: Any, loop: Any, ro
 def play(model: Any, safety: Any, sample: Any, handle: Any, pace: Any, loop: Any, trace: Any, places_m: Any) -> None:
     """Let the tick answer a motion (rows, 3) at the times of ``trace``, and write its force over ``sent_n`` there.
 
-    Samples are lost and repeated in the same ticks as in the trace. No work is done on anything, so the passivity
+    Samples are lost and repeated in the same ticks as in the trace. An estimator that knows the force is told what
+    ``sent_n`` held before: the force that belongs to the motion. No work is done on anything, so the passivity
     controller stays out of it.
     """
     for k in range(trace.shape[0]):
@@ -225,9 +226,19 @@ def play(model: Any, safety: Any, sample: Any, handle: Any, pace: Any, loop: Any
             handle.position_m[axis] = places_m[k, axis]
         sample.fresh, loop.measured = trace[k].fresh, trace[k].measured
         _read(sample, handle, pace, loop)
-        open_account(safety.account)
+        _settle_account(safety.account)
         _answer(model, safety, sample, loop.safe)
+        log_acted(safety.account, trace[k].sent_n)
         copy(sample.device_force_n, trace[k].sent_n)
+
+
+@kernel
+def _settle_account(account: Any) -> None:
+    """Owe nothing: each balance begins the tick as high as the liquid's reserve lets it be."""
+    account.balance_j = account.late_balance_j = account.later_balance_j = account.fast.balance_j = math.inf
+    account.gain = 1.0
+    account.settling = 0
+    clear(account.velocity_mps)
 
 
 @kernel

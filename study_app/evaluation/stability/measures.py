@@ -50,24 +50,28 @@ def given_out_j(trace: Any) -> float:
 
 
 @kernel
-def smooth(trace: Any, spread_s: float, out_m: Any) -> None:
-    """Write the handle's motion without what is fast into ``out_m`` (rows, 3): a Gaussian mean over time."""
+def smooth(trace: Any, spread_s: float, out_m: Any, out_n: Any) -> None:
+    """Write motion and force without what is fast into ``out_m``, ``out_n`` (rows, 3): a Gaussian mean over time."""
     rows = trace.shape[0]
     first = 0
     for k in range(rows):
         while trace[k].t_s - trace[first].t_s > 3.5 * spread_s:
             first += 1
-        total = x = y = z = 0.0
+        total = 0.0
+        out_m[k] = 0.0
+        out_n[k] = 0.0
         j = first
         while j < rows and trace[j].t_s - trace[k].t_s <= 3.5 * spread_s:
             distance = (trace[j].t_s - trace[k].t_s) / spread_s
             weight = math.exp(-0.5 * distance * distance)
             total += weight
-            x += weight * trace[j].position_m[0]
-            y += weight * trace[j].position_m[1]
-            z += weight * trace[j].position_m[2]
+            for axis in range(3):
+                out_m[k, axis] += weight * trace[j].position_m[axis]
+                out_n[k, axis] += weight * trace[j].sent_n[axis]
             j += 1
-        out_m[k, 0], out_m[k, 1], out_m[k, 2] = x / total, y / total, z / total
+        for axis in range(3):
+            out_m[k, axis] /= total
+            out_n[k, axis] /= total
 
 
 def fast_part(vectors: Any, rate_hz: float, corner_hz: float, first: int, last: int, aside_s: float = 0.0) -> float:

@@ -145,8 +145,8 @@ def _restlessness(
     case: Case, trace: Any, before: list[tuple[int, Bench]], limits: Bearable | None
 ) -> tuple[float, float]:
     """Return the force's fast part, and that of the same motion without feedback, where they differ most."""
-    calm_m = np.zeros((len(trace), 3))
-    smooth(trace, SPREAD_S, calm_m)
+    calm_m, calm_n = np.zeros((len(trace), 3)), np.zeros((len(trace), 3))
+    smooth(trace, SPREAD_S, calm_m, calm_n)
     undecided_m = case.quantum_um * 1e-6 * (np.random.default_rng(1).random(calm_m.shape) - 0.5)
     passive = _passive(case, bool(before[0][1].loop.safe), limits)
     found = []
@@ -156,6 +156,7 @@ def _restlessness(
         for places_m in (calm_m, calm_m + undecided_m):
             again, answer = bench.copy(), trace.copy()
             answer.sent_n[:first] = 0.0
+            answer.sent_n[first:] = calm_n[first:]
             play(
                 again.model,
                 again.safety[0],

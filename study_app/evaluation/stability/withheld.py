@@ -52,6 +52,8 @@ HAND_NSPM: Final = 60.0
 MOST: Final = 0.05
 MOST_AFTER: Final = 0.005
 EXEMPT: Final = ("physical_tar",)
+ESTIMATORS: Final = ("ewma", "kalman")
+"""Those that studies use."""
 MODES: Final = ("position imposed", "handle held")
 
 
@@ -81,7 +83,7 @@ class Withheld(NamedTuple):
 
 
 def measure(
-    names: Sequence[str] | None = None, estimators: Sequence[str] = ("ewma",), *, delay: int = 1
+    names: Sequence[str] | None = None, estimators: Sequence[str] = ESTIMATORS, *, delay: int = 1
 ) -> tuple[Withheld, ...]:
     """Return the shares of liquids (by default all that ship), each at its own scale, at 1 kHz."""
     shipped = [name for name in liquids() if name != "dense"]
