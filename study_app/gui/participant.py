@@ -124,7 +124,6 @@ class ParticipantWindow(QWidget):
         self.setObjectName("participant")
         self.setFont(font("body"))
         self.setStyleSheet(stylesheet(PARTICIPANT))
-        self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)  # it has the keyboard in the tank; Tab stays on the page
         self.setMinimumSize(LEAST_SIZE)
 
     @property

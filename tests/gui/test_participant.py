@@ -131,6 +131,33 @@ def test_windows_title_is_neutral(opened: Opened) -> None:
         assert opened.window.windowTitle() == words("en").window_title
 
 
+def beside(window: ParticipantWindow) -> QPoint:
+    """Return a place in the window where its page has nothing to press."""
+    return QPoint(window.width() // 2, window.height() - 12)
+
+
+@pytest.mark.parametrize(
+    ("page", "key", "told"),
+    [
+        (text_page("consent"), Qt.Key.Key_Return, Continue),
+        (text_page(), Qt.Key.Key_Space, Continue),
+        (PausePage(force_off=False), Qt.Key.Key_Return, ResumeAsked),
+        (questionnaire(), Qt.Key.Key_4, Chosen),
+        (task_page(explore()), Qt.Key.Key_Space, Continue),
+    ],
+    ids=lambda value: type(value).__name__,
+)
+def test_click_beside_a_button_leaves_the_page_its_keys(opened: Opened, page: Page, key: Qt.Key, told: type) -> None:
+    opened.window.show_page(page)
+    opened.window.show_view(view(elapsed_s=60.0))
+    opened.window.grab()
+    QTest.mouseClick(
+        opened.window.windowHandle(), Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier, beside(opened.window)
+    )
+    QTest.keyClick(opened.focus, key)
+    assert told in opened.kinds
+
+
 def test_events_of_pages_are_passed_on(opened: Opened) -> None:
     opened.window.show_page(text_page())
     QTest.keyClick(opened.focus, Qt.Key.Key_Space)
