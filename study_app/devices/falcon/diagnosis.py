@@ -79,11 +79,13 @@ Shows = Callable[[Facts], bool | None]
 class Mode:
     """One way to fail.
 
-    ``symptom`` is what a user sees, ``cause`` a clause that fits after "because", ``cures`` what to do by platform
-    ("" for all others), ``detected`` by what it is known, ``paste`` what a terminal on Linux takes.
+    ``tested`` is what holds where it is not there, ``symptom`` what a user sees where it is, ``cause`` a clause that
+    fits after "because", ``cures`` what to do by platform ("" for all others), ``detected`` by what it is known,
+    ``paste`` what a terminal on Linux takes.
     """
 
     id: str
+    tested: str
     symptom: str
     cause: str
     cures: Mapping[str, str]
@@ -176,6 +178,7 @@ def _late(facts: Facts) -> bool | None:
 MODES: Final = (
     Mode(
         "upload",
+        "its firmware loads",
         "its firmware could not be loaded, though it sometimes goes at the third or tenth attempt",
         "handshake or echo of its boot loader was disturbed",
         {
@@ -187,6 +190,7 @@ MODES: Final = (
     ),
     Mode(
         "permission",
+        "this account may open it",
         "it opens for the administrator alone",
         "this account may not open it",
         {
@@ -200,6 +204,7 @@ MODES: Final = (
     ),
     Mode(
         "windows-driver",
+        "its driver lets programs open it",
         "Windows lists it, but it cannot be opened",
         "its present driver does not let programs open it, and FTDI's library (ftd2xx) is not there",
         {
@@ -212,6 +217,7 @@ MODES: Final = (
     ),
     Mode(
         "two-drivers",
+        "one driver alone is bound to it",
         "Windows lists it, FTDI's driver shows none",
         "Force Dimension's driver is bound to it, which FTDI's D2XX cannot share",
         {
@@ -224,6 +230,7 @@ MODES: Final = (
     ),
     Mode(
         "firmware-file",
+        "its firmware is there",
         "there is no firmware for it",
         "it has no program since it was switched on, and none may be given away with this software",
         {
@@ -235,6 +242,7 @@ MODES: Final = (
     ),
     Mode(
         "stroke-in",
+        "it homes: every arm has passed its index",
         "it does not home: no lock is felt",
         "not every arm has passed its index",
         {_ANY: "push the grip fully in, as far as it goes, then pull it out"},
@@ -243,6 +251,7 @@ MODES: Final = (
     ),
     Mode(
         "stroke-out",
+        "its grip was pulled out after homing",
         "it is homed, and gives no force",
         "it is homed, but its grip was not pulled out since",
         {_ANY: "pull it fully out, toward you"},
@@ -251,6 +260,7 @@ MODES: Final = (
     ),
     Mode(
         "power",
+        "it answers",
         "its bridge is there, its arms are limp",
         "it does not answer",
         {_ANY: "check its mains adapter, then unplug it, plug it in and start again"},
@@ -259,6 +269,7 @@ MODES: Final = (
     ),
     Mode(
         "frozen",
+        "its encoders move",
         "its positions stand still",
         "its encoders do not move",
         {_ANY: "check its mains adapter; if the grip was moved, switch it off and on, then load its firmware again"},
@@ -267,6 +278,7 @@ MODES: Final = (
     ),
     Mode(
         "broken-packets",
+        "its packets are answered whole",
         "it trembles, or buttons seem pressed that are not",
         f"more than {MOST_BROKEN:.1%} of its packets get no whole reply",
         {_ANY: f"try another cable, then {_PORT[_ANY]}", "darwin": f"try another cable, then {_PORT['darwin']}"},
@@ -275,6 +287,7 @@ MODES: Final = (
     ),
     Mode(
         "shaking",
+        "the servo keeps its rate, and the force does not jump",
         "it shakes or twitches",
         f"the servo turns slower than {LEAST_HZ:.0f} times a second, or the force jumps by more than "
         f"{LARGEST_STEP_N} N",
@@ -287,6 +300,7 @@ MODES: Final = (
     ),
     Mode(
         "slow",
+        "its replies come in time",
         "it feels coarse, as at 60 or 300 Hz",
         f"a reply takes {1000 * LONGEST_ROUND_TRIP_S:.0f} ms or longer: the bridge's timer holds it back",
         {
@@ -298,6 +312,7 @@ MODES: Final = (
     ),
     Mode(
         "mac-driver",
+        "no driver of macOS keeps it",
         "macOS denies access to it",
         "a driver of FTDI's has taken it",
         {
@@ -310,6 +325,7 @@ MODES: Final = (
     ),
     Mode(
         "kernel-driver",
+        "no driver of Linux keeps it",
         "Linux has made a serial port of it",
         "a driver of the system holds it and does not let go",
         {"linux": "run 'sudo modprobe -r ftdi_sio', and take '0403 cb48' out of what writes to its new_id", _ANY: ""},
@@ -319,6 +335,7 @@ MODES: Final = (
     ),
     Mode(
         "busy",
+        "no other program holds it",
         "it cannot be claimed",
         "another program holds it",
         {
@@ -330,6 +347,7 @@ MODES: Final = (
     ),
     Mode(
         "unplugged",
+        "it stayed connected",
         "it was lost in use",
         "it is no longer there",
         {
@@ -341,6 +359,7 @@ MODES: Final = (
     ),
     Mode(
         "not-connected",
+        "it is connected",
         "it is not found",
         "none is connected",
         {
@@ -353,6 +372,7 @@ MODES: Final = (
     ),
     Mode(
         "no-libusb",
+        "libusb is loaded",
         "no USB device is found at all",
         "libusb cannot be loaded",
         {_ANY: "install libusb-package again: pip install --force-reinstall libusb-package"},
@@ -361,6 +381,7 @@ MODES: Final = (
     ),
     Mode(
         "no-ftd2xx",
+        "FTDI's driver library is loaded where it is needed",
         "FTDI's driver is of no use",
         "FTDI's driver library (ftd2xx) cannot be loaded",
         {_ANY: "install FTDI's D2XX driver"},
@@ -369,6 +390,7 @@ MODES: Final = (
     ),
     Mode(
         "transfer",
+        "its transfers succeed",
         "a transfer failed",
         "the bridge did not carry out a transfer, or not in time",
         {_ANY: f"check cable and mains adapter, then {_PORT[_ANY]}"},

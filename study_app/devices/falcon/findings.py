@@ -16,20 +16,23 @@ if TYPE_CHECKING:
     from study_app.devices.falcon.doctor import Examined
 
 State = Literal["ok", "found", "not looked at"]
+ORDER: Final[tuple[State, ...]] = ("found", "not looked at", "ok")
 WIDTH: Final = 100
 NOTHING_WRONG: Final = "Nothing is wrong with it."
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One mode of failure: ``number`` in the list, ``symptom`` as a user sees it, and whether it is there.
+    """One mode of failure: ``number`` in the list, and whether it is there.
 
+    ``tested`` says what holds where it is not, ``symptom`` what a user sees where it is.
     ``cause``, ``cure`` and ``known_by`` are of every mode; ``paste`` is what a terminal here takes, "" where nothing.
     ``says_itself`` where the failure's own sentence says cause and cure better.
     """
 
     number: int
     id: str
+    tested: str
     symptom: str
     state: State
     cause: str
@@ -37,6 +40,11 @@ class Finding:
     known_by: str
     paste: str = ""
     says_itself: bool = False
+
+    @property
+    def words(self) -> str:
+        """The symptom where it was found, else what is tested."""
+        return self.symptom if self.state == "found" else self.tested
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +59,11 @@ class Report:
     def found(self) -> tuple[Finding, ...]:
         """What is wrong."""
         return tuple(finding for finding in self.findings if finding.state == "found")
+
+    @property
+    def in_order(self) -> tuple[Finding, ...]:
+        """Every finding: what is wrong first, then what could not be looked at."""
+        return tuple(sorted(self.findings, key=lambda finding: ORDER.index(finding.state)))
 
     @property
     def unseen(self) -> tuple[Finding, ...]:
@@ -68,7 +81,7 @@ class Report:
         if not self.well:
             return f"Found: {len(self.found)}."
         if self.unseen:
-            return f"Nothing wrong was found. Not looked at: {'; '.join(one.symptom for one in self.unseen)}."
+            return f"Nothing wrong was found. Not looked at: {'; '.join(one.tested for one in self.unseen)}."
         return NOTHING_WRONG
 
 
@@ -87,6 +100,7 @@ def _finding(number: int, mode: Mode, facts: Facts) -> Finding:
     return Finding(
         number,
         mode.id,
+        mode.tested,
         mode.symptom,
         "not looked at" if shown is None else "found" if shown else "ok",
         mode.cause,
@@ -100,9 +114,9 @@ def _finding(number: int, mode: Mode, facts: Facts) -> Finding:
 def lines(found: Report) -> list[str]:
     """Return a report as text of 100 columns; what is to be pasted stands in one line."""
     told = ["", *(f"seen: {words}" for words in found.seen), ""]
-    for finding in found.findings:
+    for finding in found.in_order:
         word = "FOUND" if finding.state == "found" else finding.state
-        told.append(f"{finding.number:>2}  {word:<13}  {finding.symptom}")
+        told.append(f"{finding.number:>2}  {word:<13}  {finding.words}")
         if finding.state == "found" and not finding.says_itself:
             told.append(_indented(f"cause: {finding.cause}", 19))
             told.append(_indented(f"cure: {finding.cure}", 19))

@@ -24,7 +24,6 @@ from study_app.gui.themed import wear
 
 LOOK_MS = 100
 PREPARING = "Preparing … The first time the driver is compiled, which takes about a minute."
-ORDER = ("found", "not looked at", "ok")
 SIZE = QSize(820, 700)
 
 
@@ -207,7 +206,7 @@ class DiagnosisDialog(QDialog):
         """Show every mode as it was found; what is found stands first."""
         for row, finding in zip(self.rows, report.findings, strict=True):
             row.show_finding(finding)
-        self._order(sorted(self.rows, key=lambda row: ORDER.index(row.finding.state)))
+        self._order([self.rows[finding.number - 1] for finding in report.in_order])
 
     def _order(self, rows: Sequence[FindingRow]) -> None:
         """Put rows under each other, and lead the keyboard through them in that order."""

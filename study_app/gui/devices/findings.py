@@ -53,7 +53,7 @@ class Paste(QWidget):
 
 
 class FindingRow(Themed, QWidget):
-    """One mode of failure; what is found is tinted and open, the others open when they are asked."""
+    """One mode of failure: what is tested, or the symptom where it was found; that is tinted and open."""
 
     def __init__(self, finding: Finding) -> None:
         super().__init__()
@@ -65,16 +65,15 @@ class FindingRow(Themed, QWidget):
         self.more.setProperty("dense", "true")
         self.more.setAutoDefault(False)
         self.more.setCheckable(True)
-        self.more.setAccessibleName(f"Why: {finding.symptom}")
         self.more.toggled.connect(self._open)
         number = figures(str(finding.number), "label", "text2")
         number.setFixedWidth(22)
         number.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-        self.symptom = label(capital(finding.symptom), "body", wraps=True)
+        self.words = label("", "body", wraps=True)
         head = QHBoxLayout()
         head.setSpacing(12)
         head.addWidget(number)
-        head.addWidget(self.symptom, 1)
+        head.addWidget(self.words, 1)
         head.addWidget(self.chip)
         head.addWidget(self.more)
         self._column = QVBoxLayout(self)
@@ -99,8 +98,10 @@ class FindingRow(Themed, QWidget):
             body.deleteLater()
         self.finding, self.found = finding, found
         self.chip.show_state(*state)
-        self.symptom.setFont(font("strong" if found else "body"))
-        self.setAccessibleName(f"{finding.number}. {finding.symptom}: {state[2]}")
+        self.words.setFont(font("strong" if found else "body"))
+        self.words.setText(capital(finding.words))
+        self.setAccessibleName(f"{finding.number}. {finding.words}: {state[2]}")
+        self.more.setAccessibleName(f"Why: {finding.words}")
         self.more.setChecked(found)
         self._open(found)
         self.update()

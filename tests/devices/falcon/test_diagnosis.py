@@ -29,6 +29,7 @@ def shown(**facts):
 class TestModes:
     @pytest.mark.parametrize("mode", MODES, ids=lambda mode: mode.id)
     def test_each_says_symptom_cause_cure_and_how_it_is_known(self, mode):
+        assert mode.tested
         assert mode.symptom
         assert mode.cause
         assert mode.detected

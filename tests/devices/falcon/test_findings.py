@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import pytest
 
 from study_app.devices.falcon.diagnosis import MODES, OPEN, Facts
-from study_app.devices.falcon.findings import NOTHING_WRONG, report
+from study_app.devices.falcon.findings import NOTHING_WRONG, lines, report
 
 
 @dataclass(frozen=True)
@@ -73,3 +73,14 @@ def test_a_refused_firmware_says_itself_what_is_wrong():
 def test_a_report_goes_to_another_process_as_it_is():
     found = report(Seen(Facts(platform="linux", usb="access"), "refused", ("opened",)))
     assert pickle.loads(pickle.dumps(found)) == found  # noqa: S301 - our own
+
+
+def test_a_report_states_what_was_tested_and_what_is_wrong_first():
+    told = lines(report(Seen(Facts(platform="linux", usb="access"), "the Falcon cannot be used")))
+    numbered = [line for line in told if line[:2].strip().isdigit()]
+    states = [line[4:17].strip() for line in numbered]
+    assert states == sorted(states, key=("FOUND", "not looked at", "ok").index)
+    assert numbered[0].endswith("it opens for the administrator alone")
+    in_order = lines(report(Seen(WELL)))
+    assert any(line.split() == ["5", "ok", "its", "firmware", "is", "there"] for line in in_order)
+    assert not any("there is no firmware" in line for line in in_order)

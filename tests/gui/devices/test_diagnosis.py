@@ -82,6 +82,7 @@ def test_what_is_found_stands_first_open_with_cause_cure_and_what_to_paste(dialo
     assert dialog.step.text() == "This account may not open it."
     found = [row for row in dialog.rows if row.found]
     assert [row.finding.id for row in found] == ["permission"]
+    assert found[0].words.text() == capital(found[0].finding.symptom)
     qtbot.waitUntil(lambda: order(dialog)[0] == found[0].finding.number)
     (mode,) = (mode for mode in MODES if mode.id == "permission")
     told = words(found[0].body)
@@ -103,6 +104,7 @@ def test_others_say_why_when_they_are_asked(dialog, begun, qtbot):
     assert over.args == [True]
     row = next(row for row in dialog.rows if row.finding.state == "ok")
     assert row.chip.word == "OK"
+    assert row.words.text() == capital(row.finding.tested)
     assert row.body is None
     qtbot.keyClick(row.more, Qt.Key.Key_Space)
     assert "Cure" in words(row.body)
