@@ -17,6 +17,7 @@ from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.app.visit import Visit
 from study_app.gui.home.cards import StudyCard
+from study_app.gui.operator.strip import Strip
 from study_app.gui.pages.questionnaire import QuestionnaireWidget
 from study_app.gui.participant import ParticipantWindow
 from study_app.gui.preflight.window import FULL as PREFLIGHT
@@ -117,7 +118,7 @@ def explore_to_the_questionnaire(program: Program) -> str:
 
 def answer_nine_items(program: Program, felt: str, qtbot) -> None:
     """Answer with digits, and some with clicks; then confirm with Enter."""
-    plan = ParticipantWindow(words("en"), clock=ManualClock(), windowed=True)
+    plan = ParticipantWindow(words("en"), clock=ManualClock(), windowed=True, strip=Strip())
     qtbot.addWidget(plan)
     plan.resize(*program.size(felt))
     plan.show_page(questionnaire())

@@ -22,6 +22,7 @@ from study_app.gui.home.place import HomePlace
 from study_app.gui.main_window import FULL as HOME
 from study_app.gui.new_session import NewSessionDialog
 from study_app.gui.operator import OperatorWindow
+from study_app.gui.operator.strip import Strip
 from study_app.gui.pages.questionnaire import QuestionnaireWidget
 from study_app.gui.pages.text import TextWidget
 from study_app.gui.participant import WINDOWED_SIZE, ParticipantWindow
@@ -147,7 +148,7 @@ class ByMouse(Person):
 
     def __init__(self, program: Visitor, qtbot: Any) -> None:
         super().__init__(program)
-        self._plan = ParticipantWindow(words("en"), clock=ManualClock(), windowed=True)
+        self._plan = ParticipantWindow(words("en"), clock=ManualClock(), windowed=True, strip=Strip())
         qtbot.addWidget(self._plan)
         laid_out(self._plan, (WINDOWED_SIZE.width(), WINDOWED_SIZE.height()))
         self._middle = self._plan.rect().center()

@@ -22,6 +22,7 @@ from study_app.errors import SessionError, StudyError
 from study_app.gui.collector import settle, unsettle
 from study_app.gui.frames import Frames
 from study_app.gui.lookout import Lookout
+from study_app.gui.operator.strip import Strip
 from study_app.gui.operator.view import OperatorView
 from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.participant import ParticipantWindow
@@ -82,18 +83,28 @@ class SessionBridge(QObject):
         The two windows, made and not yet connected.
     refresh_hz
         Frames a second of the participant's screen.
+    strip
+        What tells the state in the participant's window, where both windows share one screen.
     """
 
     done = Signal()
     diagnose_asked = Signal()
 
     def __init__(
-        self, parts: Parts, participant: ParticipantWindow, operator: OperatorWindow, *, refresh_hz: float = 60.0
+        self,
+        parts: Parts,
+        participant: ParticipantWindow,
+        operator: OperatorWindow,
+        *,
+        refresh_hz: float = 60.0,
+        strip: Strip | None = None,
     ) -> None:
         super().__init__()
         self.parts = parts
         self.participant = participant
         self.operator = operator
+        self.strip = strip
+        self._called = False
         self.lookout = Lookout(parts, refresh_hz)
         self.trouble = ""
         self.failure: BaseException | None = None
@@ -125,6 +136,12 @@ class SessionBridge(QObject):
         operator.diagnose_asked.connect(self._diagnose)
         operator.escape.leave_to(participant)
         participant.event.connect(self._event)
+        participant.left.connect(operator.come_forward)
+        if self.strip is not None:
+            self.strip.stop_asked.connect(self._stop_force)
+            self.strip.operator_asked.connect(operator.come_forward)
+            operator.header.page.show()
+            operator.page_asked.connect(participant.come_forward)
         participant.painted.connect(self._painted)
         participant.swapped.connect(self._frames.swapped)
         if self.parts.point_to is not None:
@@ -243,7 +260,13 @@ class SessionBridge(QObject):
             QTimer.singleShot(END_SHOWN_MS, self.operator, self.operator.come_forward)
 
     def _show(self) -> None:
-        self.operator.show_view(self.view())
+        view = self.view()
+        self.operator.show_view(view)
+        if self.strip is not None:
+            self.strip.show_view(view)
+            if view.state == "trouble" and not self._called:
+                self.operator.come_forward()
+            self._called = view.state == "trouble"
 
     def view(self) -> OperatorView:
         """Return what the operator is to see now."""
@@ -263,6 +286,8 @@ class SessionBridge(QObject):
     @_guarded
     def _resume(self) -> None:
         self._post(ResumeAsked(self._now(), "operator"))
+        if self.strip is not None:
+            self.participant.come_forward()
 
     @_guarded
     def _diagnose(self) -> None:

@@ -29,6 +29,7 @@ from study_app.gui.pages.reading import ReadingPage
 from study_app.gui.pages.text import TextWidget
 from study_app.gui.pointer import BUTTONS, PointerCapture
 from study_app.gui.scene_view import TankWidget, paint_ahead
+from study_app.gui.screens import place
 from study_app.gui.theme import PARTICIPANT, font, load_fonts, stylesheet
 from study_app.protocol.words import Words, words
 from study_app.session.events import Continue, ForceStopped, PauseAsked
@@ -65,11 +66,13 @@ class ParticipantWindow(QWidget):
     pilot : a coloured frame and the title say that this is no participant's session
     text_scale : how much larger than designed words must be at least, for this screen at this distance
     on_card : whether the tank is drawn on a surface of the graphics card, in step with the screen
+    strip : what stands above every page, where the operator has no screen of their own
 
     While ``may_close`` is false, closing the window in the middle of a session is a pause.
     ``event`` carries the session's events; ``pointer`` the hand's place [m] and ``buttons`` the buttons' bits while the
     pointer is captured; ``painted`` the time of the sample [ns] of every view, while it is drawn, and ``swapped`` comes
-    where a surface has just swapped. ``painting`` is the last thread that painted ahead.
+    where a surface has just swapped; ``left`` where the participant closed the last page. ``painting`` is the last
+    thread that painted ahead.
     """
 
     event = Signal(object)  # type: ignore[assignment]  # hides QWidget.event() from Python, not from Qt
@@ -77,6 +80,7 @@ class ParticipantWindow(QWidget):
     buttons = Signal(int)
     painted = Signal(object)
     swapped = Signal()
+    left = Signal()
 
     def __init__(
         self,
@@ -88,9 +92,11 @@ class ParticipantWindow(QWidget):
         pilot: bool = False,
         text_scale: float = 1.0,
         on_card: bool = False,
+        strip: QWidget | None = None,
     ) -> None:
         super().__init__()
         load_fonts()
+        self._strip = strip
         self._on_card = on_card
         self._words = said
         self._clock = clock
@@ -125,6 +131,8 @@ class ParticipantWindow(QWidget):
         self.setFont(font("body"))
         self.setStyleSheet(stylesheet(PARTICIPANT))
         self.setMinimumSize(LEAST_SIZE)
+        if strip is not None:
+            strip.setParent(self)
 
     @property
     def page(self) -> Page | None:
@@ -147,14 +155,19 @@ class ParticipantWindow(QWidget):
             self.setScreen(screen)
             self.move(screen.geometry().topLeft())
         if self._windowed:
-            room = self.screen().availableSize()
-            self.resize(WINDOWED_SIZE.boundedTo(room).expandedTo(LEAST_SIZE))
+            self.resize(WINDOWED_SIZE)
+            place(self, self.screen(), corner=False)
             self.show()
         else:
             self.setGeometry(self.screen().geometry())
             self.showFullScreen()
         self.activateWindow()
         self._widget.setFocus()
+
+    def come_forward(self) -> None:
+        """Stand before every other window of the screen."""
+        self.raise_()
+        self.activateWindow()
 
     def show_page(self, page: Page) -> None:
         """Put a page in place of the present one, whole and at once."""
@@ -221,6 +234,9 @@ class ParticipantWindow(QWidget):
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
         """Let the page fill the window."""
         super().resizeEvent(event)
+        if self._strip is not None:
+            room = self._room()
+            self._strip.setGeometry(room.left(), self.frame_px, room.width(), self._strip.height())
         self._widget.setGeometry(self._room())
         self._ahead.start()
 
@@ -232,6 +248,8 @@ class ParticipantWindow(QWidget):
             return
         self._capture.release()
         super().closeEvent(event)
+        if not self.may_close:
+            self.left.emit()
 
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802
         """Fill what no page covers: nothing, or the frame of a pilot."""
@@ -263,7 +281,8 @@ class ParticipantWindow(QWidget):
     def _room(self) -> QRect:
         """Return where pages are."""
         frame = self.frame_px
-        return self.rect().adjusted(frame, frame, -frame, -frame)
+        above = self._strip.height() if self._strip is not None else 0
+        return self.rect().adjusted(frame, frame + above, -frame, -frame)
 
     def _make(self, page: Page, old: QWidget) -> PageWidget | TankWidget:
         said, clock, text = self._words, self._clock, self._text_scale
@@ -313,8 +332,11 @@ class ParticipantWindow(QWidget):
             self._pause()
 
     def _pause(self) -> None:
+        """Pause the session; close the last page."""
         if isinstance(self._page, TextPage | TaskPage | QuestionnairePage):
             self.event.emit(PauseAsked(self._clock(), "participant"))
+        elif isinstance(self._page, EndPage):
+            self.close()
 
     def _stop_force(self) -> None:
         if self._page is not None:

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
-from PySide6.QtCore import QSize
+from PySide6.QtCore import QPoint, QRect, QTimer
 from PySide6.QtGui import QGuiApplication, QScreen
 from PySide6.QtWidgets import QWidget
 
 from study_app.errors import DisplayError
+
+FRAMED_AFTER_MS = 300  # by then a window manager has put its frame around a new window
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,11 +87,35 @@ def describe_screen(screen: QScreen) -> dict[str, Any]:
 
 
 def place(window: QWidget, screen: QScreen, *, corner: bool) -> None:
-    """Give ``window`` its size, or as much of it as ``screen`` has, in the middle or in the lower right corner."""
+    """Give ``window`` its size, or as much of it as ``screen`` has, in the middle or in the lower right corner.
+
+    The system's frame is not known before the window is shown: once it is, the window makes room for it.
+    """
     room = screen.availableGeometry()
-    size = window.size().boundedTo(room.size()).expandedTo(window.minimumSize())
-    spare = QSize(max(0, room.width() - size.width()), max(0, room.height() - size.height()))
-    share = 1.0 if corner else 0.5
     window.setScreen(screen)
-    window.resize(size)
-    window.move(room.left() + round(share * spare.width()), room.top() + round(share * spare.height()))
+    window.setGeometry(_inside(window, room, corner=corner))
+    QTimer.singleShot(FRAMED_AFTER_MS, window, partial(make_room_for_frame, window, corner=corner))
+
+
+def make_room_for_frame(window: QWidget, *, corner: bool = False) -> None:
+    """Bring ``window`` with its frame wholly onto its screen; its least size gives way to the frame."""
+    room, outer, inner = window.screen().availableGeometry(), window.frameGeometry(), window.geometry()
+    if window.isFullScreen() or window.isMaximized() or room.contains(outer):
+        return
+    before, after = inner.topLeft() - outer.topLeft(), inner.bottomRight() - outer.bottomRight()
+    room = QRect(room.topLeft() + before, room.bottomRight() + after)
+    least = (window.minimumSize() - (outer.size() - inner.size())).expandedTo(
+        window.minimumSize().boundedTo(room.size())
+    )
+    if least.boundedTo(room.size()) != least:
+        return  # the screen is too small for it anyway
+    window.setMinimumSize(least)
+    window.setGeometry(_inside(window, room, corner=corner))
+
+
+def _inside(window: QWidget, room: QRect, *, corner: bool) -> QRect:
+    """Return where ``window`` stands in ``room``, from its upper left corner if it is larger."""
+    size = window.size().boundedTo(room.size()).expandedTo(window.minimumSize())
+    share = 1.0 if corner else 0.5
+    right, down = max(0, room.width() - size.width()), max(0, room.height() - size.height())
+    return QRect(room.topLeft() + QPoint(round(share * right), round(share * down)), size)

@@ -13,6 +13,7 @@ from study_app.gui.devices.view import TITLES
 from study_app.gui.graphics import has_card
 from study_app.gui.operator import OperatorWindow
 from study_app.gui.operator.progress import SessionProgress, progress_after, stages
+from study_app.gui.operator.strip import Strip
 from study_app.gui.operator.view import Session
 from study_app.gui.operator.watch import WatchedJournal
 from study_app.gui.participant import ParticipantWindow
@@ -67,6 +68,8 @@ def open_windows(
         force_limit_n=protocol.device.force_limit_n if protocol.study.blinding == "single" else None,
         theme=theme,
     )
+    shown_on, operated_on = choose_screens(chosen.screen)
+    strip = Strip() if shown_on is operated_on else None
     participant = ParticipantWindow(
         words(chosen.language),
         clock=clock,
@@ -75,6 +78,7 @@ def open_windows(
         pilot=chosen.pilot,
         on_card=refresh_hz is None and has_card(),
         text_scale=text_scale,
+        strip=strip,
     )
     hand = hand_of(device)
     parts = Parts(
@@ -93,8 +97,8 @@ def open_windows(
         press=device.press if isinstance(device, MouseDevice) else None,
         hand_for=_hands(hand, chosen, clock) if hand is not None and moves_by_itself(device.name) else None,
     )
-    shown_on, operated_on = choose_screens(chosen.screen)
-    bridge = SessionBridge(parts, participant, operator, refresh_hz=refresh_hz or shown_on.refreshRate() or 60.0)
+    rate_hz = refresh_hz or shown_on.refreshRate() or 60.0
+    bridge = SessionBridge(parts, participant, operator, refresh_hz=rate_hz, strip=strip)
     place(operator, operated_on, corner=shown_on is operated_on)
     operator.show()
     participant.open_on(shown_on)

@@ -73,6 +73,7 @@ class Words:
     end_body: str
     ended_early_title: str
     ended_early_body: str
+    close: str
 
     # before the first page
     window_title: str

@@ -47,6 +47,7 @@ ARABIC = Words(
     end_body="انتهت الجلسة. يمكنك ترك الجهاز.",
     ended_early_title="انتهت الجلسة",
     ended_early_body="يمكنك ترك الجهاز. شكراً على وقتك.",
+    close="إغلاق",
     window_title="دراسة",
     preparing="لحظة، يجري تحضير الجلسة …",
 )

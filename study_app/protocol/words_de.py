@@ -47,6 +47,7 @@ GERMAN = Words(
     end_body="Die Sitzung ist beendet. Sie können das Gerät loslassen.",
     ended_early_title="Die Sitzung ist zu Ende",
     ended_early_body="Sie können das Gerät loslassen. Vielen Dank für Ihre Zeit.",
+    close="Schließen",
     window_title="Studie",
     preparing="Einen Moment, die Sitzung wird vorbereitet …",
 )

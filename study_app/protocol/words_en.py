@@ -47,6 +47,7 @@ ENGLISH = Words(
     end_body="The session is complete. You can let go of the device.",
     ended_early_title="The session has ended",
     ended_early_body="You can let go of the device. Thank you for your time.",
+    close="Close",
     window_title="Study",
     preparing="One moment, the session is being prepared …",
 )

@@ -48,6 +48,7 @@ FRENCH = Words(
     end_body="La séance est terminée. Vous pouvez lâcher l'appareil.",
     ended_early_title="La séance a pris fin",
     ended_early_body="Vous pouvez lâcher l'appareil. Merci pour votre temps.",
+    close="Fermer",
     window_title="Étude",
     preparing="Un instant, la séance se prépare …",
 )

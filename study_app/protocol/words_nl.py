@@ -47,6 +47,7 @@ DUTCH = Words(
     end_body="De sessie is klaar. U kunt het apparaat loslaten.",
     ended_early_title="De sessie is beëindigd",
     ended_early_body="U kunt het apparaat loslaten. Dank u voor uw tijd.",
+    close="Sluiten",
     window_title="Onderzoek",
     preparing="Een ogenblik, de sessie wordt voorbereid …",
 )

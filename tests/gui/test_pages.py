@@ -17,7 +17,7 @@ from study_app.gui.pages.text import TextWidget
 from study_app.gui.progress import ProgressLine, progress_words
 from study_app.protocol.words import words
 from study_app.session.events import Continue, ResumeAsked
-from study_app.session.pages import EndPage, PausePage, Progress, TroublePage
+from study_app.session.pages import PausePage, Progress, TroublePage
 from tests.gui.small import ManualClock, text_page
 
 ENGLISH = words("en")
@@ -154,8 +154,8 @@ def test_pause_lies_on_the_page_below_as_a_shade(qtbot: Any) -> None:
     assert bare.grab().toImage().pixelColor(4, 4).lightness() < corner.lightness() < 100
 
 
-@pytest.mark.parametrize("page", [TroublePage("One moment", "Help comes."), EndPage("Thank you", "You may let go.")])
-def test_trouble_and_end_have_nothing_to_press(qtbot: Any, page: TroublePage | EndPage) -> None:
+def test_trouble_has_nothing_to_press(qtbot: Any) -> None:
+    page = TroublePage("One moment", "Help comes.")
     widget = NoticeWidget(page, ENGLISH, ManualClock())
     told = opened(qtbot, widget)
     assert widget.button is None

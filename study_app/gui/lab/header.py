@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPaintEvent
+from PySide6.QtCore import QRectF, Qt, Signal
+from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import (
     QGridLayout,
     QHBoxLayout,
     QPushButton,
-    QSizePolicy,
-    QStyle,
-    QStyleOptionButton,
-    QStylePainter,
     QWidget,
 )
 
@@ -20,6 +16,7 @@ from study_app.gui.icons import draw_icon
 from study_app.gui.lab.switch import SideSwitch
 from study_app.gui.lab.view import Choices, LabView
 from study_app.gui.labels import label
+from study_app.gui.stop_button import CompactStop
 from study_app.gui.theme import font
 from study_app.gui.themed import Themed
 
@@ -44,43 +41,6 @@ class IconButton(Themed, QPushButton):
         super().paintEvent(event)
         ink = self.theme.text if self.isEnabled() else self.theme.ctl
         draw_icon(QPainter(self), self._icon, QRectF(self.rect()).adjusted(12, 12, -12, -12), ink, 2.0)
-
-
-class LabStop(Themed, QPushButton):
-    """Stop force, in the force stop's own colour; it acts when pressed, not when released, and is never disabled."""
-
-    WORDS = "Stop force"
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.setProperty("role", "stop")
-        self.setAccessibleName(f"{self.WORDS}. Holding Esc does the same.")
-        self.setToolTip("Stop force (or hold Esc)")
-        self.setFixedHeight(BUTTON)
-        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
-        self.setCursor(Qt.CursorShape.PointingHandCursor)
-        self._font = font("strong", scale=0.96)
-
-    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """Return the room for octagon and words."""
-        return QSize(round(QFontMetricsF(self._font).horizontalAdvance(self.WORDS)) + 62, BUTTON)
-
-    def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        """Return the same: it is never cut."""
-        return self.sizeHint()
-
-    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the button, its octagon and its words."""
-        painter = QStylePainter(self)
-        option = QStyleOptionButton()
-        self.initStyleOption(option)
-        painter.drawControl(QStyle.ControlElement.CE_PushButtonBevel, option)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        ink = QColor(self.theme.on_stop)
-        draw_icon(painter, "stop", QRectF(17, self.height() / 2 - 10, 20, 20), ink, 2.0)
-        painter.setPen(ink)
-        painter.setFont(self._font)
-        painter.drawText(QRectF(46, 0, self.width() - 46, self.height()), Qt.AlignmentFlag.AlignVCenter, self.WORDS)
 
 
 class Picker(Choice):
@@ -140,7 +100,7 @@ class LabHeader(Themed, QWidget):
         self.path = Picker("route", "Motion")
         self.undo = IconButton("undo", "Undo", "Undo (Ctrl+Z)")
         self.redo = IconButton("redo", "Redo", "Redo (Ctrl+Shift+Z)")
-        self.stop = LabStop()
+        self.stop = CompactStop()
         self.save = ActionButton("save", "Save preset …", role="primary", height=BUTTON)
         self.save.setFixedHeight(BUTTON)
         self._narrow: bool | None = None

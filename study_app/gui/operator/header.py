@@ -7,6 +7,7 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
 from study_app.gui.cards import Chip, Logo, Tone
+from study_app.gui.controls import ActionButton
 from study_app.gui.icons import draw_icon
 from study_app.gui.labels import Elided, figures
 from study_app.gui.operator.view import OperatorView, State, minutes
@@ -25,6 +26,14 @@ BLINDINGS = {"double": ("lock", "Double-blind"), "single": ("eye", "Single-blind
 SAVED_RECENTLY_S = 2.0
 PARTS_WIDTH = 120
 PARTS_GAP = 4
+
+
+def shown_state(view: OperatorView) -> tuple[Tone, str, str]:
+    """Return tone, icon and word of a session's state."""
+    tone, icon = STATES[view.state]
+    if view.state == "ended" and view.state_word != "Complete":
+        tone, icon = "neutral", "cross"
+    return tone, icon, view.state_word
 
 
 class ThemeButton(Themed, QPushButton):
@@ -74,9 +83,13 @@ class PartsBar(Themed, QWidget):
 
 
 class Header(Themed, QWidget):
-    """The strip at the top; ``theme_asked`` when the operator wants the other theme."""
+    """The strip at the top; ``theme_asked`` when the operator wants the other theme.
+
+    ``page_asked`` when the operator wants the participant's window in front, which covers this one on a single screen.
+    """
 
     theme_asked = Signal()
+    page_asked = Signal()
 
     def __init__(self) -> None:
         super().__init__()
@@ -95,6 +108,9 @@ class Header(Themed, QWidget):
         self.trials = figures("", "small", "text2")
         self.theme_button = ThemeButton()
         self.theme_button.clicked.connect(self.theme_asked)
+        self.page = ActionButton("", "Participant's window", height=40)
+        self.page.clicked.connect(self.page_asked)
+        self.page.hide()
         self._lay_out()
 
     def _lay_out(self) -> None:
@@ -110,6 +126,7 @@ class Header(Themed, QWidget):
         row.addLayout(_column(self.clock, self.expected))
         row.addLayout(_column(self.bar, self.trials))
         row.addSpacing(8)
+        row.addWidget(self.page)
         row.addWidget(self.theme_button)
 
     def show_view(self, view: OperatorView) -> None:
@@ -117,10 +134,7 @@ class Header(Themed, QWidget):
         self.study.show_text(view.study)
         self.who.show_text(view.who)
         self.blind.show_state("neutral", *BLINDINGS[view.blinding])
-        tone, icon = STATES[view.state]
-        if view.state == "ended" and view.state_word != "Complete":
-            tone, icon = "neutral", "cross"
-        self.state.show_state(tone, icon, view.state_word)
+        self.state.show_state(*shown_state(view))
         if view.saved_ago_s is None:
             self.saved.show_state("neutral", "ring", "Nothing to save yet")
         elif view.over or view.saved_ago_s > SAVED_RECENTLY_S:

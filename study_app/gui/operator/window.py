@@ -60,6 +60,7 @@ class OperatorWindow(QMainWindow):
     mark_set = Signal()
     diagnose_asked = Signal()
     close_asked = Signal()
+    page_asked = Signal()
     theme_changed = Signal(object)
 
     def __init__(
@@ -114,6 +115,7 @@ class OperatorWindow(QMainWindow):
 
     def _connect(self) -> None:
         self.header.theme_asked.connect(self._change_theme)
+        self.header.page_asked.connect(self.page_asked)
         self.stop.stop_asked.connect(self.stop_asked)
         self.stop.fade_in_asked.connect(self.fade_in_asked)
         self.escape.held.connect(self.stop_asked)

@@ -78,7 +78,7 @@ class PauseWidget(ReadingPage):
 
 
 class NoticeWidget(ReadingPage):
-    """Something broke, or the session is over: a calm sentence and nothing to do."""
+    """Something broke, or the session is over: a calm sentence; the last page can be closed."""
 
     def __init__(
         self,
@@ -92,4 +92,21 @@ class NoticeWidget(ReadingPage):
         ended = isinstance(page, EndPage)
         icon, colour = ("check", PARTICIPANT.ok) if ended else ("info", PARTICIPANT.warn)
         column = (icon, page.title, (page.paragraph,), colour)
-        super().__init__(column, words, clock, parent=parent, text_scale=text_scale)
+        button = (words.close, words.space_key) if ended else None
+        super().__init__(column, words, clock, button=button, parent=parent, text_scale=text_scale)
+
+    def focus_first(self) -> None:
+        """Put the keyboard on the button, where there is one."""
+        (self.button or self).setFocus()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802
+        """Close the last page with Enter as well, and with Space wherever the keyboard is."""
+        keys = (Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Space)
+        if self.button is not None and event.key() in keys and not event.isAutoRepeat():
+            self.go_on()
+        else:
+            super().keyPressEvent(event)
+
+    def go_on(self) -> None:
+        """Close the window after the last page."""
+        self.window().close()

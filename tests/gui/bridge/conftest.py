@@ -29,7 +29,7 @@ def world():
 
 @pytest.fixture
 def make(qapp, world):
-    def build(blinding="double", force_limit_n=None, **parts):
+    def build(blinding="double", force_limit_n=None, strip=None, **parts):
         protocol = load("demo")
         protocol = protocol.model_copy(update={"study": protocol.study.model_copy(update={"blinding": blinding})})
         schedule = build_schedule(protocol, "P001", 1)
@@ -55,13 +55,13 @@ def make(qapp, world):
             "aim_m": lambda: (0.0, 0.0, 0.0),
         }
         made = Parts(**(given | parts))
-        participant = ParticipantWindow(words("en"), clock=world.seconds, windowed=True)
+        participant = ParticipantWindow(words("en"), clock=world.seconds, windowed=True, strip=strip)
         operator = OperatorWindow(
             "demo", lateness_limit_s=0.002, reach_m=0.05, pointer=True, force_limit_n=force_limit_n
         )
         for window in (participant, operator):
             window.show()
-        bridge = SessionBridge(made, participant, operator)
+        bridge = SessionBridge(made, participant, operator, strip=strip)
         made_bridges.append(bridge)
         bridge.start()
         bridge._frames.stop()  # a test moves time itself

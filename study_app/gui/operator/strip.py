@@ -1,0 +1,55 @@
+"""What the operator needs where both windows share one screen: the state and the force stop, on the participant's."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QColor, QPainter, QPaintEvent
+from PySide6.QtWidgets import QHBoxLayout, QWidget
+
+from study_app.gui.cards import Chip
+from study_app.gui.controls import ActionButton
+from study_app.gui.labels import Elided
+from study_app.gui.operator.header import shown_state
+from study_app.gui.operator.view import OperatorView
+from study_app.gui.stop_button import CompactStop
+from study_app.gui.theme import PARTICIPANT
+from study_app.gui.themed import Themed, dress
+
+HEIGHT = 52
+
+
+class Strip(Themed, QWidget):
+    """State, where the session is, the way to the operator's window and the force stop; it never takes the keyboard."""
+
+    stop_asked = Signal()
+    operator_asked = Signal()
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setFixedHeight(HEIGHT)
+        self.state = Chip("neutral", "clock", "Preparing")
+        self.where = Elided("label", "text2")
+        self.operator = ActionButton("", "Operator's window", height=40)
+        self.stop = CompactStop()
+        self.operator.clicked.connect(self.operator_asked)
+        self.stop.pressed.connect(self.stop_asked)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(16, 4, 8, 4)
+        row.setSpacing(12)
+        row.addWidget(self.state)
+        row.addWidget(self.where, 1)
+        for button in (self.operator, self.stop):
+            button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+            row.addWidget(button)
+        dress(self, PARTICIPANT)
+
+    def show_view(self, view: OperatorView) -> None:
+        """Show the state and where the session is."""
+        self.state.show_state(*shown_state(view))
+        self.where.show_text(view.heading)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+        """Paint the strip and the hairline under it."""
+        painter = QPainter(self)
+        painter.fillRect(self.rect(), QColor(self.theme.surface))
+        painter.fillRect(0, self.height() - 1, self.width(), 1, QColor(self.theme.border))
