@@ -50,6 +50,7 @@ LEAST_SIZE = QSize(1024, 640)
 WINDOWED_SIZE = QSize(1366, 768)
 PILOT_FRAME = 10
 WAITING_MS = 15
+TIME_UP_MS = 1500  # so long it is told that a task's time is over, before the questions
 AHEAD_MS = 100  # after a page came, what comes next is painted
 SETTLING_MS = 100  # from one of the program's windows to the next, none may have the keyboard for so long
 
@@ -117,6 +118,10 @@ class ParticipantWindow(QWidget):
         self._waiting = QTimer(self)
         self._waiting.setInterval(WAITING_MS)
         self._waiting.timeout.connect(self._show_if_painted)
+        self._told_up = QTimer(self)
+        self._told_up.setSingleShot(True)
+        self._told_up.setInterval(TIME_UP_MS)
+        self._told_up.timeout.connect(self._ask)
         self._ahead = QTimer(self)
         self._ahead.setSingleShot(True)
         self._ahead.setInterval(AHEAD_MS)
@@ -173,11 +178,16 @@ class ParticipantWindow(QWidget):
         """Put a page in place of the present one, whole and at once."""
         self._capture.release()
         self._waiting.stop()
+        self._told_up.stop()
         if isinstance(page, TextPage) and page.language != self._words.language:
             self._words = words(page.language)
             self._title()
         self._page = page
-        if isinstance(page, TaskPage) and self.painting is not None and self.painting.is_alive():
+        up = self.tank is not None and self.tank.time_is_up
+        if isinstance(page, QuestionnairePage) and up:
+            self._told_up.start()
+            self._put(self._wait_page(self._words.time_is_up))
+        elif isinstance(page, TaskPage) and self.painting is not None and self.painting.is_alive():
             self._waiting.start()
             self._put(self._wait_page(self._words.trouble_title))
         else:
@@ -272,6 +282,11 @@ class ParticipantWindow(QWidget):
         """Put the tank in place of the page that asks to wait, once it is painted."""
         if isinstance(self._page, TaskPage) and self.painting is not None and not self.painting.is_alive():
             self._waiting.stop()
+            self._put(self._make(self._page, self._widget))
+
+    def _ask(self) -> None:
+        """Put the questions in place of the page that tells that the time is up."""
+        if isinstance(self._page, QuestionnairePage):
             self._put(self._make(self._page, self._widget))
 
     def _title(self) -> None:

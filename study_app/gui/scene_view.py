@@ -112,6 +112,11 @@ class TankWidget(QWidget):
         task = self._page.task
         return isinstance(task, Explore) and self._view is not None and self._view.task.elapsed_s >= task.min_s
 
+    @property
+    def time_is_up(self) -> bool:
+        """Whether the task shown ended because its time is over."""
+        return self._view is not None and self._view.task.elapsed_s >= self._page.task.limit_s
+
     def sizeHint(self) -> QSize:  # noqa: N802
         """Return the size that the tank was drawn for."""
         return QSize(1920, 1080)

@@ -49,6 +49,11 @@ class Explore(Table):
     max_s: Seconds = Field(description="Time after which the questionnaire comes by itself [s].")
     instruction: Localised = Field(description="One sentence shown under the tank.")
 
+    @property
+    def limit_s(self) -> float:
+        """When the task ends by itself [s]."""
+        return self.max_s
+
     @model_validator(mode="after")
     def _least_before_most(self) -> Self:
         if self.min_s > self.max_s:
@@ -84,6 +89,11 @@ class Reach(Table):
     def targets_m(self) -> tuple[Point, ...]:
         """Centres of the targets, hand frame [m]."""
         return tuple((x / 1000, y / 1000, z / 1000) for x, y, z in self.targets_mm)
+
+    @property
+    def limit_s(self) -> float:
+        """When the task ends by itself [s]."""
+        return self.timeout_s if self.duration_s is None else self.duration_s
 
     @property
     def radius_m(self) -> float:

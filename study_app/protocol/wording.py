@@ -36,6 +36,7 @@ class Words:
     continue_in: str  # {seconds}
     continue_now: str
     click_now: str  # where the mouse is the device
+    time_is_up: str
     pause_hint: str
 
     # questionnaire

@@ -18,6 +18,7 @@ ARABIC = Words(
     continue_in="يمكنك المتابعة بعد {seconds} ث",
     continue_now="اضغط على مفتاح المسافة للمتابعة",
     click_now="انقر أو اضغط على مفتاح المسافة للمتابعة",
+    time_is_up="انتهى الوقت",
     pause_hint="إيقاف مؤقت · اضغط مطولاً لإيقاف القوة",
     please_answer="يرجى الإجابة",
     press_keys="اضغط من 1 إلى 7",

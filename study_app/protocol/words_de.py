@@ -18,6 +18,7 @@ GERMAN = Words(
     continue_in="In {seconds} s können Sie weitergehen",
     continue_now="Drücken Sie die Leertaste, um weiterzugehen",
     click_now="Klicken Sie oder drücken Sie die Leertaste, um weiterzugehen",
+    time_is_up="Die Zeit ist um",
     pause_hint="Pause · gedrückt halten, um die Kraft auszuschalten",
     please_answer="Bitte antworten",
     press_keys="1 bis 7 drücken",

@@ -18,6 +18,7 @@ ENGLISH = Words(
     continue_in="You can go on in {seconds} s",
     continue_now="Press the space bar to go on",
     click_now="Click or press the space bar to go on",
+    time_is_up="Time is up",
     pause_hint="Pause · hold to switch the force off",
     please_answer="Please answer",
     press_keys="press 1 to 7",

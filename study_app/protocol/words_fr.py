@@ -18,6 +18,7 @@ FRENCH = Words(
     continue_in="Vous pourrez continuer dans {seconds} s",
     continue_now="Appuyez sur la barre d'espace pour continuer",
     click_now="Cliquez ou appuyez sur la barre d'espace pour continuer",
+    time_is_up="Le temps est écoulé",
     pause_hint="Pause · maintenir pour couper la force",
     please_answer="Réponse attendue",
     press_keys="touches 1 à 7",

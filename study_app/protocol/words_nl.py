@@ -18,6 +18,7 @@ DUTCH = Words(
     continue_in="U kunt verder over {seconds} s",
     continue_now="Druk op de spatiebalk om verder te gaan",
     click_now="Klik of druk op de spatiebalk om verder te gaan",
+    time_is_up="De tijd is om",
     pause_hint="Pauze · ingedrukt houden om de kracht uit te schakelen",
     please_answer="Nog te beantwoorden",
     press_keys="druk op 1 tot en met 7",

@@ -464,3 +464,30 @@ def test_hand_stays_where_it_was_from_one_capture_to_the_next(hand: Hand) -> Non
     assert hand.places[-1] == place
     hand.capture.take(hand.widget, (0.1, 0.06, 0.08))
     assert hand.places[-1] == pytest.approx(place)
+
+
+def timed_out(window: ParticipantWindow, elapsed_s: float = 120.0) -> None:
+    window.show_page(task_page(explore()))
+    window.show_view(view(lit=None, elapsed_s=elapsed_s))
+    window.show_page(questionnaire())
+
+
+def test_time_is_up_is_told_before_the_questions(opened: Opened, qtbot: Any) -> None:
+    timed_out(opened.window)
+    assert opened.window.widget.accessibleName() == words("en").time_is_up
+    assert opened.events == []
+    qtbot.waitUntil(lambda: isinstance(opened.window.widget, QuestionnaireWidget), timeout=5000)
+    assert opened.focus in opened.window.widget.rows
+
+
+def test_who_goes_on_before_the_limit_is_asked_at_once(opened: Opened) -> None:
+    timed_out(opened.window, 119.0)
+    assert isinstance(opened.window.widget, QuestionnaireWidget)
+
+
+def test_pause_while_time_is_up_is_told_stays(opened: Opened, qtbot: Any) -> None:
+    opened.window._told_up.setInterval(1)
+    timed_out(opened.window)
+    opened.window.show_page(PausePage(force_off=False))
+    qtbot.wait(50)
+    assert isinstance(opened.window.widget, PauseWidget)

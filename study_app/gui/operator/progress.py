@@ -35,8 +35,9 @@ class SessionProgress:
 
     ``step`` indexes the schedule's steps (−1 before the first); ``durations_s`` holds the steps left behind; ``away_s``
     is how long no program held the session, which no duration counts; ``answers`` counts the answered items of each
-    trial, ``trials_done`` says of each trial what was measured in it that broke the protocol's limits: column, value
-    and limit, in a double-blind study of lateness and gaps alone.
+    trial, ``targets`` those reached in the trial under way or answered, ``trials_done`` says of each trial what was
+    measured in it that broke the protocol's limits: column, value and limit, in a double-blind study of lateness and
+    gaps alone.
     """
 
     protocol: Protocol
@@ -46,6 +47,7 @@ class SessionProgress:
     durations_s: Mapping[int, float] = field(default_factory=dict)
     trial_since_s: float | None = None
     trial_lasted_s: float | None = None
+    targets: int = 0
     trials_done: Mapping[int, tuple[Beyond, ...]] = field(default_factory=dict)
     answers: Mapping[int, int] = field(default_factory=dict)
     notes: tuple[NoteLine, ...] = ()
@@ -116,7 +118,11 @@ def _trial_started(progress: SessionProgress, at_s: float, fields: Mapping[str, 
     number = fields["trial"]
     index = next(i for i, step in enumerate(steps) if isinstance(step, Trial) and step.number == number)
     return replace(
-        _enter(_without(progress, number), at_s, index), trial_since_s=at_s, trial_lasted_s=None, paused=False
+        _enter(_without(progress, number), at_s, index),
+        trial_since_s=at_s,
+        trial_lasted_s=None,
+        targets=0,
+        paused=False,
     )
 
 
@@ -179,6 +185,7 @@ def _ended(progress: SessionProgress, at_s: float, fields: Mapping[str, Any]) ->
 _TELLERS = {
     "page_shown": _page_shown,
     "trial_started": _trial_started,
+    "target_reached": lambda progress, _at_s, _fields: replace(progress, targets=progress.targets + 1),
     "trial_ended": _trial_ended,
     "responses": _responses,
     "paused": lambda progress, _at_s, _fields: replace(progress, paused=True),

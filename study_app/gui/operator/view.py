@@ -11,7 +11,7 @@ from typing import Literal
 from study_app.gui.operator.forces import ForceFigures
 from study_app.gui.operator.health import Vitals
 from study_app.gui.operator.progress import NoteLine, SessionProgress, Stage, operator_language
-from study_app.protocol.model import Explore, Protocol
+from study_app.protocol.model import Explore, Protocol, Reach
 from study_app.protocol.schedule import Trial
 
 State = Literal["preparing", "running", "paused", "force off", "trouble", "ended"]
@@ -290,6 +290,8 @@ def _setting_line(session: Session, progress: SessionProgress, *, answering: boo
         doing = "paused"
     elif answering:
         doing = "answering"
+    if isinstance(task, Reach):
+        doing += f"  ·  {progress.targets} {'targets' if task.count is None else f'of {task.count} targets'}"
     if trial.phase != "main":
         return doing.capitalize()
     return f"{trial.label(session.protocol, session.language)}  ·  {doing}"
@@ -304,9 +306,7 @@ def _trial_time(session: Session, progress: SessionProgress, now_s: float) -> Tr
     elapsed = progress.trial_lasted_s
     if elapsed is None:
         elapsed = now_s - (progress.trial_since_s if progress.trial_since_s is not None else now_s)
-    if isinstance(task, Explore):
-        return TrialTime(elapsed, task.min_s, task.max_s)
-    return TrialTime(elapsed, None, task.duration_s or task.timeout_s)
+    return TrialTime(elapsed, task.min_s if isinstance(task, Explore) else None, task.limit_s)
 
 
 def _step_row(stage: Stage, progress: SessionProgress) -> StepRow:

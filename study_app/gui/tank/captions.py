@@ -23,6 +23,7 @@ DESIGNED_FOR = (1920, 1080)
 LEAST_SCALE = 0.72
 INSTRUCTION = 0.72  # of the window's width
 FINE = 0.9
+COUNTED_DOWN_S = 10  # before a task's limit
 PATCH_ROOM = 88  # of the photodiode's patch in the lower right corner [px]
 CENTRED = int(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop | Qt.TextFlag.TextWordWrap)
 RIGHT = int(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
@@ -135,7 +136,8 @@ class Captions:
             self._draw_foot(painter)
         hint = self._hint_words(task)
         if hint and region.intersects(self._hint.toAlignedRect()):
-            colour = PARTICIPANT.text if hint == words.continue_now else PARTICIPANT.text3
+            strong = hint.startswith(words.continue_now) or hint == words.time_is_up
+            colour = PARTICIPANT.text if strong else PARTICIPANT.text3
             _text(painter, self._hint, int(Qt.AlignmentFlag.AlignCenter), hint, self._small, colour)
 
     @property
@@ -148,7 +150,9 @@ class Captions:
 
     def _longest_hints(self) -> tuple[str, ...]:
         words = self._words
-        return words.continue_now, words.continue_in.format(seconds=999), words.seconds_left.format(seconds=999)
+        counted = words.seconds_left.format(seconds=999)
+        both = words.seconds_left.format(seconds=COUNTED_DOWN_S)
+        return f"{words.continue_now} · {both}", words.continue_in.format(seconds=999), counted, words.time_is_up
 
     def _draw_foot(self, painter: QPainter) -> None:
         """Draw the way to pause."""
@@ -163,12 +167,16 @@ class Captions:
         """Return how long it takes until the participant may or must go on."""
         todo, words = self._page.task, self._words
         elapsed_s = task.elapsed_s if task else 0.0  # before the first view nothing has happened yet
+        left = math.ceil(todo.limit_s - elapsed_s)
+        if left <= 0:
+            return words.time_is_up
+        counted = words.seconds_left.format(seconds=left)
         if isinstance(todo, Explore):
             wait = math.ceil(todo.min_s - elapsed_s)
-            return words.continue_in.format(seconds=wait) if wait > 0 else words.continue_now
-        if todo.duration_s is None:
-            return ""
-        return words.seconds_left.format(seconds=max(0, math.ceil(todo.duration_s - elapsed_s)))
+            if wait > 0:
+                return words.continue_in.format(seconds=wait)
+            return words.continue_now if left > COUNTED_DOWN_S else f"{words.continue_now} · {counted}"
+        return counted if todo.duration_s is not None or left <= COUNTED_DOWN_S else ""
 
     def _counted(self, task: TaskShown | None) -> tuple[int, int | None]:
         if task is not None:

@@ -77,6 +77,20 @@ def test_exploring_shows_least_and_most_time(told):
     assert time.words == "0:12 of 0:30"
 
 
+def test_reaching_shows_targets_reached_while_they_are_and_after(told):
+    (first, *_) = (trial.number for trial in told.schedule.trials if trial.code.startswith("D"))
+    told.welcome()
+    told.start(first)
+    assert told.view().setting_line.endswith("reaching targets  ·  0 of 6 targets")
+    for target in (0, 1):
+        told.tell("target_reached", 1.0, trial=first, target=target, t_task_s=1.0)
+    assert told.view().setting_line.endswith("reaching targets  ·  2 of 6 targets")
+    told.end(first, "timeout")
+    assert told.view().setting_line.endswith("answering  ·  2 of 6 targets")
+    told.start(first, 2)
+    assert told.view().setting_line.endswith("0 of 6 targets")
+
+
 def test_a_paused_session_can_resume_but_not_repeat(told):
     told.welcome()
     told.start(1)
