@@ -54,15 +54,6 @@ class Draft(BaseModel):
             force_limit_n=self.device.force_limit_n,
         )
 
-    def liquids_of(self, block: Block) -> set[str]:
-        """Return the liquids that a block presents, as far as its conditions are sound."""
-        return {
-            liquid
-            for name in block.conditions
-            if name in self.conditions
-            for liquid in self.conditions[name].liquid_ids
-        }
-
 
 def draft(document: Mapping[str, Any], broken: Iterable[Path]) -> Draft:
     """Return what of ``document`` is sound; ``broken`` are the paths of the problems already found."""
@@ -85,7 +76,7 @@ def check(document: Mapping[str, Any], broken: Iterable[Path]) -> Iterator[Fault
     parts = draft(document, broken)
     for of_tables in (targets, crowded, outside, unfelt, equal_liquids, equal_conditions):
         yield from of_tables(parts)
-    for of_tables in (practice, codes, compares, breaks, counted_parts):
+    for of_tables in (codes, compares, breaks, counted_parts):
         yield from of_tables(parts)
 
 
@@ -167,21 +158,6 @@ def equal_conditions(parts: Draft) -> Iterator[Fault]:
                 message = f'"{condition}" presents the same as "{earlier}"'
                 hint = "change it, or use repetitions" + (", or write replicates = true" if delays else "")
                 yield Fault(("blocks", name, "conditions", index), message, hint)
-
-
-def practice(parts: Draft) -> Iterator[Fault]:
-    """Check that practice uses a liquid that no other block presents."""
-    judged = {
-        liquid: name
-        for name, block in parts.blocks.items()
-        if block.phase != "practice"
-        for liquid in parts.liquids_of(block)
-    }
-    for name, block in parts.blocks.items():
-        if block.phase == "practice":
-            for liquid in sorted(parts.liquids_of(block) & judged.keys()):
-                message = f'practice is in "{liquid}", which block "{judged[liquid]}" presents too'
-                yield Fault(("blocks", name, "conditions"), message, "practise in a liquid of its own")
 
 
 def codes(parts: Draft) -> Iterator[Fault]:

@@ -25,7 +25,7 @@ def effects(protocol: Protocol) -> tuple[str, ...]:
 def warnings(protocol: Protocol) -> tuple[str, ...]:
     """Return what is permitted and may still be a mistake, a sentence each."""
     felt = {name: steady(protocol.scene_of(name)) for name in protocol.liquids}
-    return (*_alike(protocol, felt), *_clipped(felt))
+    return (*_alike(protocol, felt), *_clipped(felt), *_practised(protocol))
 
 
 def _alike(protocol: Protocol, felt: dict[str, Steady]) -> Iterator[str]:
@@ -60,3 +60,19 @@ def _clipped(felt: dict[str, Steady]) -> Iterator[str]:
                 f"{name} is clipped: at {HAND_MPS:g} m/s of the hand {limit} lets {it.force_n:.2f} of its "
                 f"{it.drag_n:.2f} N through"
             )
+
+
+def _practised(protocol: Protocol) -> Iterator[str]:
+    """Yield the liquids that are practised in and judged in another block."""
+    used = {
+        block.id: dict.fromkeys(name for it in block.conditions for name in protocol.conditions[it].liquid_ids)
+        for block in protocol.blocks_in_order
+    }
+    judged = {name: block.id for block in reversed(protocol.main_blocks) for name in used[block.id]}
+    for block in protocol.blocks_in_order:
+        for name in used[block.id] if block.phase == "practice" else ():
+            if name in judged:
+                yield (
+                    f"practice {block.id} is in {name}, which block {judged[name]} presents too: participants know it "
+                    "from the practice when they judge it"
+                )

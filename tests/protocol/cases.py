@@ -387,8 +387,6 @@ CASES = (
          ('liquids = ["extra_0"', "conditions.crowd.liquids", "has more than 8 liquids")),
     case("target outside", "[30, 0, 0]", "[46, 0, 0]",
          ("[46, 0, 0]", "tasks.reach.targets_mm.2", "x = 46 mm with radius 6 mm leaves the tank")),
-    case("practice in a judged liquid", 'liquid = "other"', 'liquid = "thick"',
-         ('conditions = ["apart"]', "blocks.warm_up.conditions", 'practice is in "thick"')),
     case("codes of two blocks", 'code_prefix = "D"', 'code_prefix = "L"',
          ('code_prefix = "L"\nconditions = ["on_time", "both"]', "blocks.look.code_prefix",
           'block "feel" has the prefix "L" too')),

@@ -52,6 +52,14 @@ def test_a_clipped_liquid_is_named_with_what_is_left_of_it():
     assert "thick is clipped: at 0.1 m/s of the hand the force limit lets 3.00 of its 4.27 N through" in warnings(weak)
 
 
+def test_practice_in_a_liquid_that_is_judged_later_is_permitted_and_told():
+    study = parse(SOUND.replace('liquid = "other"', 'liquid = "thick"').encode(), "small.toml")
+    (told,) = [warning for warning in warnings(study) if "practice" in warning]
+    assert told.startswith("practice warm_up is in thick, which block feel presents too")
+    assert f"  {told}" in describe(study)
+    assert not any("practice" in warning for warning in warnings(dense(1400)))
+
+
 @pytest.mark.parametrize("name", ["rek2024", "demo"])
 def test_the_thesis_liquids_need_no_warning(name: str):
     protocol = load(name)
