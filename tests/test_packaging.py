@@ -4,7 +4,8 @@ import os
 import re
 import subprocess
 import sys
-from importlib.metadata import requires
+import tomllib
+from importlib.metadata import metadata, requires
 from pathlib import Path
 
 import pytest
@@ -62,6 +63,16 @@ def test_the_check_installs_and_tests_as_the_readme_says() -> None:
 def test_qt_stays_where_repainting_does_not_leak() -> None:
     (qt,) = [Requirement(entry) for entry in requires("liquid-study") or [] if entry.lower().startswith("pyside6")]
     assert qt.specifier == SpecifierSet(">=6.8.3,<6.10")
+
+
+def test_python_is_bounded_as_the_pinned_qt_bounds_it() -> None:
+    with (ROOT / "pyproject.toml").open("rb") as file:
+        ours = SpecifierSet(tomllib.load(file)["project"]["requires-python"])
+    qts = SpecifierSet(metadata("PySide6-Essentials")["Requires-Python"])
+    offered = [minor for minor in range(8, 20) if f"3.{minor}.0" in ours]
+    assert offered[0] == 11
+    assert all(f"3.{minor}.0" in qts for minor in offered)
+    assert f"3.{offered[-1] + 1}.0" not in qts
 
 
 def test_every_picture_of_the_readme_is_there() -> None:
