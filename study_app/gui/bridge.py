@@ -10,13 +10,14 @@ from __future__ import annotations
 
 import logging
 import sys
+import threading
 import traceback
 from collections.abc import Callable
 from functools import wraps
 from types import TracebackType
 from typing import Concatenate, ParamSpec
 
-from PySide6.QtCore import QObject, QTimer, Signal
+from PySide6.QtCore import QObject, Qt, QTimer, Signal
 
 from study_app.errors import SessionError, StudyError
 from study_app.gui.collector import settle, unsettle
@@ -89,6 +90,7 @@ class SessionBridge(QObject):
 
     done = Signal()
     diagnose_asked = Signal()
+    _thread_broke = Signal(str)
 
     def __init__(
         self,
@@ -114,6 +116,8 @@ class SessionBridge(QObject):
         self._gone = False
         self._stalled: str | None = None
         self._hook_before = sys.excepthook
+        self._thread_hook_before = threading.excepthook
+        self._thread_broke.connect(self._tell_of_thread, Qt.ConnectionType.QueuedConnection)
         self._frames = Frames(refresh_hz, parent=self)
         self._frames.due.connect(self._frame)
         self._urgency = Urgency()
@@ -163,6 +167,7 @@ class SessionBridge(QObject):
     def start(self) -> None:
         """Begin the session."""
         sys.excepthook = self._uncaught
+        threading.excepthook = self._uncaught_in_thread
         settle()
         self._urgency.hurry()
         self._frames.start()
@@ -206,6 +211,18 @@ class SessionBridge(QObject):
         """Hear of exceptions that Qt met outside our slots, such as in painting."""
         self.fail(error)
         self._hook_before(kind, error, trace)
+
+    def _uncaught_in_thread(self, told: threading.ExceptHookArgs) -> None:
+        """Hear of an exception that ended a thread, in that thread."""
+        name = told.thread.name if told.thread is not None else "unknown"
+        log.error("the thread %r ended: %s", name, told.exc_value, exc_info=told.exc_value)
+        self._thread_broke.emit(f"{name}: {told.exc_type.__name__}: {told.exc_value}")
+
+    @_guarded
+    def _tell_of_thread(self, what: str) -> None:
+        """Tell the operator, and note it: what that thread did is missing from here on."""
+        self.operator.tell("A part of the program ended", f"{what}. What was answered is kept.")
+        self._remember(f"a thread of the program ended: {what}")
 
     def _now(self) -> float:
         return self.parts.clock()
@@ -369,6 +386,7 @@ class SessionBridge(QObject):
         self._urgency.rest()
         unsettle()
         sys.excepthook = self._hook_before
+        threading.excepthook = self._thread_hook_before
         self.participant.may_close = True
         self.participant.close()
         self.operator.may_close = True

@@ -74,6 +74,7 @@ class Lookout:
             faults=self._faults,
             rate_hz=parts.servo.rate_hz,
             forces=None if self.forces is None else self.forces.figures(),
+            lost={one.trial: one.reason for one in parts.recorder.lost} if parts.recorder is not None else {},
         )
 
     def _count_faults(self) -> None:

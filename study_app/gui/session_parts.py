@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -22,6 +22,22 @@ class ServoPanel(ServoPort, Protocol):
     def force_is_on(self) -> bool: ...  # noqa: D102
     @property
     def overruns(self) -> int: ...  # noqa: D102
+
+
+class LostRecording(Protocol):
+    """A recording that could not be kept."""
+
+    @property
+    def trial(self) -> int: ...  # noqa: D102
+    @property
+    def reason(self) -> str: ...  # noqa: D102
+
+
+class RecorderPanel(RecorderPort, Protocol):
+    """What is asked of the recorder here, beyond what the runner asks."""
+
+    @property
+    def lost(self) -> Sequence[LostRecording]: ...  # noqa: D102
 
 
 class Hand(Protocol):
@@ -48,7 +64,7 @@ class Parts:
     journal: WatchedJournal
     clock: Callable[[], float]
     aim_m: Callable[[], tuple[float, float, float]]
-    recorder: RecorderPort | None = None
+    recorder: RecorderPanel | None = None
     start: Start = FIRST
     exclude: Callable[[int | None, str], None] | None = None
     point_to: Callable[[float, float, float], None] | None = None

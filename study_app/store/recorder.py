@@ -1,8 +1,9 @@
 """Recordings are written beside the session: what happens at 1 kHz goes into a queue, a thread of its own to the disk.
 
 Handing samples over never waits for the disk. Where the disk cannot keep up for two minutes, or takes nothing at all,
-samples are dropped and counted and the session goes on: answers are worth more than recordings. In a rehearsal, where
-time waits for the program, handing over waits instead, and nothing is lost.
+samples are dropped and counted and the session goes on: answers are worth more than recordings. Whatever else fails
+loses that trial's recording alone; `Recorder.lost` says so at once. In a rehearsal, where time waits for the program,
+handing over waits instead, and nothing is lost.
 """
 
 from __future__ import annotations
@@ -97,6 +98,7 @@ class Recorder:
         self._waiting = 0
         self._closing = False
         self._kept: list[Kept] = []
+        self._lost: list[Lost] = []
         self._underway: tuple[int, int] | None = None
         self._expected: dict[tuple[int, int], None] = {}
         self._frames = array("q")
@@ -158,6 +160,12 @@ class Recorder:
         """How many samples of the recording under way, or of the last one, were dropped."""
         return self._dropped
 
+    @property
+    def lost(self) -> tuple[Lost, ...]:
+        """Every recording that could not be kept so far, known as soon as it is lost."""
+        with self._changed:
+            return tuple(self._lost)
+
     def kept(self) -> tuple[Kept, ...]:
         """Return what has become whole, or was lost, since the last call."""
         with self._changed:
@@ -188,6 +196,8 @@ class Recorder:
                 if (begin.trial, begin.attempt) in self._expected:
                     del self._expected[begin.trial, begin.attempt]
                     self._kept.append(kept)
+                    if isinstance(kept, Lost):
+                        self._lost.append(kept)
                     self._changed.notify_all()
 
     def _record(self, begin: _Begin) -> Kept:
@@ -206,15 +216,16 @@ class Recorder:
             frames = np.frombuffer(end.frames, np.int64).reshape(-1, 2)
             shown = self._files.write_frames(frames_path, frames, facts)
             return Recorded(begin.trial, begin.attempt, file.finish(end.dropped), shown, end.dropped)
-        except OSError as error:
-            with contextlib.suppress(OSError):  # what cannot be taken away either is named by a check of the folder
+        except Exception as error:  # noqa: BLE001 - whatever it is, the next trial's recording is still to be written
+            with contextlib.suppress(Exception):  # what cannot be taken away either is named by a check of the folder
                 if file is not None:
                     file.abandon()
-            with contextlib.suppress(OSError):
+            with contextlib.suppress(Exception):
                 if shown is not None:
                     shown.path.unlink(missing_ok=True)
             coming.skip()
-            return Lost(begin.trial, begin.attempt, cause(error))
+            reason = cause(error) if isinstance(error, OSError) else f"{type(error).__name__}: {error}"
+            return Lost(begin.trial, begin.attempt, reason)
 
     def _make_folder(self) -> None:
         """Create the folder, where it is missing, so that no power cut takes it with all that was journalled."""

@@ -85,6 +85,8 @@ class Room:
 
     # the recorder: keeps the frames of each trial
 
+    lost = ()
+
     def start(self, trial, _attempt, _rate_hz):
         self.frames.append((trial, []))
 

@@ -210,6 +210,26 @@ def test_what_cannot_even_be_taken_away_loses_one_recording_and_not_the_next(
     assert isinstance(kept, Recorded)
 
 
+def test_any_failure_loses_one_recording_and_tells_it_at_once(recorder: Recorder, samples_of: Make) -> None:
+    class Broken(SamplesFile):
+        def write(self, samples: Any) -> None:
+            raise ValueError("a column of another length")
+
+    recorder._files = SimpleNamespace(SamplesFile=Broken, write_frames=recording.write_frames)  # type: ignore[assignment]
+    record(recorder, samples_of(200), trial=1)
+    with recorder._changed:
+        assert recorder._changed.wait_for(lambda: recorder._lost, 20)
+    lost = Lost(1, 1, "ValueError: a column of another length")
+    assert recorder.lost == (lost,)
+    recorder._files = recording
+    record(recorder, samples_of(200), trial=2)
+    recorder.close()
+    told, kept = recorder.kept()
+    assert told == lost
+    assert isinstance(kept, Recorded)
+    assert recorder.lost == (lost,)
+
+
 def test_a_folder_that_cannot_be_made_loses_every_recording(tmp_path: Path, samples_of: Make) -> None:
     (tmp_path / "recordings").write_text("a file is in the way")
     recorder = Recorder(tmp_path / "recordings", FACTS)

@@ -37,7 +37,7 @@ class SessionProgress:
     is how long no program held the session, which no duration counts; ``answers`` counts the answered items of each
     trial, ``targets`` those reached in the trial under way or answered, ``trials_done`` says of each trial what was
     measured in it that broke the protocol's limits: column, value and limit, in a double-blind study of lateness and
-    gaps alone.
+    gaps alone, ``lost`` why a trial's recording could not be kept.
     """
 
     protocol: Protocol
@@ -50,6 +50,7 @@ class SessionProgress:
     targets: int = 0
     trials_done: Mapping[int, tuple[Beyond, ...]] = field(default_factory=dict)
     answers: Mapping[int, int] = field(default_factory=dict)
+    lost: Mapping[int, str] = field(default_factory=dict)
     notes: tuple[NoteLine, ...] = ()
     repeats: int = 0
     paused: bool = False
@@ -188,6 +189,9 @@ _TELLERS = {
     "target_reached": lambda progress, _at_s, _fields: replace(progress, targets=progress.targets + 1),
     "trial_ended": _trial_ended,
     "responses": _responses,
+    "recording_lost": lambda progress, _at_s, fields: replace(
+        progress, lost={**progress.lost, fields["trial"]: fields["reason"]}
+    ),
     "paused": lambda progress, _at_s, _fields: replace(progress, paused=True),
     "resumed": lambda progress, _at_s, _fields: replace(progress, paused=False),
     "force_stopped": lambda progress, _at_s, _fields: replace(progress, force_off=True),

@@ -5,6 +5,7 @@ Nothing here says a liquid, a parameter or a delay; nor, in a double-blind study
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -84,8 +85,8 @@ class OperatorView:
     ``elapsed_s`` is the time that was worked: not the gap before a session was resumed. ``main_trials`` has a pair for
     each part, of its main trials left behind and of all. ``trial`` is the number of the trial under way or answered.
     ``waits`` says that the trouble is a disk that takes
-    nothing: the session goes on when it does again. ``beyond`` says of each trial out of limits which it broke, the
-    newest first.
+    nothing: the session goes on when it does again. ``beyond`` says which recordings were lost, then of each trial out
+    of limits which it broke, the newest first.
     """
 
     study: str
@@ -156,12 +157,13 @@ def operator_view(
     faults: int = 0,
     rate_hz: float = 1000.0,
     forces: ForceFigures | None = None,
+    lost: Mapping[int, str] | None = None,
 ) -> OperatorView:
     """Return what the operator sees at ``now_s`` on the session's clock.
 
     ``trouble`` is what no journal could say; ``device_ready`` and ``faults`` (how many there were since the program
     was started) are the servo's own, whatever other trouble there is; ``forces`` are shown where a study is
-    single-blind.
+    single-blind; ``lost`` says of trials why their recordings were lost, also where no journal tells it yet.
     """
     trouble = progress.broke or trouble
     state = _state(progress, force_on=force_on, trouble=trouble)
@@ -199,7 +201,7 @@ def operator_view(
         over=state == "ended",
         trial=None if trial is None else trial.number,
         waits=waits,
-        beyond=_beyond(session, progress),
+        beyond=(*_lost(session, progress, {**progress.lost, **(lost or {})}), *_beyond(session, progress)),
         blinding=session.protocol.study.blinding,
     )
 
@@ -325,6 +327,15 @@ def _counts(session: Session, progress: SessionProgress) -> tuple[tuple[str, str
         ("Answers on disk", f"{sum(progress.answers.values())} of {session.answers_of}"),
         ("Trials within limits", f"{progress.trials_within_limits} of {len(progress.trials_done)}"),
         ("Marks, repeats", f"{progress.marks}, {progress.repeats}"),
+    )
+
+
+def _lost(session: Session, progress: SessionProgress, lost: Mapping[int, str]) -> tuple[str, ...]:
+    """Return a sentence for every trial whose recording could not be kept, the newest first."""
+    trials = {trial.number: trial for trial in progress.schedule.trials}
+    return tuple(
+        f"Recording of {trials[number].label(session.protocol, session.language)} lost: {reason}"
+        for number, reason in sorted(lost.items(), reverse=True)
     )
 
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import pkgutil
 import sys
+import threading
 import weakref
+from types import SimpleNamespace
 
 import pytest
 from PySide6.QtCore import QEvent, Qt, QTimer
@@ -12,6 +14,7 @@ from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QApplication
 
 from study_app.errors import StoreError
+from study_app.gui.dialogs import Notice
 from study_app.session.events import Submitted
 from study_app.session.pages import TroublePage
 from tests.gui.bridge.world import begin_trial
@@ -204,3 +207,34 @@ def test_a_painter_that_a_failure_leaves_at_work_is_ended(make, world, qtbot, mo
     assert left
     bridge._hook_before = before
     caplog.clear()
+
+
+def test_a_thread_that_ends_by_an_exception_is_told_noted_and_ends_no_session(bridge, world, qtbot, caplog):
+    begin_trial(bridge, world)
+    thread = threading.Thread(target=lambda: 1 / 0, name="recorder")
+    thread.start()
+    thread.join()
+    qtbot.waitUntil(lambda: bridge.operator.findChildren(Notice) != [])
+    (notice,) = bridge.operator.findChildren(Notice)
+    assert notice.isVisible()
+    assert "recorder" in caplog.text
+    caplog.clear()
+    (note,) = (entry[1] for entry in world.done if entry[0] == "note")
+    assert "recorder: ZeroDivisionError" in note["text"]
+    assert world.force_is_on
+    assert not bridge.trouble
+
+
+def test_the_recorders_losses_reach_the_cockpit_without_an_event(make, world, qtbot):
+    class Losing:
+        lost = (SimpleNamespace(trial=1, reason="No space left on device"),)
+
+        def start(self, *_arguments):
+            pass
+
+        append = frame = stop = start
+
+    bridge = make(recorder=Losing())
+    begin_trial(bridge, world)
+    bridge._tiles()
+    assert bridge.operator.rail.tally.beyond.text().endswith("lost: No space left on device.")

@@ -91,6 +91,18 @@ def test_reaching_shows_targets_reached_while_they_are_and_after(told):
     assert told.view().setting_line.endswith("0 of 6 targets")
 
 
+def test_a_lost_recording_is_told_first_by_the_recorder_or_the_journal(told):
+    told.welcome()
+    told.start(1)
+    told.end(1, lateness_p99_ms=99.0)
+    assert told.view().beyond[0].startswith("Liquid setting 1 out of limits")
+    line = "Recording of Liquid setting 1 lost: No space left on device"
+    assert told.view(lost={1: "No space left on device"}).beyond[0] == line
+    told.tell("recording_lost", trial=1, attempt=1, reason="No space left on device")
+    assert told.view().beyond[0] == line
+    assert len(told.view(lost={1: "No space left on device"}).beyond) == 2
+
+
 def test_a_paused_session_can_resume_but_not_repeat(told):
     told.welcome()
     told.start(1)
