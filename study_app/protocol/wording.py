@@ -25,6 +25,7 @@ class Words:
 
     # pages to read
     continue_: str
+    decline: str  # on the consent
     space_key: str
     enter_key: str
     escape_key: str

@@ -9,6 +9,7 @@ ARABIC = Words(
     part="الجزء {part} من {parts}",
     setting="{label} من {of}",
     continue_="متابعة",
+    decline="لا أرغب في المشاركة",
     space_key="مسافة",
     enter_key="Enter",
     escape_key="Esc",

@@ -9,6 +9,7 @@ GERMAN = Words(
     part="Teil {part} von {parts}",
     setting="{label} von {of}",
     continue_="Weiter",
+    decline="Ich möchte nicht teilnehmen",
     space_key="Leertaste",
     enter_key="Enter",
     escape_key="Esc",

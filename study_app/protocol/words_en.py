@@ -9,6 +9,7 @@ ENGLISH = Words(
     part="Part {part} of {parts}",
     setting="{label} of {of}",
     continue_="Continue",
+    decline="I do not want to take part",
     space_key="Space",
     enter_key="Enter",
     escape_key="Esc",

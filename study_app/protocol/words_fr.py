@@ -9,6 +9,7 @@ FRENCH = Words(
     part="Partie {part} sur {parts}",
     setting="{label} sur {of}",
     continue_="Continuer",
+    decline="Je ne souhaite pas participer",
     space_key="Espace",
     enter_key="Entrée",
     escape_key="Échap",

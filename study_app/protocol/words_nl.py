@@ -9,6 +9,7 @@ DUTCH = Words(
     part="Deel {part} van {parts}",
     setting="{label} van {of}",
     continue_="Verder",
+    decline="Ik wil niet meedoen",
     space_key="Spatie",
     enter_key="Enter",
     escape_key="Esc",

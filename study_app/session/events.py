@@ -107,7 +107,7 @@ class RepeatAsked:
 
 @dataclass(frozen=True, slots=True)
 class EndAsked:
-    """The operator (or the participant through the operator) ends the session early."""
+    """The operator ends the session early, or the participant does not consent."""
 
     at_s: float
     status: Literal["withdrawn", "aborted"]

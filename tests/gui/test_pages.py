@@ -15,7 +15,7 @@ from study_app.gui.pages.notices import NoticeWidget, PauseWidget
 from study_app.gui.pages.reading import ReadingPage
 from study_app.gui.pages.text import TextWidget
 from study_app.gui.progress import ProgressLine, progress_words
-from study_app.protocol.words import words
+from study_app.protocol.words import LANGUAGES, words
 from study_app.session.events import Continue, ResumeAsked
 from study_app.session.pages import PausePage, Progress, TroublePage
 from tests.gui.small import ManualClock, text_page
@@ -180,3 +180,22 @@ def test_pages_grow_with_the_window_and_never_shrink() -> None:
     assert page_scale(1920, 1080) == pytest.approx(1920 / 1366)
     assert page_scale(1920, 800) == pytest.approx(800 / 768)
     assert page_scale(10_000, 10_000) == pytest.approx(2.4)
+
+
+@pytest.mark.parametrize("by_key", [False, True])
+def test_consent_can_be_declined_in_every_language(qtbot: Any, by_key: bool) -> None:
+    for said in LANGUAGES.values():
+        widget = TextWidget(text_page("consent"), said, ManualClock())
+        told = opened(qtbot, widget)
+        assert widget.decline is not None
+        assert widget.decline.text() == said.decline
+        assert widget.rect().contains(widget.decline.geometry())
+        assert not widget.decline.geometry().intersects(widget.button.geometry())
+        if by_key:
+            widget.decline.setFocus()
+            QTest.keyClick(widget.decline, Qt.Key.Key_Return)
+        else:
+            QTest.mouseClick(widget.decline, Qt.MouseButton.LeftButton)
+        (end,) = told
+        assert (end.status, end.reason) == ("withdrawn", "no consent")
+    assert TextWidget(text_page(), ENGLISH, ManualClock()).decline is None

@@ -169,6 +169,9 @@ def test_tab_and_an_arrow_choose_a_language(qtbot: Any) -> None:
     assert opened.page.languages.buttons[0].hasFocus()
     opened.press(Qt.Key.Key_Tab)
     assert opened.page.button.hasFocus()
+    opened.press(Qt.Key.Key_Tab)
+    assert opened.page.decline is not None
+    assert opened.page.decline.hasFocus()
     opened.press(Qt.Key.Key_Tab, Qt.Key.Key_Right)
     QApplication.processEvents()
     assert opened.told == [LanguageChosen(100.0, "nl")]

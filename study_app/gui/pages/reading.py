@@ -163,10 +163,11 @@ class ReadingPage(PageWidget):
             top += self._progress.height()
         top = self._lay_out_head(scale, margin, top)
         width = min(round(COLUMN * scale), self.width() - 2 * margin)
-        foot = 0
+        foot = below = 0
         if self.button is not None:
             self.button.set_scale(scale)
-            foot = self.button.height() + round((16 if least else 28) * scale)
+            below = self._below_button(width)
+            foot = self.button.height() + below + round((16 if least else 28) * scale)
         room = self.height() - top - round((28 if least else 48) * scale) - foot
         for text, badge in MUST_BE_READ if least else GIVING_WAY:
             self._column.set_scale(scale, text=text, badge=badge)
@@ -186,7 +187,11 @@ class ReadingPage(PageWidget):
         self._content = QRectF(x, y, width, height + foot)
         if self.button is not None:
             left = x + width - self.button.width() + 4 if self.mirrored else x - 4
-            self.button.move(left, y + height + foot - self.button.height())
+            self.button.move(left, y + height + foot - below - self.button.height())
+
+    def _below_button(self, _width: int) -> int:
+        """Return the height [px] of what stands under the button in a column of a width."""
+        return 0
 
     def _lay_out_head(self, _scale: float, _margin: int, top: int) -> int:
         """Place what stands above the column from ``top`` on; return where the column's room begins [px]."""

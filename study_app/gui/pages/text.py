@@ -7,15 +7,15 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt, QTimer
-from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QLabel, QWidget
+from PySide6.QtGui import QFontMetricsF, QKeyEvent
+from PySide6.QtWidgets import QLabel, QPushButton, QWidget
 
 from study_app.gui.pages.languages import LanguageSwitch
 from study_app.gui.pages.reading import ReadingPage
 from study_app.gui.pages.speech import say
 from study_app.gui.progress import ProgressLine
 from study_app.gui.theme import PARTICIPANT, font
-from study_app.session.events import Continue, LanguageChosen
+from study_app.session.events import Continue, EndAsked, LanguageChosen
 from study_app.session.pages import TextPage
 
 if TYPE_CHECKING:
@@ -25,11 +25,34 @@ ICONS = {"consent": "pen", "instructions": "drop", "break": "clock", "debrief": 
 TICK_MS = 200
 
 
+class DeclineButton(QPushButton):
+    """The outlined button of a consent that ends the session."""
+
+    def __init__(self, text: str, parent: QWidget) -> None:
+        super().__init__(text, parent)
+        self.setCursor(Qt.CursorShape.PointingHandCursor)
+        self.setAutoDefault(False)
+
+    def set_scale(self, scale: float) -> None:
+        """Grow with the page."""
+        self.setFont(font("card", scale=scale, weight=500))
+        metrics = QFontMetricsF(self.font())
+        self.setFixedSize(round(metrics.horizontalAdvance(self.text()) + 44 * scale), round(48 * scale))
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802
+        """Decline with Enter, too, where the keyboard is here: it must not agree."""
+        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
+            if not event.isAutoRepeat():
+                self.click()
+        else:
+            super().keyPressEvent(event)
+
+
 class TextWidget(ReadingPage):
     """Consent, instructions, a break or the debrief.
 
-    Space or Enter goes on; a consent asks for more: its button, or Enter. A break with a least time counts it down in
-    the place of its button. Before the consent another language can be chosen.
+    Space or Enter goes on; a consent asks for more: its button, or Enter; another button declines. A break with a least
+    time counts it down in the place of its button. Before the consent another language can be chosen.
     """
 
     def __init__(
@@ -54,6 +77,7 @@ class TextWidget(ReadingPage):
         self._ticker = QTimer(self)
         self._ticker.setInterval(TICK_MS)
         self._ticker.timeout.connect(self.tick)
+        self._stacked = False
         self.languages: LanguageSwitch | None = None
         if page.languages:
             self.languages = LanguageSwitch(page.languages, page.language, words.choose_language, self)
@@ -62,6 +86,9 @@ class TextWidget(ReadingPage):
             for language in self.languages.buttons:
                 assert self.button is not None  # noqa: S101  # these pages have one
                 QWidget.setTabOrder(language, self.button)  # above the text, so before its button
+        self.decline = DeclineButton(words.decline, self) if self._consent else None
+        if self.decline is not None:
+            self.decline.clicked.connect(self._decline)
         if page.stays_until_s is not None:
             self._ticker.start()
         self.tick()
@@ -109,6 +136,35 @@ class TextWidget(ReadingPage):
         self._count.setFont(font("card", scale=self.words_scale * 1.125, weight=500, tabular=True))
         self._count.adjustSize()
         self._place_count()
+
+        self._place_decline()
+
+    def _below_button(self, width: int) -> int:
+        """Leave room for the button that declines, where the column is too narrow for both beside each other."""
+        if self.decline is None or self.button is None:
+            return 0
+        self.decline.set_scale(self.words_scale)
+        self._stacked = self.button.width() + self._gap + self.decline.width() > width
+        return self.decline.height() + self._gap // 2 if self._stacked else 0
+
+    @property
+    def _gap(self) -> int:
+        return round(16 * self.words_scale)
+
+    def _place_decline(self) -> None:
+        """Put the button that declines beside the other one, or under it."""
+        if self.decline is None or self.button is None:
+            return
+        place, size = self.button.geometry(), self.decline.size()
+        if self._stacked:
+            left, top = (place.right() - size.width() if self.mirrored else place.left()), place.bottom()
+            self.decline.move(left, top + self._gap // 2)
+        else:
+            left = place.left() - self._gap - size.width() if self.mirrored else place.right() + self._gap
+            self.decline.move(left, place.center().y() - size.height() // 2)
+
+    def _decline(self) -> None:
+        self.event_made.emit(EndAsked(self._clock(), "withdrawn", "no consent"))
 
     def _place_count(self) -> None:
         assert self.button is not None  # noqa: S101  # these pages have one
