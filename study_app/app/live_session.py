@@ -272,6 +272,9 @@ class LiveSession(QObject):
         self.theme = self.bridge.operator.theme
         if self._tell is not None and (proof := self.bridge.parts.journal.fingerprint):
             self._tell(f"fingerprint of the session, also in fingerprints.txt of the study: {proof}")
+        if self._tell is not None and self._store is not None:
+            status, folder = self.bridge.parts.journal.progress.ended, self._store.folder.path
+            self._tell(f"session {status}: {folder}" if status else f"session not finished: {folder}")
         trouble = self.bridge.trouble or self.bridge.runner.stalled or self.bridge.parts.journal.progress.broke
         if trouble and isinstance(self.bridge.failure, StudyError | None):
             self.error = StudyError(f"the session was stopped: {trouble}; what was answered before is on the disk")

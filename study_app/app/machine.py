@@ -105,6 +105,11 @@ class MachineDesk(QObject):
         self._before.append((CALLED[next(iter(values))], self.settings))
         self._keep(made)
 
+    def remember_operator(self, operator: str) -> None:
+        """Offer these initials in the next session; that is no change of the machine that could be taken back."""
+        if operator and operator != self.settings.operator:
+            self._keep(self.settings.model_copy(update={"operator": operator}))
+
     def measured(self, mean_ms: float, spread_ms: float, how: str, screen: str) -> None:
         """Set the display offset that was measured today on a screen."""
         offset = {"mean_ms": mean_ms, "spread_ms": spread_ms, "how": how, "screen": screen}
@@ -113,7 +118,7 @@ class MachineDesk(QObject):
     def undo(self) -> None:
         """Take the last change back."""
         if self._before:
-            self._keep(self._before.pop()[1])
+            self._keep(self._before.pop()[1].model_copy(update={"operator": self.settings.operator}))
 
     @property
     def undo_called(self) -> str:

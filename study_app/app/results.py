@@ -133,6 +133,10 @@ class ResultsDesk(QObject):
         """Look which studies there are, and read the chosen one again."""
         self._ask(FindStudies(self.results), "looking for studies")
 
+    def choose(self, folder: Path) -> None:
+        """Show this study when the place is entered next."""
+        self.view = ResultsView(studies=self.view.studies, chosen=folder)
+
     def close(self) -> None:
         """End the processes, whatever they are doing."""
         self._listening.stop()

@@ -92,6 +92,7 @@ class Visit(QObject):
     def _home(self) -> HomePlace:
         made = HomePlace(self.results)
         made.session_asked.connect(self._start)
+        made.results_asked.connect(self._show_study)
         made.device.display_asked.connect(self._test_display)
         made.show_machine(self.machine.settings, self.devices.preferred)
         self._home_place = made
@@ -116,6 +117,13 @@ class Visit(QObject):
         """Open the display test; home has gone to the machine's place."""
         if self.machine.place is not None:
             self.machine.place.open_test()
+
+    def _show_study(self, folder: Path) -> None:
+        """Go to the results of a study."""
+        self.window.place("results")
+        assert self.desk is not None  # noqa: S101 - made with its place
+        self.desk.choose(folder)
+        self.window.go("results")
 
     def _results(self) -> ResultsPlace:
         from study_app.app.results import ResultsDesk  # noqa: PLC0415 - only once it is needed
@@ -153,6 +161,7 @@ class Visit(QObject):
     def _start(self, chosen: NewSession) -> None:
         if self.live is not None:
             return
+        self.machine.remember_operator(chosen.operator)
         self.live = LiveSession(chosen, self.window.theme, asks=True)
         self.live.over.connect(self._return)
         self.window.rest()

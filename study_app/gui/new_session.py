@@ -108,6 +108,7 @@ class NewSessionDialog(QDialog):
         self.seed.setValidator(QIntValidator(0, 2_147_483_647, self))
         self.operator.setPlaceholderText("Initials, such as AK")
         self.operator.setMaxLength(40)
+        self.operator.setText(self._machine.operator)
         for code in study.languages:
             self.language.addItem(LANGUAGES.get(code, code), code)
         preferred = _known(self._machine.device)

@@ -136,6 +136,8 @@ def stylesheet(theme: Theme) -> str:
             _buttons(t),
             _fields(t),
             _scrollbars(t),
+            f"QProgressBar {{ background: {t.sunk}; border: none; border-radius: 4px; }}",
+            f"QProgressBar::chunk {{ background: {t.accent}; border-radius: 4px; }}",
         )
     )
 

@@ -56,7 +56,8 @@ class MachineSettings(_Strict):
 
     ``screen`` is the participant's by its name, ``screen_number`` tells screens of one name apart and counts from 1;
     ``viewing_distance_mm`` and ``screen_width_mm`` are None until somebody measured them. ``firmware`` is the file of a
-    Falcon's program, ``results`` the folder of the studies' folders; None is ``./results``. Whether ``device`` is known
+    Falcon's program, ``results`` the folder of the studies' folders; None is ``./results``; ``operator`` are the
+    initials that were given last. Whether ``device`` is known
     is for those to say who open it.
     """
 
@@ -70,6 +71,7 @@ class MachineSettings(_Strict):
     results: Place | None = None
     theme: Literal["light", "dark"] = "light"
     sound: bool = False
+    operator: Annotated[str, Field(max_length=40)] = ""
 
     @property
     def firmware_file(self) -> Path | None:

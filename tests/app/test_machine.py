@@ -289,3 +289,13 @@ def test_what_is_found_after_the_end_is_not_shown(qtbot, desk):
     devices.look()  # as a timer may ask that was set before
     QApplication.processEvents()
     assert (found, devices._thread) == ([], None)
+
+
+def test_initials_are_remembered_and_survive_a_change_taken_back(qapp):
+    desk = MachineDesk()
+    desk.change({"sound": True})
+    desk.remember_operator("AK")
+    desk.remember_operator("")
+    assert settings_here()[0].operator == "AK"
+    desk.undo()
+    assert (settings_here()[0].operator, settings_here()[0].sound) == ("AK", False)

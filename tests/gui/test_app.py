@@ -172,6 +172,7 @@ def test_a_session_runs_from_the_first_page_to_the_last_in_its_windows(short_dem
     assert traced == [b""]
     assert not (folder / "crash.txt").exists()
     assert "crash.txt" not in (folder / "checksums.sha256").read_text()
+    assert lines[-1] == f"session completed: {results / 'data' / 'sub-P001' / 'ses-01'}"
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
@@ -184,9 +185,11 @@ def test_a_signal_leaves_the_session_unfinished_and_resumable(short_demo, result
         os.kill(os.getpid(), number)
 
     person = Person(once=suspend_and_end)
-    code = app.run(short_demo, participant="P001", windowed=True, results=results)
+    lines = []
+    code = app.run(short_demo, participant="P001", windowed=True, results=results, tell=lines.append)
     person.deleteLater()
     assert code == 128 + number
+    assert lines[-1] == f"session not finished: {results / 'data' / 'sub-P001' / 'ses-01'}"
     assert can_go_on(short_demo, results)
     assert signal.getsignal(number) is before
     assert window(OperatorWindow) is None

@@ -182,7 +182,9 @@ def test_a_session_begins_with_what_is_set_for_this_machine(qtbot, results, tmp_
     monkeypatch.setattr(new_session, "screens_shown", lambda: screens)
     firmware = tmp_path / "firmware.bin"
     firmware.write_bytes(b"x")
-    made = begun_with(qtbot, results, device="falcon", screen="B", screen_number=2, firmware=str(firmware))
+    set_here = {"device": "falcon", "screen": "B", "screen_number": 2, "firmware": str(firmware), "operator": "AK"}
+    made = begun_with(qtbot, results, **set_here)
+    assert made.chosen().operator == "AK"
     assert made.firmware.isVisible()
     chosen = made.chosen()
     assert (chosen.device, chosen.screen, chosen.firmware) == ("falcon", 2, firmware)

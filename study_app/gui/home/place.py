@@ -43,7 +43,9 @@ BESIDE = 326
 
 
 class HomePlace(Place):
-    """Protocols, sessions, device, lab; ``session_asked`` carries what an operator chose.
+    """Protocols, sessions, device, lab.
+
+    ``session_asked`` carries what an operator chose, ``results_asked`` the folder of a study.
 
     Parameters
     ----------
@@ -52,6 +54,7 @@ class HomePlace(Place):
     """
 
     session_asked = Signal(object)
+    results_asked = Signal(object)
 
     def __init__(self, results: Path) -> None:
         super().__init__()
@@ -183,6 +186,7 @@ class HomePlace(Place):
         dialog = RehearsalDialog(facts, self.results, theme=self.theme, parent=self)
         self._open(dialog)
         dialog.finished.connect(self.show_sessions)
+        dialog.accepted.connect(lambda: self.results_asked.emit(dialog.folder))
 
     def end(self) -> None:
         """Stop a rehearsal that is under way."""

@@ -17,11 +17,14 @@ from study_app.store.layout import rehearsal_folder
 
 MAX_PARTICIPANTS = 200
 PATIENCE_MS = 2000
+DONE = "(simulated)"  # ends the line that is printed of a participant who is done
 ARGUMENTS = ("-m", "study_app", "rehearse")
 
 
 class RehearsalDialog(QDialog):
-    """How many simulated participants, and then how far it is; Cancel stops it and keeps whole sessions.
+    """How many simulated participants, then how far it is, then the way to their results; Cancel keeps whole sessions.
+
+    It is accepted when the results are to be shown.
 
     Parameters
     ----------
@@ -61,6 +64,7 @@ class RehearsalDialog(QDialog):
         self.process.setProcessChannelMode(QProcess.ProcessChannelMode.MergedChannels)
         self._told = ""
         self._stopping = False
+        self._over = False
         self._lay_out()
         wear(self, theme)
         self.start.clicked.connect(self._start)
@@ -94,21 +98,31 @@ class RehearsalDialog(QDialog):
         column.addLayout(foot)
 
     def _start(self) -> None:
+        if self._over:
+            self.accept()
+            return
         if self.process.state() != QProcess.ProcessState.NotRunning:
             return
         for field in (self.participants, self.seed, self.start):
             field.setEnabled(False)
+        self.progress.setRange(0, self.participants.value())
         self.progress.show()
-        self.said.setText("Rehearsing …")
+        self._show_done()
         words = ("--participants", str(self.participants.value()), "--seed", str(self.seed.value()))
         where = ("--results", str(self.folder))
         self.process.start(sys.executable, [*ARGUMENTS, self._facts.source, *words, *where])
 
     def _listen(self) -> None:
         self._told += bytes(self.process.readAll().data()).decode(errors="replace")
+        self._show_done()
+
+    def _show_done(self) -> None:
+        """Show how many participants are done, by the lines that the rehearsal printed of them, and the last line."""
         lines = self._told.strip().splitlines()
-        if lines:
-            self.said.setText(lines[-1])
+        done = sum(line.endswith(DONE) for line in lines)
+        self.progress.setValue(done)
+        counted = f"{done} of {self.participants.value()}"
+        self.said.setText(f"{counted}: {lines[-1]}" if lines else f"{counted}: rehearsing …")
 
     def _failed(self, error: QProcess.ProcessError) -> None:
         """Say that there was no program to run; whatever else fails ends the process too."""
@@ -123,7 +137,12 @@ class RehearsalDialog(QDialog):
         self._listen()
         self.progress.hide()
         if code == 0:
-            self.accept()
+            self._over = True
+            self.said.setText(f"Done: {self.participants.value()} simulated sessions, kept in {self.folder}.")
+            self.start.show_action("", "Open results")
+            self.start.setEnabled(True)
+            self.start.setFocus()
+            self.cancel.setText("Close")
             return
         lines = self._told.strip().splitlines()
         self.said.setText(lines[-1] if lines else f"The rehearsal ended with exit code {code}.")

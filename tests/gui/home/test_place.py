@@ -185,6 +185,26 @@ def test_a_failed_rehearsal_says_why_and_stays(qtbot, tmp_path, monkeypatch):
     assert dialog.said.text() == "no room left"
 
 
+def test_a_rehearsal_counts_participants_and_leads_to_its_results(qtbot, tmp_path, monkeypatch):
+    dialog = RehearsalDialog(study_facts("demo"), tmp_path)
+    qtbot.addWidget(dialog)
+    dialog.open()
+    dialog.participants.setValue(2)
+    said = "print('R1: 8 responses (simulated)', flush=True); input(); print('R2: 8 responses (simulated)')"
+    monkeypatch.setattr("study_app.gui.home.rehearsal.ARGUMENTS", ("-c", said))
+    qtbot.mouseClick(dialog.start, Qt.MouseButton.LeftButton)
+    qtbot.waitUntil(lambda: dialog.progress.value() == 1, timeout=20_000)
+    assert dialog.said.text() == "1 of 2: R1: 8 responses (simulated)"
+    assert (dialog.progress.minimum(), dialog.progress.maximum()) == (0, 2)
+    with qtbot.waitSignal(dialog.process.finished, timeout=20_000):
+        dialog.process.write(b"\n")
+    assert dialog.isVisible()
+    assert str(dialog.folder) in dialog.said.text()
+    assert dialog.start.text() == "Open results"
+    with qtbot.waitSignal(dialog.accepted):
+        qtbot.mouseClick(dialog.start, Qt.MouseButton.LeftButton)
+
+
 @pytest.mark.parametrize("at", ["participants", "seed", "start", "dialog"])
 def test_enter_begins_the_rehearsal_wherever_the_keyboard_is(qtbot, tmp_path, monkeypatch, at):
     dialog = RehearsalDialog(study_facts("demo"), tmp_path)
@@ -235,7 +255,7 @@ def test_a_rehearsal_that_does_not_listen_is_killed(qtbot, tmp_path, monkeypatch
     monkeypatch.setattr("study_app.gui.home.rehearsal.ARGUMENTS", ("-c", deaf))
     monkeypatch.setattr("study_app.gui.home.rehearsal.PATIENCE_MS", 50)
     dialog.start.click()
-    qtbot.waitUntil(lambda: dialog.said.text() == "deaf", timeout=20_000)
+    qtbot.waitUntil(lambda: dialog.said.text() == "0 of 5: deaf", timeout=20_000)
     with qtbot.waitSignal(dialog.rejected):
         dialog.close()
     assert dialog.process.state() == QProcess.ProcessState.NotRunning
