@@ -141,8 +141,8 @@ class ParticipantWindow(QWidget):
 
     @property
     def page(self) -> Page | None:
-        """The page that is shown; None before the first."""
-        return self._page
+        """The page that is shown; None before the first, and while it is told that the time is up."""
+        return None if self._told_up.isActive() else self._page
 
     @property
     def widget(self) -> PageWidget | TankWidget:

@@ -475,6 +475,7 @@ def timed_out(window: ParticipantWindow, elapsed_s: float = 120.0) -> None:
 def test_time_is_up_is_told_before_the_questions(opened: Opened, qtbot: Any) -> None:
     timed_out(opened.window)
     assert opened.window.widget.accessibleName() == words("en").time_is_up
+    assert opened.window.page is None
     assert opened.events == []
     qtbot.waitUntil(lambda: isinstance(opened.window.widget, QuestionnaireWidget), timeout=5000)
     assert opened.focus in opened.window.widget.rows
