@@ -16,15 +16,18 @@ from study_app.evaluation.appraised import Costs, Errors
 from study_app.evaluation.appraiser import Appraiser
 from study_app.gui.beginning import Ready, measured
 from study_app.gui.choices import NewSession
-from study_app.gui.preflight.view import preflight_view
+from study_app.gui.preflight.view import preflight_view, resumed_rows
 from study_app.gui.preflight.window import PreflightWindow
 from study_app.gui.screens import place
 from study_app.gui.theme import Theme
 from study_app.haptics.dynamics import Dynamics
 from study_app.haptics.scene import Scene
 from study_app.protocol.model import Protocol
+from study_app.protocol.schedule import build_schedule
 from study_app.protocol.tasks import Stroke, fastest_stroke
 from study_app.session.preflight import Facts, checks
+from study_app.store import journal
+from study_app.store.layout import locate
 
 LOOK_MS = 100
 PATIENCE_S = 10.0
@@ -108,6 +111,7 @@ class Preflight(QObject):
         super().__init__()
         self._chosen, self._protocol, self._ready, self._screen = chosen, protocol, ready, screen
         self._who = who
+        self._goes_on = _goes_on(chosen, protocol)
         self._measuring: threading.Thread | None = None
         self._ending = threading.Event()
         self._appraisal = Appraisal(_scenes(protocol), _dynamics(ready.facts, protocol))
@@ -155,6 +159,7 @@ class Preflight(QObject):
                 asked_error=self._appraisal.error_n is not None or not self._appraisal.over,
                 now=datetime.now().astimezone(),
                 busy=self._measuring is not None,
+                goes_on=self._goes_on,
             )
         )
 
@@ -204,6 +209,14 @@ class Preflight(QObject):
 
     def _cancel(self) -> None:
         self.cancelled.emit()
+
+
+def _goes_on(chosen: NewSession, protocol: Protocol) -> tuple[tuple[str, str], ...]:
+    """Return where a session goes on and what is kept, nothing of a new one."""
+    if chosen.resumes is None:
+        return ()
+    schedule = build_schedule(protocol, chosen.participant, chosen.seed)
+    return resumed_rows(protocol, schedule, journal.read(locate(chosen.resumes)[1].journal))
 
 
 def _largest(errors_n: list[float | None]) -> float | None:

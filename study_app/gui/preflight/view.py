@@ -5,15 +5,20 @@ Nothing here says a liquid, a parameter or a delay: costs and errors are those o
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 
 import numpy as np
 from numpy.typing import NDArray
 
+from study_app.gui.operator.progress import SessionProgress, operator_language, progress_after
 from study_app.protocol.describe import expected_duration_s
 from study_app.protocol.model import Protocol
+from study_app.protocol.schedule import Schedule, Trial
 from study_app.session.preflight import Check, Facts
+from study_app.session.resume import resume_at
+from study_app.store.journal import Line
 
 WAITING = "measuring …"
 BINS_PER_DECADE = 10
@@ -71,8 +76,9 @@ def preflight_view(
     asked_error: bool = True,
     now: datetime,
     busy: bool = False,
+    goes_on: tuple[tuple[str, str], ...] = (),
 ) -> PreflightView:
-    """Return what to show of ``facts``.
+    """Return what to show of ``facts``; ``goes_on`` are the rows of a session that goes on (`resumed_rows`).
 
     ``error_n`` is the largest difference of a scene's force from the definition by the letter [N], None while it is not
     known; where nobody was asked (``asked_error``) its line is left out.
@@ -81,11 +87,33 @@ def preflight_view(
         study=protocol.study.name,
         who=who,
         checks=found,
-        rows=_rows(protocol, now, error_n, asked_error=asked_error),
+        rows=(*goes_on, *_rows(protocol, now, error_n, asked_error=asked_error)),
         lateness_us=facts.lateness_ns / 1e3,
         limit_us=protocol.limits.lateness_ms * 1e3,
         busy=busy,
     )
+
+
+def resumed_rows(protocol: Protocol, schedule: Schedule, lines: Iterable[Line]) -> tuple[tuple[str, str], ...]:
+    """Return where the session with these journal lines goes on, and how much of it is kept.
+
+    Raises
+    ------
+    SessionError
+        The journal is not of this schedule.
+    """
+    told = list(lines)
+    start = resume_at(protocol, schedule, told)
+    language = operator_language(protocol)
+    step = schedule.steps[start.step] if start.step < len(schedule.steps) else None
+    if isinstance(step, Trial):
+        attempt = start.presented.get(step.number, 0) + 1
+        here = step.label(protocol, language) + (f", attempt\u00a0{attempt}" if attempt > 1 else "")
+    else:
+        here = "the end" if step is None else protocol.text(protocol.pages[step.page_id].title, language)
+    answers = progress_after(SessionProgress(protocol, schedule), told).answers
+    kept = f"{sum(answers.values())} of {protocol.responses_per_participant()} answers"
+    return ("Goes on at", here), ("Kept", kept)
 
 
 def histogram(lateness_us: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64], float | None]:

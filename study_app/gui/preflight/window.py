@@ -108,6 +108,7 @@ class PreflightWindow(QWidget):
         self.runs = Card("What will run", padding=18, gap=8)
         self._grid = QGridLayout()
         self._grid.setVerticalSpacing(9)
+        self._grid.setColumnStretch(1, 1)
         self.runs.column.addLayout(self._grid)
         side = QWidget()
         side.setFixedWidth(ASIDE)
@@ -159,6 +160,7 @@ class PreflightWindow(QWidget):
                 value = figures("", "label")
                 value.setFont(font("label", weight=600, tabular=True))
                 value.setAlignment(Qt.AlignmentFlag.AlignRight)
+                value.setWordWrap(True)
                 self._grid.addWidget(label(name, "label", "text2"), place, 0)
                 self._grid.addWidget(value, place, 1)
                 self._values[name] = value

@@ -11,12 +11,13 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QApplication, QLabel
 
 from study_app.gui.preflight import PreflightWindow
-from study_app.gui.preflight.view import WAITING, histogram, preflight_view
+from study_app.gui.preflight.view import WAITING, histogram, preflight_view, resumed_rows
 from study_app.gui.preflight.window import LEAST
 from study_app.gui.theme import DARK
 from study_app.haptics.clock_grants import Grant
 from study_app.haptics.telemetry import Timing
 from study_app.protocol.load import load
+from study_app.protocol.schedule import build_schedule
 from study_app.session.preflight import Facts, Screen, checks
 
 NOW = datetime(2026, 3, 2, 14, 20)
@@ -176,3 +177,23 @@ def test_no_words_are_cut_in_the_smallest_window(qtbot, theme):
                 assert part.height() >= part.heightForWidth(part.width()), (row.check.name, part.text())
     for value in made.runs.findChildren(QLabel):
         assert made.rect().contains(value.mapTo(made, QPoint(0, 0)))
+
+
+def test_a_session_that_goes_on_says_where_and_what_is_kept(window):
+    protocol = load("demo")
+    schedule = build_schedule(protocol, "P007", 5)
+    first, second = (trial.number for trial in schedule.trials[:2])
+    happened = (
+        {"event": "session_started"},
+        {"event": "page_shown", "page": "welcome"},
+        {"event": "page_left", "page": "welcome"},
+        {"event": "trial_started", "trial": first, "attempt": 1},
+        {"event": "trial_ended", "trial": first, "attempt": 1, "outcome": "complete"},
+        {"event": "responses", "trial": first, "attempt": 1, "items": [{"item": "a"}, {"item": "b"}]},
+        {"event": "trial_started", "trial": second, "attempt": 1},
+    )
+    rows = resumed_rows(protocol, schedule, [{**line, "t_s": float(at)} for at, line in enumerate(happened)])
+    assert rows == (("Goes on at", "Liquid setting 2, attempt\u00a02"), ("Kept", "2 of 8 answers"))
+    window.show_view(view_of(WELL, goes_on=rows))
+    assert {value.text() for value in window.values()} >= {"Liquid setting 2, attempt\u00a02", "2 of 8 answers"}
+    assert "Kept" not in dict(view_of(WELL).rows)
