@@ -130,6 +130,12 @@ def sweep_old(folder: Path) -> None:
                 path.unlink()
 
 
+def paths_in(folder: Path) -> list[Path]:
+    """Return all files and folders at any depth of ``folder``, sorted; a folder may go while it is looked at."""
+    levels = os.walk(folder)
+    return sorted(Path(above) / name for above, folders, names in levels for name in (*folders, *names))
+
+
 def sweep(folder: Path) -> tuple[Path, ...]:
     """Take away what a killed program left half-written in ``folder`` itself; return what it was.
 

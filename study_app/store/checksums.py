@@ -10,7 +10,7 @@ from pathlib import Path
 
 import study_app
 from study_app.errors import StoreError
-from study_app.store.atomic import append_line, cannot_read, write_file
+from study_app.store.atomic import append_line, cannot_read, paths_in, write_file
 from study_app.store.layout import REBUILT, SessionFolder
 
 _LINE = re.compile(r"([0-9a-f]{64})  (.+)")
@@ -108,7 +108,7 @@ def read_checksums(session: SessionFolder) -> dict[str, str]:
 def files(session: SessionFolder) -> tuple[str, ...]:
     """Return the session's files, by path in its folder; not the list itself, a crash's trace, hidden or half ones."""
     left_out = {session.checksums.name, session.crash.name}
-    found = (path.relative_to(session.path) for path in session.path.rglob("*") if path.is_file())
+    found = (path.relative_to(session.path) for path in paths_in(session.path) if path.is_file())
     return tuple(
         sorted(
             name.as_posix()

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from study_app.protocol.model import Protocol
-from study_app.store.atomic import cannot_read
+from study_app.store.atomic import cannot_read, paths_in
 from study_app.store.layout import StudyFolder
 from study_app.store.parsing import parse_json
 
@@ -89,7 +89,7 @@ def find_leaks(folder: Path, words: Telltales) -> list[Leak]:
     """
     found: list[Leak] = []
     key = StudyFolder(folder).key
-    for path in sorted(folder.rglob("*")):
+    for path in paths_in(folder):
         name = path.relative_to(folder).as_posix()
         found += [Leak(f"the name {name}", word) for word in words.in_text(name)]
         if path.is_file() and path != key and path.suffix != ".parquet":

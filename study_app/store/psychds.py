@@ -16,7 +16,7 @@ from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from study_app.store.atomic import cannot_read
+from study_app.store.atomic import cannot_read, paths_in
 from study_app.store.parsing import parse_json
 
 Metadata: TypeAlias = Mapping[str, Any]
@@ -224,7 +224,7 @@ def _files(folder: Path) -> list[Path]:
     ignore = folder / _IGNORE
     own = _content(ignore).decode("utf-8", "replace").splitlines() if ignore.is_file() else []
     patterns = [line.strip() for line in (*_IGNORED, *own, _IGNORE) if line.strip() and not line.startswith("#")]
-    found = (path for path in sorted(folder.rglob("*")) if path.is_file())
+    found = (path for path in paths_in(folder) if path.is_file())
     return [path for path in found if not _ignored(path.relative_to(folder), patterns)]
 
 

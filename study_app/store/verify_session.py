@@ -20,7 +20,7 @@ from typing import Any
 from study_app.errors import StoreError
 from study_app.store import cells, journal, receipt, tables
 from study_app.store.abandoned import never_begun
-from study_app.store.atomic import is_there, temporaries
+from study_app.store.atomic import is_there, paths_in, temporaries
 from study_app.store.blinding import Key
 from study_app.store.checksums import files, read_checksums, sha256
 from study_app.store.columns import MISSING, TABLES
@@ -80,7 +80,7 @@ def check_session(place: Place, key: Key | None, found: Gathered) -> Checked:
 def _state(folder: SessionFolder) -> dict[str, tuple[int, int, int]]:
     """Return what tells that a file of the session came, went or changed."""
     found = {}
-    for path in folder.path.rglob("*"):
+    for path in paths_in(folder.path):
         with contextlib.suppress(OSError):  # it has just gone
             facts = path.stat()
             found[str(path)] = (facts.st_ino, facts.st_size, facts.st_mtime_ns)
