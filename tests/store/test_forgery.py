@@ -21,6 +21,7 @@ from study_app.store.fingerprints import listed
 from study_app.store.layout import StudyFolder
 from study_app.store.rebuild import rebuild
 from study_app.store.resume import check_can_go_on
+from study_app.store.sealing import opened, sealed
 from study_app.store.session import SessionStore
 from study_app.store.verify import verify
 from tests.store.conftest import SOURCE
@@ -189,7 +190,14 @@ def change_the_seed(study: Path) -> None:
 def add_a_session(study: Path) -> None:
     path = study / "data" / "sub-P009" / "ses-01"
     shutil.copytree(study / P007, path)
-    forge(path / "journal.jsonl", lambda lines: lines[0].update(participant="P009"))
+    key = blinding.read_key(study)
+
+    def of_another(lines: Lines) -> None:
+        clear = opened(lines, key)
+        clear[0]["participant"] = "P009"
+        lines[:] = [sealed(clear[0], line["event"], line, key) for line in clear]
+
+    forge(path / "journal.jsonl", of_another)
     receipt.write(path / "receipt.json", receipt.read(path / "receipt.json") | {"participant": "P009"})
     for table in path.glob("*_data.csv"):
         table.unlink()
