@@ -382,7 +382,7 @@ def test_the_force_fades_in_before_a_trial_starts_again() -> None:
     assert order.index(FadeIn) < order.index(StartTrial)
 
 
-@pytest.mark.parametrize("phase", [Phase.TROUBLE, *FINAL])
+@pytest.mark.parametrize("phase", [Phase.TROUBLE, *sorted(FINAL, key=str)])
 def test_the_force_can_be_stopped_where_nothing_goes_on(phase: Phase) -> None:
     state = state_in(phase)
     after, commands = advance(state, ForceStopped(5.0, "operator"))
