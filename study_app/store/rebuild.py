@@ -8,6 +8,7 @@ from pathlib import Path
 from study_app.store import journal, receipt
 from study_app.store.atomic import is_there, sweep, write_file
 from study_app.store.checksums import note_rebuilt, read_checksums, renew_checksums
+from study_app.store.cut_journal import refuse_if_cut
 from study_app.store.fingerprints import fingerprint, listed, note_fingerprint, place_of
 from study_app.store.journal import Line
 from study_app.store.layout import SessionFolder, locate
@@ -42,14 +43,15 @@ def rebuild(session_folder: Path) -> Rebuilt:
     Raises
     ------
     StoreError
-        It is no session's folder, open in another program, or its journal is empty or damaged; or a file cannot be
-        written.
+        It is no session's folder, open in another program, or its journal is empty, damaged or tells less than the
+        session's other files; or a file cannot be written.
     """
     study_folder, folder = locate(session_folder)
     opening = open_alone(folder.path)
     try:
         contents = journal.whole(folder.journal)
         place = Place(study_folder, folder, progress_of(contents.lines).start["study"])
+        refuse_if_cut(place, contents.lines)
         swept = sweep(folder.path) + (sweep(folder.recordings) if is_there(folder.recordings) else ())
         table = study_folder.participants(place.study)
         before = _content(table)

@@ -21,6 +21,7 @@ from study_app.store import journal, receipt
 from study_app.store.atomic import is_there, sweep
 from study_app.store.blinding import Key, open_or_draw_key, same_conditions
 from study_app.store.checksums import sha256
+from study_app.store.cut_journal import refuse_if_cut
 from study_app.store.description import write_description
 from study_app.store.journal import Contents, Journal, Line, SessionClock
 from study_app.store.layout import SessionFolder, StudyFolder, locate, refuse_never_begun
@@ -63,9 +64,9 @@ def reopen(
     Raises
     ------
     StoreError
-        It is no session's folder, open in another program, finished, damaged, or of another protocol (the differences
-        are named where they are not blinded); the key is not in order; or the folder cannot be written. But for the
-        torn tail nothing has changed then.
+        It is no session's folder, open in another program, finished, damaged, with a journal that tells less than the
+        other files, or of another protocol (the differences are named where they are not blinded); the key is not
+        in order; or the folder cannot be written. But for the torn tail nothing has changed then.
     """
     study_folder, folder = locate(session_folder)
     refuse_never_begun(folder)
@@ -134,6 +135,7 @@ def _left(study_folder: StudyFolder, folder: SessionFolder, protocol: Protocol, 
     first = receipt.read(folder.receipt)
     if receipt.other_format(first, start):
         raise StoreError(f"{folder.journal} has another format than its receipt says: restore it from a copy")
+    refuse_if_cut(place, contents.lines)
     _same_protocol(place, first, start, protocol, source)
     draw = stream(start["seed"], "blinding").random if start["simulated"] else None
     return _Left(place, contents, start, first, open_or_draw_key(study_folder.path, protocol, draw))

@@ -24,6 +24,7 @@ from study_app.store.atomic import is_there, paths_in, temporaries
 from study_app.store.blinding import Key
 from study_app.store.checksums import files, read_checksums, sha256
 from study_app.store.columns import MISSING, TABLES
+from study_app.store.cut_journal import RESTORE, beyond
 from study_app.store.events import shortened, unknown_events
 from study_app.store.findings import Gathered
 from study_app.store.fingerprints import fingerprint
@@ -109,7 +110,7 @@ def _look(place: Place, key: Key | None, found: Gathered) -> Checked:
     hashes = _hashes(folder)
     ended = lines[-1]["event"] == "session_ended" and not running
     if not running:
-        _tables(place, lines, found)
+        _tables(place, lines, _more(place, lines, found), found)
         _checksums(folder, lines, hashes, found)
     _recordings(folder, lines, hashes, found, running=running)
     _rebuilt(folder, found)
@@ -189,10 +190,7 @@ def _receipt(folder: SessionFolder, lines: list[Line], key_hash: str | None, fou
         found.error(folder.journal, f"has another format than {path.name} says: it was changed; restore it from a copy")
     last = lines[-1]
     status = last["status"] if last["event"] == "session_ended" else receipt.UNFINISHED
-    resumed = held.get("resumed")
-    if isinstance(resumed, list) and len(resumed) > sum(line["event"] == "session_resumed" for line in lines):
-        found.error(path, "tells that the session was resumed more often than the journal does")
-    if held.get("status") != status and not running:
+    if held.get("status") != status and last["event"] == "session_ended" and not running:
         found.error(path, f"its status is {held.get('status')!r}, the journal's {status!r}; rebuild renews it")
 
 
@@ -215,7 +213,18 @@ def _rebuilt(folder: SessionFolder, found: Gathered) -> None:
             found.warning(folder.rebuilt, f"{shortened(line)}; only a copy of {FINGERPRINTS} proves more")
 
 
-def _tables(place: Place, lines: list[Line], found: Gathered) -> None:
+def _more(place: Place, lines: list[Line], found: Gathered) -> set[Path]:
+    """Return the files that tell more than the journal, having said so."""
+    telling: set[Path] = set()
+    with contextlib.suppress(StoreError):  # said of receipt or journal already
+        for path, what in beyond(place, lines):
+            found.error(path, f"{what}: {RESTORE}")
+            telling.add(path)
+    return telling
+
+
+def _tables(place: Place, lines: list[Line], said: set[Path], found: Gathered) -> None:
+    """Compare the tables with the journal, but for those of which something was ``said``."""
     try:
         expected = table_files(place, lines, opened_key(place.study_folder))
     except StoreError as error:
@@ -223,7 +232,8 @@ def _tables(place: Place, lines: list[Line], found: Gathered) -> None:
         return
     ended = lines[-1]["event"] == "session_ended"
     for (path, content), name in zip(expected, ("responses", "trials"), strict=True):
-        check_table(path, content, name, found, may_be_behind=lambda _: not ended)
+        if path not in said:
+            check_table(path, content, name, found, may_be_behind=lambda _: not ended)
 
 
 def check_table(
@@ -281,8 +291,6 @@ def _hashes(folder: SessionFolder) -> dict[str, str]:
 
 def _checksums(folder: SessionFolder, lines: list[Line], hashes: Mapping[str, str], found: Gathered) -> None:
     if lines[-1]["event"] != "session_ended":
-        if is_there(folder.checksums):
-            found.error(folder.checksums, "was made when the session had ended, though the journal has no end")
         return
     if not is_there(folder.checksums):
         found.error(folder.checksums, "is missing: was the program killed at the session's end? rebuild makes it")

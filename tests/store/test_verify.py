@@ -464,8 +464,8 @@ def test_a_lost_journal_is_an_error_by_whatever_else_is_left(
     ("left", "sentence"),
     [
         ("checksums.sha256", "checksums.sha256: was made when the session had ended, though the journal has no end"),
-        ("*responses_data.csv", "responses_data.csv: is not what the journal gives"),
-        ("*trials_data.csv", "trials_data.csv: is not what the journal gives"),
+        ("*responses_data.csv", "responses_data.csv: has 12 rows, and the journal gives 0: restore the journal"),
+        ("*trials_data.csv", "trials_data.csv: has 6 rows, and the journal gives 2: restore the journal"),
         ("recordings/trial-004.parquet", "trial-004.parquet: is of a trial that the journal never started"),
     ],
 )
