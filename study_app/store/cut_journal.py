@@ -10,6 +10,7 @@ from pathlib import Path
 from study_app.errors import StoreError
 from study_app.store import receipt, tables
 from study_app.store.atomic import is_there, paths_in, read_own
+from study_app.store.events import unknown_events
 from study_app.store.fingerprints import listed, place_of
 from study_app.store.journal import Line
 from study_app.store.layout import SessionFolder
@@ -22,13 +23,18 @@ RESTORE = "restore the journal from a copy"
 
 
 def refuse_if_cut(place: Place, lines: Sequence[Line]) -> None:
-    """Refuse a journal that tells less than the session's other files: what follows from it would replace them.
+    """Refuse a journal that tells this version less than the session's other files may: they would be replaced.
 
     Raises
     ------
     StoreError
-        Names the file that tells more; or one of them cannot be read.
+        Names the file that tells more, or an event of another version; or one of them cannot be read.
     """
+    for name in unknown_events(lines):
+        raise StoreError(
+            f"{place.folder.journal} has events {name!r}, which this version does not know: use the version that wrote "
+            "them"
+        )
     for path, what in (*beyond(place, lines), *_ended_or_recorded(place, lines)):
         raise StoreError(f"{path} {what}: {RESTORE}")
 

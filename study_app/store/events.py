@@ -79,6 +79,7 @@ EVENTS: tuple[Event, ...] = (
 
 _OF_ALL = ("n", "event", "t_s", "at")
 _BY_NAME = {event.name: event for event in EVENTS}
+EVENT_NAMES = frozenset(_BY_NAME)
 
 _MOST_SECONDS = 1e9  # of a session's clock
 _MOST = 10**30  # no whole number that the program writes is greater
@@ -113,10 +114,13 @@ def _is_number(value: object) -> bool:
 
 
 def _is_time(value: object) -> bool:
+    if not isinstance(value, str):
+        return False
     try:
-        return isinstance(value, str) and datetime.fromisoformat(value).tzinfo is not None
+        moment = datetime.fromisoformat(value)
     except ValueError:
         return False
+    return moment.tzinfo is not None and 1 < moment.year < 9999  # in any zone
 
 
 def _is_object(value: object) -> bool:
@@ -179,8 +183,8 @@ _KIND_OF: dict[str, tuple[str, bool]] = {column.name: (column.kind, True) for co
 def problem(line: Mapping[str, Any]) -> str | None:
     """Return what is wrong with a line of a journal, or None.
 
-    A line lacks no field of its event, and every field that the dictionary knows is of its kind. Of an event of another
-    version only the fields that all lines have are known.
+    A line lacks no field of its event, and every field that the dictionary knows is of its kind, in events of another
+    version, too.
     """
     event = line.get("event")
     if not isinstance(event, str):
@@ -188,7 +192,7 @@ def problem(line: Mapping[str, Any]) -> str | None:
     known = _BY_NAME.get(event)
     if lacking := [name for name in (*_OF_ALL, *(known.fields if known else ())) if name not in line]:
         return f"({event}) lacks {', '.join(lacking)}"
-    for name in line if known else _OF_ALL:
+    for name in line:
         if not holds(name, line[name]):
             return f"({event}) holds {name} {shortened(line[name])}, expected: {_KIND_OF[name][0]}"
     return None if 0 <= line["t_s"] <= _MOST_SECONDS else f"({event}) has t_s {line['t_s']:g}"
@@ -202,7 +206,7 @@ def shortened(value: object) -> str:
 
 def unknown_events(lines: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     """Yield the names of events that the dictionary does not know, each once."""
-    yield from {line["event"]: None for line in lines if line["event"] not in _BY_NAME}
+    yield from {line["event"]: None for line in lines if line["event"] not in EVENT_NAMES}
 
 
 def holds(name: str, value: object) -> bool:

@@ -26,9 +26,10 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, BinaryIO, TypeAlias
 
+import study_app
 from study_app.errors import StoreError
 from study_app.store.atomic import cannot_write, read_own, study_root, sync_folder, write_file, write_whole
-from study_app.store.events import problem, shortened
+from study_app.store.events import EVENT_NAMES, problem, shortened
 from study_app.store.parsing import parse_json
 
 Line: TypeAlias = dict[str, Any]
@@ -156,12 +157,15 @@ class Journal:
         Raises
         ------
         StoreError
-            The line was not written, or is not on the disk though it was waited for, or a line before it could not be
-            flushed; the journal ends with the line before it and can be appended to again.
+            The line was not written (the disk failed, or a reader would call it damaged), or is not on the disk though
+            it was waited for, or a line before it could not be flushed; the journal ends with the line before it and
+            can be appended to again.
         """
         if self._file.closed:
             raise StoreError(f"{self.path} is closed: {event!r} came after the session's end and was not recorded")
         line = line_of(self._lines + 1, event, self.clock, t_s, fields, previous=self._hash.hexdigest())
+        if (wrong := problem(line)) is not None:
+            raise StoreError(f"{self.path}, line {line['n']} {wrong}: it was not written; tell the developers")
         content = line_bytes(line)
         self._refuse_if_replaced()
         try:
@@ -369,6 +373,7 @@ def scan(path: Path) -> Contents:
     whole_bytes = 0
     hashed = hashlib.sha256()
     chained = False
+    version: Any = None  # that wrote the lines
     for number, piece in enumerate(pieces, start=1):
         line = _parse(piece)
         if line is None:
@@ -377,7 +382,8 @@ def scan(path: Path) -> Contents:
             shown = shortened(line.get("n"))
             damage = f"{path}, line {number}: its n is {shown}: lines are missing or doubled; restore a copy"
             return Contents(lines, whole_bytes, damage=damage)
-        if (wrong := problem(line)) is not None:
+        version = line.get("version", version)
+        if (wrong := problem(line) or _unknown(line, version)) is not None:
             damage = f"{path}, line {number} {wrong}: it was changed; restore it from a copy"
             return Contents(lines, whole_bytes, damage=damage)
         if (wrong := _break(line, hashed.hexdigest(), chained=chained)) is not None:
@@ -387,6 +393,13 @@ def scan(path: Path) -> Contents:
         hashed.update(piece + b"\n")
         chained = "previous" in line
     return Contents(lines, whole_bytes, torn_bytes=len(tail), hash=hashed)
+
+
+def _unknown(line: Line, version: Any) -> str | None:
+    """Return that a line of this program's version has an event which this version does not have, or None."""
+    if version != study_app.__version__ or line["event"] in EVENT_NAMES:
+        return None
+    return f"has an event {shortened(line['event'])}, which version {version} does not write"
 
 
 def _break(line: Line, before: str, *, chained: bool) -> str | None:

@@ -33,6 +33,8 @@ from study_app.store.recorder import Lost, Recorded, event_of, recording_files
 from study_app.store.session import make_recorder, surroundings
 
 SHOWN_DIFFERENCES = 6
+MOST_GAP_S = 366 * 86400.0
+"""A wall clock that tells of a longer gap was wrong before it, or is now."""
 
 
 def reopen(
@@ -49,8 +51,8 @@ def reopen(
     """Open an unfinished session to go on with it; ``progress.progress_of(store.lines)`` says where.
 
     A torn tail of the journal is moved to a file of its own, half-written files are taken away, and
-    ``session_resumed`` is journalled with the gap since the last line (null where the wall clock was set back, so that
-    nobody knows). The session's clock goes on from there, so that its times never go back.
+    ``session_resumed`` is journalled with the gap since the last line (null where the wall clock was set back or
+    is wrong by years, so that nobody knows). The session's clock goes on from there, so that its times never go back.
 
     Parameters
     ----------
@@ -176,9 +178,10 @@ def _go_on(lines: list[Line], now_ns: Callable[[], int], now: datetime | None) -
     """Return the gap since the last line, if it is known [s], and the clock that goes on after it."""
     now = now if now is not None else datetime.now().astimezone()
     gap_s = (now - datetime.fromisoformat(lines[-1]["at"])).total_seconds()
-    shown_s = progress_of(lines).t_s + max(gap_s, 0.0)
+    known = 0 <= gap_s <= MOST_GAP_S
+    shown_s = progress_of(lines).t_s + (gap_s if known else 0.0)
     clock = SessionClock(now_ns, now - timedelta(seconds=shown_s), shown_s=shown_s)
-    return (round(gap_s, 3) if gap_s >= 0 else None), clock
+    return (round(gap_s, 3) if known else None), clock
 
 
 def _sweep(folder: SessionFolder) -> None:

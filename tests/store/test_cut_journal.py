@@ -11,11 +11,13 @@ import pytest
 from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
 from study_app.store import receipt
+from study_app.store.journal import scan
 from study_app.store.rebuild import rebuild
 from study_app.store.resume import check_can_go_on
 from study_app.store.session import SessionStore
 from study_app.store.verify import verify
 from tests.store.conftest import SOURCE
+from tests.store.forging import Lines, forge
 
 Attend = Callable[[SessionStore], None]
 
@@ -113,3 +115,40 @@ def test_a_table_with_a_trial_more_or_that_is_no_table_stops_neither(folder: Pat
         table.write_bytes(content)
         check_can_go_on(folder, protocol, SOURCE)
         assert table in rebuild(folder).rewritten
+
+
+def renamed(folder: Path, **of_start: str) -> None:
+    """Rename the event of the last answers; the session's first line is another version's, where that is given."""
+
+    def change(lines: Lines) -> None:
+        last = max(index for index, line in enumerate(lines) if line["event"] == "responses")
+        lines[last]["event"] = "sesponses"
+        lines[0].update(of_start)
+        if lines[-1]["event"] == "session_ended":
+            del lines[-1]
+
+    forge(folder / "journal.jsonl", change)
+
+
+def test_an_event_that_the_writing_version_did_not_have_is_damage(folder: Path, protocol: Protocol) -> None:
+    renamed(folder)
+    assert "has an event 'sesponses', which version" in str(scan(folder / "journal.jsonl").damage)
+    assert not verify(folder.parents[2]).sound
+    for act in (lambda: rebuild(folder), lambda: check_can_go_on(folder, protocol, SOURCE)):
+        with pytest.raises(StoreError, match="was changed; restore it from a copy"):
+            act()
+
+
+def test_a_session_with_events_of_another_version_is_left_alone_by_this_one(folder: Path, protocol: Protocol) -> None:
+    renamed(folder, version="99.0")
+    path = folder / "receipt.json"
+    receipt.write(path, receipt.read(path) | {"version": "99.0"})
+    never_ended(folder)
+    assert scan(folder / "journal.jsonl").damage is None
+    before = every_byte(folder)
+    for act in (lambda: rebuild(folder), lambda: check_can_go_on(folder, protocol, SOURCE)):
+        with pytest.raises(
+            StoreError, match="has events 'sesponses', which this version does not know: use the version"
+        ):
+            act()
+    assert every_byte(folder) == before

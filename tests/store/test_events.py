@@ -40,6 +40,7 @@ def test_whatever_the_store_writes_is_in_the_dictionary(
         (line("weather") | {"t_s": True}, "(weather) holds t_s True, expected: number"),
         (line("weather") | {"t_s": 1e300}, "(weather) has t_s 1e+300"),
         (line("weather") | {"t_s": -1.0}, "(weather) has t_s -1"),
+        (line("weather", trial=[]), "(weather) holds trial [], expected: integer"),
         ({"n": 4, "event": ["note"]}, "names no event"),
         (line("page_shown", page=["consent"]), "(page_shown) holds page ['consent'], expected: text"),
         (line("choice", trial="1", item="calm", value=3), "holds trial '1', expected: integer"),
@@ -57,6 +58,6 @@ def test_what_is_wrong_with_a_line_is_named(held: dict[str, Any], sentence: str)
 
 
 def test_an_event_of_another_version_is_told_once_and_lacks_nothing() -> None:
-    lines = [line("weather", trial="x"), line("note", kind="note", text=""), line("weather")]
+    lines = [line("weather", wind="x"), line("note", kind="note", text=""), line("weather")]
     assert list(unknown_events(lines)) == ["weather"]
     assert [problem(each) for each in lines] == [None] * 3

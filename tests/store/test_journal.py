@@ -3,6 +3,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import json
+import re
 import subprocess
 import sys
 import threading
@@ -209,7 +210,7 @@ def test_a_line_that_nobody_waits_for_is_flushed_behind_and_in_order(disk: Disk)
     journal = Journal.create(disk.path)
     before = disk.mine  # the folder's entry
     disk.free.clear()  # no flush ends
-    written = [journal.append("seen", waits=False, item=number) for number in range(9)]
+    written = [journal.append("seen", waits=False, count=number) for number in range(9)]
     assert read(disk.path) == written
     assert disk.mine == before
     disk.free.set()
@@ -305,6 +306,23 @@ def test_a_power_cut_takes_no_answer_and_leaves_no_hole(
     assert left.damage is None
     assert left.lines == kept[: len(left.lines)]
     assert len(left.lines) >= answers
+
+
+@pytest.mark.parametrize(
+    ("told", "sentence"),
+    [
+        ({"t_s": -0.001}, "(note) has t_s -0.001"),
+        ({"t_s": 1e10}, "(note) has t_s 1e+10"),
+        ({"kind": 3}, "(note) holds kind 3, expected: text"),
+    ],
+)
+def test_what_a_reader_would_call_damage_is_not_written(tmp_path: Path, told: dict[str, Any], sentence: str) -> None:
+    path = tmp_path / "journal.jsonl"
+    with Journal.create(path) as journal:
+        with pytest.raises(StoreError, match=re.escape(f"line 1 {sentence}")):
+            journal.append("note", **({"kind": "note", "text": "x"} | told))
+        journal.append("note", kind="note", text="kept")
+    assert [line["text"] for line in read(path)] == ["kept"]
 
 
 def test_after_its_end_it_takes_nothing(tmp_path: Path) -> None:
@@ -437,9 +455,9 @@ json_values = st.recursive(
 def test_any_value_comes_back(tmp_path_factory: pytest.TempPathFactory, value: Any) -> None:
     path = tmp_path_factory.mktemp("journal") / "journal.jsonl"
     with Journal.create(path) as journal:
-        journal.append("said", text=AWKWARD, value=value)
+        journal.append("said", text=AWKWARD, said=value)
         journal.append("said", text="")
-    assert [(line["text"], line.get("value")) for line in read(path)] == [(AWKWARD, value), ("", None)]
+    assert [(line["text"], line.get("said")) for line in read(path)] == [(AWKWARD, value), ("", None)]
     assert path.read_bytes().count(b"\n") == 2
 
 

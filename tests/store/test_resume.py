@@ -117,6 +117,27 @@ def test_times_never_go_back_whatever_the_clocks_do(start: Callable[..., Session
     assert datetime.fromisoformat(line["at"]) - set_back < timedelta(seconds=1)
 
 
+@pytest.mark.parametrize("at", [None, "0001-01-01T00:00:00.000+01:00", "9999-12-31T23:59:59.000-01:00"])
+def test_a_gap_that_no_session_has_is_unknown_and_locks_nothing(
+    start: Callable[..., SessionStore], again: Again, at: str | None
+) -> None:
+    """The wall clock was at 1970 before, or is decades ahead now; or a moment was changed."""
+    with start() as store:
+        store.append("page_shown", t_s=40.0, page="consent")
+    now = datetime.fromisoformat(store.lines[-1]["at"]) + timedelta(days=40 * 365)
+    if at is not None:
+        path = store.folder.journal
+        path.write_bytes(path.read_bytes().replace(store.lines[-1]["at"].encode(), at.encode()))
+        with pytest.raises(StoreError, match=r"holds at .* expected: time"):
+            again()
+        return
+    for _ in range(2):
+        with again(now=now) as resumed:
+            resumed.append("page_left", page="consent")
+        assert (resumed.lines[-2]["gap_s"], resumed.lines[-2]["t_s"] < 41) == (None, True)
+        now += timedelta(days=40 * 365)
+
+
 def test_the_receipt_tells_what_it_goes_on_with(start: Callable[..., SessionStore], again: Again) -> None:
     with start() as store:
         before = receipt.read(store.folder.receipt)

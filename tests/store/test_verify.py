@@ -236,6 +236,8 @@ def test_what_should_be_known_is_a_warning(study: Path, start: Callable[..., Ses
         for trial in (1, 2):
             store.append("trial_started", trial=trial, attempt=1, **told_of)
         store.append("recording_lost", trial=1, attempt=1, reason="No space left on device")
+        later = {"operator": "AB", "device": "mouse", "version": "99.0"}
+        store.append("session_resumed", gap_s=None, torn_bytes=0, **later)
         store.append("weather", sky="blue")
         store.write_tables()
     with store.folder.journal.open("ab") as file:
