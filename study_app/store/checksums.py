@@ -10,7 +10,7 @@ from pathlib import Path
 
 import study_app
 from study_app.errors import StoreError
-from study_app.store.atomic import append_line, cannot_read, paths_in, write_file
+from study_app.store.atomic import append_line, cannot_read, paths_in, read_own, study_root, write_file
 from study_app.store.layout import REBUILT, SessionFolder
 
 _LINE = re.compile(r"([0-9a-f]{64})  (.+)")
@@ -89,9 +89,7 @@ def read_checksums(session: SessionFolder) -> dict[str, str]:
         The list cannot be read, or is none.
     """
     try:
-        text = session.checksums.read_text(encoding="utf-8")
-    except OSError as error:
-        raise cannot_read(session.checksums, error) from error
+        text = read_own(session.checksums, study_root(session.checksums)).decode("utf-8")
     except UnicodeDecodeError as error:
         raise StoreError(f"{session.checksums} is no list of checksums: restore it from a copy") from error
     found: dict[str, str] = {}

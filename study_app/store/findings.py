@@ -44,7 +44,7 @@ class Gathered:
 
     def failure(self, path: Path, error: StoreError) -> None:
         """Add an error that stopped us reading ``path``, which is named once."""
-        self.error(path, str(error).removeprefix(str(path)).lstrip(" ,:"))
+        self.error(path, str(error).removeprefix(str(path)).lstrip(" ,:/"))
 
     def warning(self, path: Path, message: str) -> None:
         """Add what should be known of ``path``."""

@@ -42,10 +42,13 @@ def opened_or_none(folder: StudyFolder) -> Key | None:
 
 def row_of(session: SessionFolder, key: Key | None) -> list[tables.Row]:
     """Return the row of one session; none if it has not begun. ``key`` is the study's once it was opened."""
-    contents = journal.scan(session.journal) if is_there(session.journal) else journal.Contents([], 0)
-    if not contents.lines:
-        return [] if never_begun(session.path) else [_damaged(session, {})]
-    return [row_from(session, contents, key)]
+    try:
+        contents = journal.scan(session.journal) if is_there(session.journal) else journal.Contents([], 0)
+        if not contents.lines and never_begun(session.path):
+            return []
+    except StoreError:  # one session that cannot be read must not stop the others
+        return [_damaged(session, {})]
+    return [row_from(session, contents, key) if contents.lines else _damaged(session, {})]
 
 
 def row_from(session: SessionFolder, contents: journal.Contents, key: Key | None) -> tables.Row:
@@ -79,7 +82,7 @@ def write_participants(folder: StudyFolder, study: str, known: Mapping[Path, tab
     Raises
     ------
     StoreError
-        The table cannot be written, or a journal cannot be read.
+        The table cannot be written.
     """
     path = folder.participants(study)
     content = tables.csv_bytes(PARTICIPANTS, participants(folder, known))

@@ -42,7 +42,9 @@ LOOKS = 20
 BETWEEN_S = 0.05
 
 _BEGUN = "though receipt, tables, recordings or checksums show that the session was begun: restore it from a copy"
-_NOT_YET = frozenset({MISSING, "false"})  # cells of a trial that later events fill
+_COUNTED = frozenset(
+    {"status", "session_ended_at", "resumed", "language", "trials", "responses", "validity"}
+)  # columns of a session that later events change
 NOTHING = Contents([], 0)
 READERS = 4  # files whose checksums are computed at the same time
 
@@ -70,7 +72,9 @@ def check_session(place: Place, key: Key | None, found: Gathered) -> Checked:
     folder = place.folder
     for _ in range(LOOKS):
         before, seen = _state(folder), found.alike()
-        checked = _look(place, key, seen)
+        checked = Checked(place, readable=False, running=False)
+        with seen.reading(folder.path):
+            checked = _look(place, key, seen)
         if not seen.errors or _state(folder) == before:
             break
         time.sleep(BETWEEN_S)
@@ -251,23 +255,36 @@ def check_table(
         return
     expected, columns = tables.in_columns_of(content, expected, TABLES[name])
     if differing := _differing_lines(content, expected):
-        behind = all(map(may_be_behind, differing)) and (name == "participants" or _is_behind(content, expected))
+        behind = all(map(may_be_behind, differing)) and _is_behind(content, expected, name)
         tell = found.warning if behind else found.error
         tell(path, f"is not what the journal gives, from line {differing[0]} on; rebuild renews it")
     for problem in cells.problems(content, columns):
         found.error(path, problem)
 
 
-def _is_behind(held: bytes, expected: bytes) -> bool:
+def _is_behind(held: bytes, expected: bytes, table: str) -> bool:
     """Return whether a table ``held`` may be an earlier state of ``expected``: it tells nothing that this does not."""
-    theirs, ours = (list(csv.reader(io.StringIO(table.decode("utf-8", "replace")))) for table in (held, expected))
+    try:
+        theirs, ours = (
+            list(csv.reader(io.StringIO(content.decode("utf-8", "replace"), newline=""), strict=True))
+            for content in (held, expected)
+        )
+    except csv.Error:
+        return False
     if len(theirs) > len(ours) or theirs[:1] != ours[:1]:
         return False
     return all(
-        here == there or here in _NOT_YET or (name == "notes" and there.startswith(here))
+        here == there or _may_lag(table, name, here, there)
         for early, late in zip(theirs, ours, strict=False)
         for name, here, there in zip_longest(ours[0], early, late, fillvalue="")
     )
+
+
+def _may_lag(table: str, name: str, here: str, there: str) -> bool:
+    """Return whether a cell ``here`` may become ``there`` with later events of its session."""
+    if table == "participants":
+        return name in _COUNTED
+    return here == MISSING or (name, here) == ("marked", "false") or (name == "notes" and there.startswith(here))
 
 
 def _differing_lines(content: bytes, expected: bytes) -> list[int]:

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from study_app.errors import StoreError
+from study_app.gui.sessions.facts import sessions
 from study_app.store import journal, participants
 from study_app.store.layout import StudyFolder
 from study_app.store.rebuild import rebuild
@@ -119,3 +120,40 @@ def test_of_two_programs_the_last_to_write_has_seen_both(
     monkeypatch.setattr(participants, "write_file", late)
     store.finish("completed")
     assert [row["status"] for row in table(tmp_path / "study")] == ["completed", "withdrawn"]
+
+
+def into_a_folder(path: Path) -> None:
+    path.unlink()
+    path.mkdir()
+
+
+def into_a_link_to_itself(path: Path) -> None:
+    path.unlink()
+    path.symlink_to(path)
+
+
+def into_a_link_out_of_the_study(path: Path) -> None:
+    path.symlink_to(path.rename(path.parents[4] / "elsewhere"))
+
+
+@pytest.mark.parametrize("name", ["journal.jsonl", "checksums.sha256", "receipt.json"])
+@pytest.mark.parametrize("turn", [into_a_folder, into_a_link_to_itself, into_a_link_out_of_the_study])
+def test_a_file_that_cannot_be_read_hides_no_session_and_stops_none(
+    tmp_path: Path,
+    start: Callable[..., SessionStore],
+    attend: Callable[[SessionStore], None],
+    turn: Callable[[Path], None],
+    name: str,
+) -> None:
+    store = start("P001")
+    attend(store)
+    store.finish("completed")
+    turn(store.folder.path / name)
+    start("P002").finish("completed")
+    there = "damaged" if name == "journal.jsonl" else "completed"
+    assert [row["status"] for row in table(tmp_path / "study")] == [there, "completed"]
+    assert [one.participant for one in sessions(tmp_path, {})] == ["P001", "P002"]
+    findings = verify(tmp_path / "study")
+    assert findings.sessions == 2
+    assert any("P001/ses-01" in str(error) and name in str(error) for error in findings.errors)
+    assert not any("P002" in str(error) for error in findings.errors)

@@ -311,6 +311,30 @@ def test_tables_of_a_session_that_has_not_ended_may_be_behind_its_journal(
     assert f"{PARTICIPANTS}: is not what the journal gives" in told(verify(study))
 
 
+@pytest.mark.parametrize(
+    ("name", "old", "new"),
+    [
+        (PARTICIPANTS, "P000,1,", "P999,1,"),
+        (PARTICIPANTS, "P000,1,false", "P000,1,true"),
+        (PARTICIPANTS, "unfinished", "unfinished\r"),
+        ("data/sub-P000/ses-01/*trials_data.csv", "complete", "com\rplete"),
+    ],
+)
+def test_a_table_of_a_session_that_has_not_ended_tells_nothing_else_than_its_journal(
+    study: Path, start: Callable[..., SessionStore], summary: dict[str, Any], name: str, old: str, new: str
+) -> None:
+    """Nor does a table that is no CSV end in a traceback."""
+    told_of = {"block": "b", "phase": "main", "part": 1, "index": 1, "of": 1, "code": "L1"}
+    with start("P000") as store:
+        store.append("trial_started", trial=1, attempt=1, **told_of)
+        store.append("trial_ended", trial=1, attempt=1, outcome="complete", **summary)
+        store.write_tables()
+    assert verify(study).errors == ()
+    (path,) = study.glob(name)
+    replace(old, new)(path)
+    assert f"{path.relative_to(study).as_posix()}: is not what the journal gives" in told(verify(study))
+
+
 def test_a_trial_without_its_recording_is_known_at_the_end(study: Path, start: Callable[..., SessionStore]) -> None:
     store = start("P009", recordings=True)
     told_of = {"block": "b", "phase": "main", "part": 1, "index": 1, "of": 1, "code": "L1"}
