@@ -15,6 +15,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from study_app.errors import AnalysisError
+from study_app.store.atomic import read_regular
 from study_app.store.columns import LATER, MISSING, SEALED, Column, Kind, columns_held, header
 from study_app.store.parsing import parse_json
 
@@ -63,7 +64,7 @@ def rows(path: Path, columns: tuple[Column, ...]) -> list[list[str]]:
         They are not, or the file cannot be read.
     """
     try:
-        text = path.read_bytes().decode("utf-8")
+        text = read_regular(path).decode("utf-8")
         found = list(csv.reader(io.StringIO(text, newline=""), strict=True))
     except OSError as error:
         why = error.strerror or type(error).__name__
@@ -99,7 +100,7 @@ def document(path: Path) -> dict[str, Any]:
         It cannot be read or is none.
     """
     try:
-        found = parse_json(path.read_bytes())
+        found = parse_json(read_regular(path))
     except OSError as error:
         raise unreadable(path, error) from error
     except ValueError as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import re
 import secrets
@@ -11,6 +12,7 @@ import stat
 import sys
 import time
 from collections.abc import Mapping
+from io import BufferedReader
 from pathlib import Path
 from typing import BinaryIO
 
@@ -221,6 +223,19 @@ def cannot_read(path: Path, error: OSError) -> StoreError:
     return StoreError(f"{path} cannot be read ({cause(error)}): mend permissions, or restore it from a copy")
 
 
+def open_regular(path: Path) -> BufferedReader:
+    """Open a file to read it; a folder, and a device or pipe, which may have no end, is an OSError."""
+    if not stat.S_ISREG(path.stat().st_mode):
+        raise OSError(errno.EINVAL, "it is no file")
+    return path.open("rb")
+
+
+def read_regular(path: Path) -> bytes:
+    """Return the content of a file; as `open_regular`."""
+    with open_regular(path) as file:
+        return file.read()
+
+
 def read_own(path: Path, root: Path) -> bytes:
     """Return the content of a file that must lie under ``root``, wherever links lead.
 
@@ -233,9 +248,7 @@ def read_own(path: Path, root: Path) -> bytes:
         real = path.resolve(strict=True)
         if not real.is_relative_to(root.resolve()):
             raise StoreError(f"{path} leads out of {root}, to {real}: put the file itself there")
-        if not stat.S_ISREG(real.stat().st_mode):
-            raise StoreError(f"{path} is no file: restore it from a copy")
-        return real.read_bytes()
+        return read_regular(real)
     except OSError as error:
         raise cannot_read(path, error) from error
     except RuntimeError as error:  # a loop of links

@@ -24,7 +24,7 @@ from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
 from study_app.protocol.schedule import block_codes, draw_key
 from study_app.store import journal, receipt
-from study_app.store.atomic import append_line, cannot_read, create_folder, is_there, read_own
+from study_app.store.atomic import append_line, create_folder, is_there, read_own
 from study_app.store.events import holds
 from study_app.store.layout import SessionFolder, StudyFolder
 from study_app.store.parsing import parse_json
@@ -188,13 +188,9 @@ def unreadable_reveals(folder: Path) -> tuple[tuple[int, bool], ...]:
 def _reveal_lines(folder: Path) -> Iterator[tuple[int, bytes, dict[str, str] | None]]:
     """Yield number, line and record of every line that is not empty."""
     path = StudyFolder(folder).reveals
-    try:
-        content = path.read_bytes()
-    except FileNotFoundError:
+    if not is_there(path):
         return
-    except OSError as error:
-        raise cannot_read(path, error) from error
-    for number, line in enumerate(content.split(b"\n"), start=1):
+    for number, line in enumerate(read_own(path, folder).split(b"\n"), start=1):
         try:
             record = parse_json(line)
         except ValueError:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import study_app
 from study_app.errors import StoreError
-from study_app.store.atomic import append_line, cannot_read, paths_in, read_own, study_root, write_file
+from study_app.store.atomic import append_line, cannot_read, open_regular, paths_in, read_own, study_root, write_file
 from study_app.store.layout import REBUILT, SessionFolder
 
 _LINE = re.compile(r"([0-9a-f]{64})  (.+)")
@@ -125,7 +125,7 @@ def sha256(path: Path) -> str:
         It cannot be read.
     """
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
     except OSError as error:
         raise cannot_read(path, error) from error

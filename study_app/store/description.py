@@ -8,12 +8,11 @@ from __future__ import annotations
 
 import contextlib
 import json
-from pathlib import Path
 
 from study_app.errors import StoreError
 from study_app.protocol.model import StudyHead
 from study_app.protocol.texts import text_in
-from study_app.store.atomic import cannot_read, is_there, write_file
+from study_app.store.atomic import is_there, read_own, write_file
 from study_app.store.blinding import reveals
 from study_app.store.columns import LATER, SEALED, every_column, variable
 from study_app.store.layout import StudyFolder
@@ -72,7 +71,7 @@ def write_description(folder: StudyFolder, study: StudyHead) -> None:
     Until the key is opened it lacks the sealed columns, unless an earlier version of the program described them: then
     tables have them.
     """
-    held = _read(folder.description) if is_there(folder.description) else b""
+    held = read_own(folder.description, folder.path) if is_there(folder.description) else b""
     content = description_bytes(study, sealed=not (reveals(folder.path) or names_sealed(held)))
     if held != content:
         write_file(folder.description, content)
@@ -98,7 +97,7 @@ def described_study(folder: StudyFolder) -> str | None:
     if not is_there(folder.description):
         return None
     try:
-        return check_study_name(parse_json(_read(folder.description))["name"])
+        return check_study_name(parse_json(read_own(folder.description, folder.path))["name"])
     except (ValueError, KeyError, TypeError) as error:
         raise StoreError(f"{folder.description} describes no study: is {folder.path} a results folder?") from error
 
@@ -124,10 +123,3 @@ def check_study(folder: StudyFolder, study: str) -> None:
             f"{folder.path} holds folders of studies ({', '.join(within[:3])}{' ...' if within[3:] else ''}): use one "
             f"of these or a new one beside them, such as {folder.path / study}"
         )
-
-
-def _read(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise cannot_read(path, error) from error

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from study_app.errors import StoreError
 from study_app.store import journal
-from study_app.store.atomic import is_there
+from study_app.store.atomic import cause, is_there, read_regular
 from study_app.store.checksums import hashed, read_checksums
 from study_app.store.columns import TABLES
 from study_app.store.journal import Contents
@@ -100,8 +100,16 @@ def _as_ended(place: Place) -> bool:
 def _changed(place: Place, listed: Mapping[str, str]) -> Iterator[Path]:
     """Yield journal, receipt and tables that are not those the checksums are of; a missing one is said elsewhere."""
     for name, path in _behind(place).items():
-        if name in listed and is_there(path) and hashed(place.folder, name) != listed[name]:
+        if name in listed and is_there(path) and _hash(place, name) != listed[name]:
             yield path
+
+
+def _hash(place: Place, name: str) -> str:
+    """Return the checksum of a file; none where it cannot be read."""
+    try:
+        return hashed(place.folder, name)
+    except StoreError:
+        return ""
 
 
 def _behind(place: Place) -> dict[str, Path]:
@@ -118,11 +126,18 @@ def _tables(place: Place, contents: Contents, restore: str) -> Iterator[Doubt]:
     except (StoreError, KeyError) as error:
         yield Doubt(place.folder.journal, f"gives no tables ({error})", restore)
         return
+    again = f"liquid-study rebuild {place.folder.path} makes it again from the journal"
     for (path, whole), name in zip(expected, ("responses", "trials"), strict=True):
-        there = path.read_bytes() if is_there(path) else b""
+        try:
+            there = read_regular(path)
+        except FileNotFoundError:
+            yield Doubt(path, "is missing", again)
+            continue
+        except OSError as error:
+            yield Doubt(path, f"cannot be read ({cause(error)})", restore)
+            continue
         content, _ = in_columns_of(there, whole, TABLES[name])
         if there != content:
             pairs = zip_longest(there.split(b"\n"), content.split(b"\n"))
             line = next(number for number, (ours, theirs) in enumerate(pairs, start=1) if ours != theirs)
-            what = f"is not what the journal gives, from line {line} on" if is_there(path) else "is missing"
-            yield Doubt(path, what, f"liquid-study rebuild {place.folder.path} makes it again from the journal")
+            yield Doubt(path, f"is not what the journal gives, from line {line} on", again)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from study_app.errors import StoreError
 from study_app.store import journal
-from study_app.store.atomic import cannot_read, write_file
+from study_app.store.atomic import cannot_read, read_regular, write_file
 from study_app.store.columns import EXCLUSIONS, MISSING, header
 from study_app.store.formulas import guarded, unguarded
 from study_app.store.layout import StudyFolder
@@ -93,7 +93,7 @@ def exclusions(folder: Path) -> tuple[Exclusion, ...]:
     """
     path = StudyFolder(folder).exclusions
     try:
-        text = without_mark(path.read_bytes()).decode("utf-8")
+        text = without_mark(read_regular(path)).decode("utf-8")
         names, *rows = list(csv.reader(io.StringIO(text, newline=""))) or [[]]
     except FileNotFoundError:
         return ()

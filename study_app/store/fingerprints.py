@@ -14,7 +14,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from study_app.errors import StoreError
-from study_app.store.atomic import append_line, cannot_read
+from study_app.store.atomic import append_line, cannot_read, read_regular
 from study_app.store.checksums import checksum_bytes
 from study_app.store.layout import REBUILT, SessionFolder, StudyFolder
 
@@ -85,7 +85,7 @@ def read_copy(path: Path) -> tuple[tuple[str, str], ...]:
 
 def _lines(path: Path) -> Iterator[tuple[int, re.Match[str] | None]]:
     try:
-        text = path.read_bytes().decode("utf-8-sig", "replace")
+        text = read_regular(path).decode("utf-8-sig", "replace")
     except FileNotFoundError:
         return
     except OSError as error:

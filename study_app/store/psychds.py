@@ -16,7 +16,7 @@ from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from study_app.store.atomic import cannot_read, paths_in
+from study_app.store.atomic import cannot_read, paths_in, read_regular
 from study_app.store.parsing import parse_json
 
 Metadata: TypeAlias = Mapping[str, Any]
@@ -251,6 +251,6 @@ def _json(path: Path) -> Any:
 
 def _content(path: Path) -> bytes:
     try:
-        return path.read_bytes()
+        return read_regular(path)
     except OSError as error:
         raise cannot_read(path, error) from error

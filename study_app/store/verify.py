@@ -17,7 +17,7 @@ from typing import Any, TypeAlias
 from study_app.errors import StoreError
 from study_app.protocol.model import StudyHead
 from study_app.store import blinding, cells, exclusions, psychds, receipt, tables
-from study_app.store.atomic import is_there, temporaries
+from study_app.store.atomic import is_there, read_own, read_regular, temporaries
 from study_app.store.blinding import Key
 from study_app.store.columns import EXCLUSIONS, PARTICIPANTS
 from study_app.store.description import described_study, describes_alike, description_bytes, names_sealed
@@ -192,14 +192,15 @@ def _left(one: Checked) -> Checked:
 
 def _description(study: StudyFolder, found: Gathered) -> None:
     """Compare the description with what this version writes for the study as one of the receipts has it."""
-    sealed = not (blinding.reveals(study.path) or names_sealed(study.description.read_bytes()))
+    held = read_own(study.description, study.path)
+    sealed = not (blinding.reveals(study.path) or names_sealed(held))
     heads: set[bytes] = set()
     for protocol in _published(study):
         with contextlib.suppress(KeyError, TypeError, ValueError):  # said of the receipt already
             heads.add(description_bytes(StudyHead.model_validate(protocol["study"]), sealed=sealed))
-    if not heads or study.description.read_bytes() in heads:
+    if not heads or held in heads:
         return
-    if any(describes_alike(study.description.read_bytes(), head) for head in heads):
+    if any(describes_alike(held, head) for head in heads):
         found.warning(study.description, "describes the columns as an earlier version of the program did")
     else:
         found.error(study.description, "is not what this version writes for the study in the receipts")
@@ -219,7 +220,7 @@ def _exclusions(study: StudyFolder, sessions: Sessions, found: Gathered) -> None
         rows = exclusions.exclusions(study.path)
         if not is_there(study.exclusions):
             return
-        for problem in cells.problems(exclusions.without_mark(study.exclusions.read_bytes()), EXCLUSIONS):
+        for problem in cells.problems(exclusions.without_mark(read_regular(study.exclusions)), EXCLUSIONS):
             found.error(study.exclusions, problem)
         trials = {(one.place.folder.participant, one.place.folder.number): one.trials for one in sessions}
         for row in rows:

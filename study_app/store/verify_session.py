@@ -20,7 +20,7 @@ from typing import Any
 from study_app.errors import StoreError
 from study_app.store import cells, journal, receipt, tables
 from study_app.store.abandoned import never_begun
-from study_app.store.atomic import is_there, paths_in, temporaries
+from study_app.store.atomic import is_there, paths_in, read_own, read_regular, study_root, temporaries
 from study_app.store.blinding import Key
 from study_app.store.checksums import files, read_checksums, sha256
 from study_app.store.columns import MISSING, TABLES
@@ -212,8 +212,10 @@ def _answers(folder: SessionFolder, lines: list[Line], found: Gathered) -> None:
 
 def _rebuilt(folder: SessionFolder, found: Gathered) -> None:
     """Say that the proof of a session was made again after its end."""
-    with contextlib.suppress(FileNotFoundError):
-        for line in folder.rebuilt.read_text(encoding="utf-8", errors="replace").splitlines():
+    if not is_there(folder.rebuilt):
+        return
+    with found.reading(folder.rebuilt):
+        for line in read_own(folder.rebuilt, study_root(folder.rebuilt)).decode("utf-8", "replace").splitlines():
             found.warning(folder.rebuilt, f"{shortened(line)}; only a copy of {FINGERPRINTS} proves more")
 
 
@@ -249,7 +251,7 @@ def check_table(
     journal with the next page or when it is rebuilt.
     """
     try:
-        content = path.read_bytes()
+        content = read_regular(path)
     except OSError:
         found.error(path, "is missing or cannot be read; rebuild makes it again")
         return

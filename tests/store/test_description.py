@@ -87,7 +87,7 @@ def test_a_description_that_cannot_be_read_is_named(tmp_path: Path, protocol: Pr
     folder = StudyFolder(tmp_path)
     folder.description.mkdir()
     for attempt in (lambda: check_study(folder, "brackish"), lambda: write_description(folder, protocol.study)):
-        with pytest.raises(StoreError, match=r"dataset_description\.json cannot be read \(Is a directory\)"):
+        with pytest.raises(StoreError, match=r"dataset_description\.json cannot be read \(it is no file\)"):
             attempt()
 
 

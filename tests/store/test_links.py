@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -97,3 +99,47 @@ def test_an_empty_name_to_write_to_is_refused(command: str) -> None:
     done = CliRunner().invoke(commands, [command, "results", "--to", ""])
     assert done.exit_code == 2
     assert "is empty: name a file or folder" in done.output
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="has no such device")
+@pytest.mark.parametrize(
+    "name",
+    [
+        "dataset_description.json",
+        "blinding/reveals.jsonl",
+        "blinding/key.sealed",
+        "fingerprints.txt",
+        "exclusions.csv",
+        "data/study-brackish_description-participants_data.csv",
+        "data/sub-P007/ses-01/checksums.sha256",
+        "data/sub-P007/ses-01/rebuilt.txt",
+        "data/sub-P007/ses-01/subject-P007_session-01_task-brackish_description-trials_data.csv",
+    ],
+)
+def test_an_endless_device_is_never_read(tmp_path: Path, finished: SessionStore, name: str) -> None:
+    """Neither by `verify` nor by what looks for doubts, each of which says what is wrong."""
+    path = tmp_path / "study" / name
+    path.unlink(missing_ok=True)
+    path.symlink_to("/dev/zero")
+    program = (
+        "import resource, sys\n"
+        "from pathlib import Path\n"
+        "from study_app.errors import StudyError\n"
+        "from study_app.store.doubts import doubts\n"
+        "from study_app.store.layout import StudyFolder\n"
+        "from study_app.store.open_session import Place\n"
+        "from study_app.store.verify import verify\n"
+        "resource.setrlimit(resource.RLIMIT_CPU, (20, 20))\n"
+        "resource.setrlimit(resource.RLIMIT_DATA, (2**30, 2**30))\n"
+        "study = StudyFolder(Path(sys.argv[1]))\n"
+        "try:\n"
+        "    print([str(doubt) for one in study.sessions() for doubt in doubts(Place(study, one, 'brackish'))])\n"
+        "    print(*verify(study.path).errors)\n"
+        "except StudyError as error:\n"
+        "    print(error)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program, tmp_path / "study"], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert path.name in done.stdout

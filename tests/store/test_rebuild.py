@@ -95,6 +95,16 @@ def test_a_session_without_a_fingerprint_gets_it_with_a_note(tmp_path: Path, end
     assert rebuild(ended.folder.path).rewritten == ()
 
 
+@pytest.mark.parametrize("name", ["responses", "trials"])
+def test_a_folder_under_a_tables_name_is_a_doubt(ended: SessionStore, name: str) -> None:
+    path = ended.folder.table("brackish", name)
+    path.unlink()
+    path.mkdir()
+    (doubt,) = doubts(ended.place)
+    assert doubt.path == path
+    assert "cannot be read" in str(doubt)
+
+
 @pytest.mark.parametrize("name", ["journal.jsonl", "receipt.json", "mood.txt"])
 def test_a_changed_or_added_file_is_never_vouched_for(tmp_path: Path, ended: SessionStore, name: str) -> None:
     """Making tables again must not hide that something else has changed since the session ended."""
