@@ -53,16 +53,23 @@ def description_bytes(study: StudyHead, *, sealed: bool) -> bytes:
 
 
 def describes_alike(content: bytes, expected: bytes) -> bool:
-    """Return whether a description says the same of the study, and names the same columns but for `LATER`.
+    """Return whether a description says the same of the study, and of the same columns but for `LATER`.
 
-    Earlier versions of the program lack columns, and describe others in other words.
+    Earlier versions of the program lack columns, and describe others in other words; units, ranges and levels are the
+    same in all.
     """
     try:
-        found, wanted = json.loads(content), json.loads(expected)
-        names, wanted_names = ([variable["name"] for variable in it.pop("variableMeasured")] for it in (found, wanted))
+        found, wanted = parse_json(content), parse_json(expected)
+        columns, wanted_columns = (
+            [(variable["name"], variable | {"description": ""}) for variable in it.pop("variableMeasured")]
+            for it in (found, wanted)
+        )
     except (AttributeError, KeyError, TypeError, ValueError):
         return False
-    return bool(found == wanted and names == [name for name in wanted_names if name in names or name not in LATER])
+    names = [name for name, _ in columns]
+    return bool(
+        found == wanted and columns == [one for one in wanted_columns if one[0] in names or one[0] not in LATER]
+    )
 
 
 def write_description(folder: StudyFolder, study: StudyHead) -> None:

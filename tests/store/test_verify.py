@@ -436,8 +436,18 @@ def test_a_description_of_an_earlier_version_is_a_warning_and_a_column_it_never_
     findings = verify(study)
     assert not any(error.place == path.name for error in findings.errors)
     assert "describes the columns as an earlier version of the program did" in warned(findings)
-    path.write_text(json.dumps(content | {"variableMeasured": variables[1:]}))
-    assert "is not what this version writes" in told(verify(study))
+    at = next(index for index, it in enumerate(variables) if "minValue" in it and "unitText" in it)
+    for change in (
+        {"minValue": -5},
+        {"maxValue": 7},
+        {"unitText": "mile"},
+        {"valuePattern": "x"},
+        {"@type": "y"},
+        None,
+    ):
+        changed = variables[1:] if change is None else [*variables[:at], variables[at] | change, *variables[at + 1 :]]
+        path.write_text(json.dumps(content | {"variableMeasured": changed}))
+        assert "is not what this version writes" in told(verify(study))
 
 
 def test_damaged_lines_at_the_end_are_an_error(study: Path, start: Callable[..., SessionStore]) -> None:
