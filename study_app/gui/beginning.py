@@ -15,8 +15,8 @@ from study_app.gui.choices import NewSession
 from study_app.gui.machine import Machine
 from study_app.protocol.model import Protocol
 from study_app.session.preflight import Facts, Screen
+from study_app.store.clock import SessionClock
 from study_app.store.description import check_study
-from study_app.store.journal import SessionClock
 from study_app.store.layout import StudyFolder, check_participant, check_unused
 from study_app.store.open_session import SessionStore
 from study_app.store.resume import reopen

@@ -26,7 +26,7 @@ from study_app.session.pages import Page, QuestionnairePage, TaskPage, TextPage
 from study_app.session.resume import REHEARSED_SCREENS
 from study_app.session.simulated import Draw, filled_in, reading_s
 from study_app.session.state import FINAL
-from study_app.store.journal import SessionClock
+from study_app.store.clock import SessionClock
 from study_app.store.layout import rehearsal_folder
 from study_app.store.simulated import SimulatedSession, SimulatedStudy
 

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 from study_app.haptics.scene import Scene
 from study_app.session.pages import Page
 from study_app.store.blinding import Key
-from study_app.store.journal import SessionClock
+from study_app.store.clock import SessionClock
 
 
 class ServoPort(Protocol):

@@ -38,8 +38,8 @@ from study_app.session.simulated import Draw, Explorer, Reacher, Senses, filled_
 from study_app.session.trial import TankView
 from study_app.session.unkept import Unkept
 from study_app.store import journal
+from study_app.store.clock import SessionClock
 from study_app.store.description import check_study
-from study_app.store.journal import SessionClock
 from study_app.store.layout import StudyFolder, check_unused, locate, rehearsal_folder
 from study_app.store.open_session import SessionStore
 from study_app.store.progress import progress_of

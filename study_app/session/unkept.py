@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from study_app.store.blinding import Key
-from study_app.store.journal import SessionClock
+from study_app.store.clock import SessionClock
 
 
 class Unkept:

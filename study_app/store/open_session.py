@@ -19,7 +19,8 @@ from study_app.store.blinding import Key
 from study_app.store.checksums import write_checksums
 from study_app.store.columns import RESPONSES
 from study_app.store.fingerprints import fingerprint, note_fingerprint
-from study_app.store.journal import Journal, Line
+from study_app.store.journal import Line
+from study_app.store.journal_writer import Journal
 from study_app.store.layout import SessionFolder, StudyFolder
 from study_app.store.opening import Opening
 from study_app.store.participants import write_participants

@@ -21,9 +21,11 @@ from study_app.store import journal, receipt
 from study_app.store.atomic import is_there, sweep
 from study_app.store.blinding import Key, open_or_draw_key, same_conditions
 from study_app.store.checksums import sha256
+from study_app.store.clock import SessionClock
 from study_app.store.cut_journal import refuse_if_cut
 from study_app.store.description import write_description
-from study_app.store.journal import Contents, Journal, Line, SessionClock
+from study_app.store.journal import Contents, Line
+from study_app.store.journal_writer import Journal
 from study_app.store.layout import SessionFolder, StudyFolder, locate, refuse_never_begun
 from study_app.store.open_session import Place, SessionStore
 from study_app.store.opening import open_alone, refuse_if_open

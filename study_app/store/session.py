@@ -17,8 +17,10 @@ from study_app.store import receipt
 from study_app.store.abandoned import sweep_claims, take_over
 from study_app.store.atomic import beside, cannot_write, is_there, sweep_old, sync_folder
 from study_app.store.blinding import Key, open_or_draw_key, reveals
+from study_app.store.clock import SessionClock
 from study_app.store.description import check_study, write_description
-from study_app.store.journal import FORMAT, Journal, SessionClock
+from study_app.store.journal import FORMAT
+from study_app.store.journal_writer import Journal
 from study_app.store.layout import StudyFolder, check_participant, check_unused, used_id
 from study_app.store.open_session import Place, SessionStore
 from study_app.store.opening import Opening, create_opened

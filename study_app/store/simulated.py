@@ -20,9 +20,10 @@ from study_app.store import tables
 from study_app.store.atomic import cannot_write, create_folder
 from study_app.store.blinding import open_or_draw_key, reveals
 from study_app.store.checksums import checksum_bytes
+from study_app.store.clock import SessionClock
 from study_app.store.description import check_study, write_description
 from study_app.store.fingerprints import fingerprint, note_fingerprint
-from study_app.store.journal import Line, SessionClock, line_bytes, line_of, plain
+from study_app.store.journal import Line, line_bytes, line_of, plain
 from study_app.store.layout import StudyFolder, check_participant, check_unused, used_id
 from study_app.store.open_session import Place, table_files
 from study_app.store.opening import Opening, open_alone

@@ -26,7 +26,7 @@ from study_app.session.rehearsal import rehearse
 from study_app.session.resume import resume_at
 from study_app.session.runner import Runner
 from study_app.store import recording
-from study_app.store.journal import SessionClock
+from study_app.store.clock import SessionClock
 from study_app.store.layout import StudyFolder
 from study_app.store.open_session import SessionStore
 from study_app.store.resume import reopen

@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from study_app.session.state import Phase
-from study_app.store import journal, resume
-from study_app.store.journal import SessionClock
+from study_app.store import clock, resume
+from study_app.store.clock import SessionClock
 from study_app.store.resume import reopen
 from study_app.store.verify import verify
 from tests.faults.worlds import StoredWorld
@@ -29,7 +29,7 @@ class Slow(datetime):
 
 
 def set_back(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(journal, "datetime", Slow)
+    monkeypatch.setattr(clock, "datetime", Slow)
     monkeypatch.setattr(resume, "datetime", Slow)
 
 

@@ -10,7 +10,7 @@ from study_app.session.events import Begin, Chosen, Continue, ItemShown, ResumeA
 from study_app.session.ports import Ports
 from study_app.session.runner import Runner
 from study_app.session.state import Phase
-from study_app.store.journal import SessionClock
+from study_app.store.clock import SessionClock
 from study_app.store.open_session import SessionStore
 from study_app.store.session import begin
 from tests.session import small

@@ -15,7 +15,7 @@ import pytest
 from study_app.haptics.layout import LIMITER_NAMES, SAMPLE
 from study_app.protocol.model import Protocol
 from study_app.protocol.schedule import build_schedule
-from study_app.store.journal import SessionClock
+from study_app.store.clock import SessionClock
 from study_app.store.session import SessionStore, begin
 
 SEVEN = ("Completely disagree", "Mostly", "Somewhat", "Neutral", "Somewhat agree", "Mostly agree", "Completely agree")

@@ -12,7 +12,7 @@ import pytest
 
 from study_app import app
 from study_app.errors import StoreError
-from study_app.store import journal, open_session, session
+from study_app.store import journal_writer, open_session, session
 from study_app.store.abandoned import abandoned, never_begun
 from study_app.store.layout import StudyFolder, check_unused, suggest_id
 from study_app.store.open_session import SessionStore
@@ -67,7 +67,7 @@ def left(request: pytest.FixtureRequest, study: StudyFolder, start: Start) -> St
     if request.param in KILLED_BEFORE:
         killed(start, "P004", *KILLED_BEFORE[request.param])
     elif request.param == "the end of the first line":
-        killed(start, "P004", journal, "write_whole", half_a_line)
+        killed(start, "P004", journal_writer, "write_whole", half_a_line)
     else:
         study.session("P004", 1).path.mkdir(parents=True)
     assert study.session("P004", 1).path.is_dir()

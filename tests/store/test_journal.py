@@ -20,7 +20,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from study_app.errors import StoreError
-from study_app.store.journal import Journal, SessionClock, plain, read, scan
+from study_app.store.clock import SessionClock
+from study_app.store.journal import plain, read, scan
+from study_app.store.journal_writer import Journal
 
 AWKWARD = 'comma, "quote",\nnew line\r\n\ttab 🌊 \u2028\x85 =SUM(A1)' + "é" * 10_000
 
@@ -57,7 +59,7 @@ def test_a_line_is_on_the_disk_when_append_returns(tmp_path: Path, monkeypatch: 
     path = tmp_path / "journal.jsonl"
     flushed: list[bytes] = []
     with Journal.create(path) as journal:
-        monkeypatch.setattr("study_app.store.journal.os.fsync", lambda _: flushed.append(path.read_bytes()))
+        monkeypatch.setattr("study_app.store.journal_writer.os.fsync", lambda _: flushed.append(path.read_bytes()))
         for count in (1, 2, 3):
             journal.append("counted", value=count)
             assert len(flushed) == count
@@ -202,7 +204,7 @@ class Disk:
 @pytest.fixture
 def disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Disk:
     made = Disk(tmp_path / "journal.jsonl")
-    monkeypatch.setattr("study_app.store.journal.os.fsync", made.fsync)
+    monkeypatch.setattr("study_app.store.journal_writer.os.fsync", made.fsync)
     return made
 
 
@@ -226,7 +228,7 @@ def test_a_line_that_nobody_waits_for_is_flushed_behind_and_in_order(disk: Disk)
 def test_a_flush_that_fails_behind_is_told_with_the_next_line_and_loses_none(
     disk: Disk, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("study_app.store.journal.RETRY_S", 3600.0)
+    monkeypatch.setattr("study_app.store.journal_writer.RETRY_S", 3600.0)
     journal = Journal.create(disk.path)
     first = journal.append("counted", value=1)
     disk.fails = 2
@@ -242,7 +244,7 @@ def test_a_flush_that_fails_behind_is_told_with_the_next_line_and_loses_none(
 
 
 def test_a_flush_that_fails_in_the_background_is_told_and_repeated(disk: Disk, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("study_app.store.journal.RETRY_S", 0.0)
+    monkeypatch.setattr("study_app.store.journal_writer.RETRY_S", 0.0)
     journal = Journal.create(disk.path)
     journal.append("counted", value=1)
     journal.check_flushed()
@@ -265,7 +267,7 @@ def test_a_flush_that_fails_in_the_background_is_told_and_repeated(disk: Disk, m
 
 
 def test_a_close_that_cannot_flush_the_last_lines_says_so(disk: Disk, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("study_app.store.journal.RETRY_S", 3600.0)
+    monkeypatch.setattr("study_app.store.journal_writer.RETRY_S", 3600.0)
     journal = Journal.create(disk.path)
     disk.fails = -1
     journal.append("seen", waits=False, item="calm")
@@ -283,7 +285,7 @@ def test_a_power_cut_takes_no_answer_and_leaves_no_hole(
     """Of what no flush has reached yet any part may be on the disk; flushes may fail."""
     disk = Disk(tmp_path_factory.mktemp("cut") / "journal.jsonl")
     with pytest.MonkeyPatch.context() as patched, contextlib.ExitStack() as over:
-        patched.setattr("study_app.store.journal.os.fsync", disk.fsync)
+        patched.setattr("study_app.store.journal_writer.os.fsync", disk.fsync)
         journal = Journal.create(disk.path)
         over.callback(journal.close)
         kept: list[Any] = []
@@ -343,7 +345,7 @@ def test_a_field_cannot_take_the_place_of_a_lines_number_or_time(tmp_path: Path)
 KILLED = """
 import sys
 from pathlib import Path
-from study_app.store.journal import Journal
+from study_app.store.journal_writer import Journal
 journal = Journal.create(Path(sys.argv[1]))
 count = 0
 while True:
