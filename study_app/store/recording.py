@@ -51,6 +51,7 @@ FRAME = np.dtype([("painted_ns", np.int64), ("sample_ns", np.int64), ("age_ns", 
 _FACTS = b"liquid_study"
 _COMPRESSION = ("zstd", 9)
 _AXES = ("x", "y", "z")
+_LATER = frozenset({"delay_ticks", *(f"undelivered_{axis}_n" for axis in _AXES)})  # columns that format 1 lacks
 _SHORT = frozenset({"buttons", "delay_ticks", "limiters", "scene", "status"})
 
 
@@ -197,7 +198,7 @@ def read_facts(path: Path) -> dict[str, Any]:
         metadata = parquet.read_metadata(path)
     except OSError as error:
         raise cannot_read(path, error) from error
-    except pa.ArrowException as error:
+    except (pa.ArrowException, UnicodeDecodeError) as error:
         raise _damaged(path, error) from error
     return _facts(path, metadata)
 
@@ -333,9 +334,24 @@ def _read(path: Path, kind: str) -> tuple[dict[str, NDArray[Any]], dict[str, Any
             table = file.read().combine_chunks()
     except OSError as error:
         raise cannot_read(path, error) from error
-    except pa.ArrowException as error:
+    except (pa.ArrowException, UnicodeDecodeError) as error:
         raise _damaged(path, error) from error
+    if not _are_of(table, SAMPLES if kind == "samples" else FRAMES, facts["rows"]):
+        raise StoreError(f"{path} is damaged (its columns are others than those of {kind}): restore it from a copy")
     return {name: _numbers(table.column(name), facts["rows"]) for name in table.column_names}, facts
+
+
+def _are_of(table: pa.Table, columns: Sequence[Column], rows: int) -> bool:
+    """Return whether a table has these columns, each once and whole, but for those that format 1 lacks."""
+    expected = {column.name: _type(column) for column in columns}
+    held = {field.name: field.type for field in table.schema}
+    return (
+        table.num_rows == rows
+        and len(table.column_names) == len(held)
+        and held.items() <= expected.items()
+        and expected.keys() - held.keys() <= _LATER
+        and not any(column.null_count for column in table.columns)
+    )
 
 
 def _numbers(column: pa.ChunkedArray, rows: int) -> NDArray[Any]:
@@ -354,11 +370,27 @@ def _facts(path: Path, metadata: Any) -> dict[str, Any]:
         if facts["format"] not in range(1, FORMAT + 1):
             found, readable = facts["format"], f"1 to {FORMAT}"
             raise StoreError(f"{path} has format {found!r}, this version reads {readable}: use a newer version")
+        if facts["kind"] == "samples":
+            _check_facts_of_samples(facts, metadata.num_rows)
         return {**facts, "kind": facts["kind"], "rows": metadata.num_rows}
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise StoreError(f"{path} is no recording of ours: restore it from a copy") from error
 
 
-def _damaged(path: Path, error: pa.ArrowException) -> StoreError:
+def _check_facts_of_samples(facts: Mapping[str, Any], rows: int) -> None:
+    """Refuse facts that are no numbers where readers compute with them (KeyError, TypeError or ValueError)."""
+    if rows and "first_device_force_n" not in facts:
+        raise KeyError("first_device_force_n")
+    checks = facts["crc32"]
+    whole = (checks["rows"], *checks["device_force"], *checks["effect_force"])
+    if not all(isinstance(number, int) for number in whole):
+        raise ValueError("its checks are none")
+    for name in {"first_device_force_n", "first_command_n"} & facts.keys():
+        first = facts[name]
+        if len(first) not in (0, 3) or not all(number is None or isinstance(number, int | float) for number in first):
+            raise ValueError(f"{name} is no force")
+
+
+def _damaged(path: Path, error: Exception) -> StoreError:
     reason = str(error).splitlines()[0] if str(error) else type(error).__name__
     return StoreError(f"{path} is damaged ({reason}): restore it from a copy")
