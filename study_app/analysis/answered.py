@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final, TypeVar
@@ -21,7 +20,7 @@ from study_app.analysis.statistics.friedman import DRAWN_UP_TO, friedman
 from study_app.analysis.statistics.global_permutation import global_permutation
 from study_app.analysis.statistics.missing import skillings_mack
 from study_app.analysis.statistics.ordinal import ordinal
-from study_app.analysis.statistics.outcome import DRAWS, FEW, Outcome, told
+from study_app.analysis.statistics.outcome import DRAWS, FEW, Outcome, draws_for, told
 from study_app.analysis.statistics.paired import paired
 from study_app.analysis.tables import Study
 
@@ -39,10 +38,6 @@ MANY: Final = DRAWN_UP_TO
 
 FEWER_DRAWS: Final = 1999
 """So many rearrangements are drawn for the test over all statements above ``MANY``, which has no approximation."""
-
-MOST_DRAWS: Final = 199_999
-FLOOR: Final = 0.05
-"""The smallest p that draws can give, corrected for its family, is this share of alpha at most."""
 
 
 @dataclass(frozen=True)
@@ -93,15 +88,12 @@ class Asked:
 
         So many that their number never decides whether something can be shown.
         """
-        return self._draws(DRAWS, len(self.block.items))
+        return draws_for(self.decided.alpha, DRAWS, len(self.block.items))
 
     @property
     def draws_over_all(self) -> int:
         """How many are drawn for the one test over all statements."""
-        return self._draws(DRAWS if self.n <= MANY else FEWER_DRAWS, 1)
-
-    def _draws(self, usual: int, members: int) -> int:
-        return min(MOST_DRAWS, max(usual, math.ceil(members / (FLOOR * self.decided.alpha))))
+        return draws_for(self.decided.alpha, DRAWS if self.n <= MANY else FEWER_DRAWS)
 
 
 def asked(

@@ -178,4 +178,4 @@ def _threshold(of: Asked, delays_ms: list[float]) -> tuple[Threshold | None, tup
     if item is None or item not in of.values:
         return None, (Waiting(THRESHOLD, "the protocol names no statement that asks for it"),)
     of.each("detection threshold")
-    return noticed(of.single[item], delays_ms, seed=of.seed), ()
+    return noticed(of.single[item], delays_ms, alpha=of.decided.alpha, seed=of.seed), ()

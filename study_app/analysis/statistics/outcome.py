@@ -5,6 +5,7 @@ A result never holds NaN: what cannot be computed is None, and ``note`` or ``no_
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
@@ -21,6 +22,10 @@ Whole: TypeAlias = NDArray[np.int64]
 
 DRAWS: Final = 9999
 """Random rearrangements where not all can be gone through; (1 + those as extreme) / (1 + DRAWS) is then p."""
+
+MOST_DRAWS: Final = 199_999
+FLOOR: Final = 0.05
+"""The smallest p that draws can give, corrected for its family, is this share of alpha at most."""
 
 SAMPLES: Final = 1999
 """Bootstrap samples of an interval."""
@@ -109,6 +114,11 @@ def complete(values: ArrayLike, *, at_least: int, why: str) -> tuple[Array, int]
         raise AnalysisError(f"{array.shape[1]} settings: at least {at_least} are needed{why}")
     whole = ~np.isnan(array).any(axis=1)
     return array[whole], int((~whole).sum())
+
+
+def draws_for(alpha: float, usual: int, members: int = 1) -> int:
+    """Return how many rearrangements are drawn for each of ``members`` tests: their number decides no verdict."""
+    return min(MOST_DRAWS, max(usual, math.ceil(members / (FLOOR * alpha))))
 
 
 def told(count: int, noun: str = "participant") -> str:

@@ -13,22 +13,24 @@ from typing import Final
 import numpy as np
 from scipy.special import expit, ndtr
 
-from study_app.analysis.statistics.outcome import Array
+from study_app.analysis.statistics.outcome import Array, draws_for
 from study_app.analysis.statistics.psychometric import LOGISTIC, NORMAL, Shape
 
 NO_RISE: Final = "noticing is not shown to rise with the level (likelihood ratio against a flat line, p = {p:.3f})"
 
 DRAWS: Final = 999
 CELLS: Final = 2_000_000
-"""So many answers are rearranged at most, and fewer times than ``DRAWS`` where there are many participants."""
+"""So many answers are rearranged, and fewer times than ``DRAWS`` where there are many participants."""
 
-FEWEST: Final = 199
+AT_ONCE: Final = 20_000
+"""So many rearrangements are compared with all curves together: more take more memory."""
+
 PLACES: Final = 11
 WIDTHS: Final = (0.05, 0.2, 0.5, 1.2, 3.0)
 RATES: Final = (0.0, 0.1, 0.35)
 
 
-def p_of_rise(yes: Array, asked: Array, levels: Array, shape: Shape, seed: int) -> float:
+def p_of_rise(yes: Array, asked: Array, levels: Array, shape: Shape, seed: int, alpha: float) -> float:
     """Return p that the share of yes answers rises with the level.
 
     Parameters
@@ -37,13 +39,17 @@ def p_of_rise(yes: Array, asked: Array, levels: Array, shape: Shape, seed: int) 
         Counts; one row where answers are independent.
     levels : (levels,) array
         Ascending.
+    alpha : float
+        So many rearrangements are drawn that their number does not decide whether p reaches it.
     """
     slope, no = _curves(tuple(levels.tolist()), shape)
     flat = no @ asked.sum(axis=0)
     found = float((slope @ yes.sum(axis=0) + flat).max())
-    drawn = _rearranged(yes, asked, seed)
+    drawn = _rearranged(yes, asked, seed, alpha)
     different, times = np.unique(drawn, axis=0, return_counts=True)
-    reached = (different @ slope.T + flat).max(axis=1) >= found - 1e-9 * abs(found)
+    parts = (different[first : first + AT_ONCE] for first in range(0, len(different), AT_ONCE))
+    highest = np.concatenate([(part @ slope.T + flat).max(axis=1) for part in parts])
+    reached = highest >= found - 1e-9 * abs(found)
     return (1 + int(times[reached].sum())) / (1 + len(drawn))
 
 
@@ -62,10 +68,10 @@ def _curves(levels: tuple[float, ...], shape: Shape) -> tuple[Array, Array]:
     return np.log(expected) - no, no
 
 
-def _rearranged(yes: Array, asked: Array, seed: int) -> Array:
+def _rearranged(yes: Array, asked: Array, seed: int, alpha: float) -> Array:
     """Return the yes counts (draws, levels) after each participant's answers changed places."""
     rng = np.random.default_rng(seed)
-    draws = int(np.clip(CELLS // max(1, int(asked.sum())), FEWEST, DRAWS))
+    draws = draws_for(alpha, min(DRAWS, CELLS // max(1, int(asked.sum()))))
     drawn = np.zeros((draws, asked.shape[1]))
     for said, of in zip(yes.astype(np.int64), asked.astype(np.int64), strict=True):
         drawn += rng.multivariate_hypergeometric(of, int(said.sum()), size=draws, method="marginals")

@@ -80,7 +80,12 @@ class _Found:
 
 
 def noticed(
-    values: ArrayLike, levels: Sequence[float], *, noticed_from: float = NOTICED_FROM, seed: int = 1
+    values: ArrayLike,
+    levels: Sequence[float],
+    *,
+    noticed_from: float = NOTICED_FROM,
+    alpha: float = 0.05,
+    seed: int = 1,
 ) -> Threshold:
     """Return the threshold of raw answers: ``noticed_from`` or more means noticed, NaN is missing.
 
@@ -90,6 +95,8 @@ def noticed(
         Answers in points of the scale; for yes and no coded 1 and 0 give ``noticed_from`` = 1.
     levels : sequence
         What was presented; equal levels are replicates of one.
+    alpha : float
+        No threshold is stated where p of a rise is above it.
     """
     array = np.asarray(values, dtype=np.float64)
     array = checked(array[..., None] if array.ndim == 2 else array, "participants, levels, presentations")
@@ -105,6 +112,7 @@ def noticed(
         (GUESSES, LAPSES),
         int(used.sum()),
         int((~used).sum()),
+        alpha,
         seed,
     )
 
@@ -117,6 +125,7 @@ def threshold(
     shape: Shape = "logistic",
     guess: float | None = None,
     lapse: float | None = None,
+    alpha: float = 0.05,
     seed: int = 1,
 ) -> Threshold:
     """Fit a psychometric function to counts of independent yes answers.
@@ -127,6 +136,8 @@ def threshold(
         What was presented, how often it was noticed, and how often it was asked.
     guess, lapse : float, optional
         Fixed rates; otherwise free up to 0.5.
+    alpha : float
+        No threshold is stated where p of a rise is above it.
 
     Raises
     ------
@@ -143,7 +154,7 @@ def threshold(
             f"{noticed_.tolist()} yes of {presented.tolist()} asked cannot be; give counts, yes ≤ asked"
         )
     rates = (GUESSES if guess is None else (guess, guess), LAPSES if lapse is None else (lapse, lapse))
-    return _estimated(x, noticed_[None], presented[None], shape, rates, None, 0, seed)
+    return _estimated(x, noticed_[None], presented[None], shape, rates, None, 0, alpha, seed)
 
 
 def _estimated(
@@ -154,6 +165,7 @@ def _estimated(
     rates: tuple[Bounds, Bounds],
     people: int | None,
     dropped: int,
+    alpha: float,
     seed: int,
 ) -> Threshold:
     """Return the threshold of ``yes`` of ``asked`` answers (participants, levels) where there is one."""
@@ -163,8 +175,8 @@ def _estimated(
     counts = Counts(order, yes.sum(axis=0), asked.sum(axis=0))
     n = int(counts.asked.sum()) if people is None else people
     reason = _impossible(counts)
-    p = None if reason else p_of_rise(yes, asked, order, shape, seed)
-    if p is not None and p > 1 - SURE:
+    p = None if reason else p_of_rise(yes, asked, order, shape, seed, alpha)
+    if p is not None and p > alpha:
         reason = NO_RISE.format(p=p)
     if reason:
         return _outcome(counts, None, shape, n, dropped, reason, p)

@@ -167,6 +167,21 @@ def test_the_interval_covers_the_threshold_of_people_who_differ(n: int, spread_m
     assert covered >= binom.ppf(0.001, 25, 0.93)
 
 
+def test_a_threshold_needs_a_rise_at_the_alpha_that_was_decided() -> None:
+    answers = np.array([[2, 6, 6, 6], [2, 2, 6, 6], [2, 2, 6, 6], [2, 6, 6, 6]])  # p is 1 in 4 · 6 · 6 · 4
+    usual = noticed(answers, (0, 50, 100, 150))
+    assert usual.p is not None
+    assert 0.001 < usual.p <= 0.05
+    assert usual.effect is not None
+    strict = noticed(answers, (0, 50, 100, 150), alpha=0.001)
+    assert strict.effect is None
+    assert strict.note.startswith("noticing is not shown to rise with the level")
+    clear = noticed(np.where(np.arange(7) > 3, 6.0, 2.0) * np.ones((12, 1)), STUDY, alpha=0.001)
+    assert clear.effect is not None
+    assert clear.p is not None
+    assert clear.p <= 0.001 / 20
+
+
 @pytest.mark.parametrize("n", [5, 12])
 def test_where_nothing_is_noticed_a_threshold_is_seldom_stated(n: int) -> None:
     rng = np.random.default_rng(n)
@@ -198,7 +213,7 @@ def test_agreement_from_five_on_is_noticing_and_missing_answers_do_not_count() -
     assert (result.yes, result.asked) == ((0, 0, 0, 1, 2, 2, 1), (2, 2, 2, 2, 2, 2, 1))
     assert (result.n, result.dropped) == (2, 1)
     five = noticed(np.vstack([values, values, values]), DELAYS)
-    assert "answers of all participants are pooled, and the interval holds how far participants differ" in five.note
+    assert "answers of all participants are pooled, and the interval includes how far participants differ" in five.note
     assert five.effect == pytest.approx(125, abs=25)
     assert noticed((values >= 3).astype(float), DELAYS, noticed_from=1).yes == (0, 0, 2, 2, 2, 2, 1)
 
