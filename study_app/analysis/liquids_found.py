@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from itertools import combinations
 from typing import Final
@@ -49,21 +50,26 @@ def liquids_found(study: Study | None, of: Asked) -> BlockFound:
 
 def pairs_of(of: Asked, omnibus: tuple[Tested, ...]) -> tuple[tuple[Pair, ...], tuple[Waiting, ...]]:
     """Return the comparisons of settings two by two, in the statements that differ at all, and why there are none."""
-    count = of.k * (of.k - 1) // 2
+    count = math.comb(of.k, 2)
     if of.k < 3:
         return (), ()
-    smallest = 2.0 ** (1 - of.n)
-    if count * smallest > of.decided.alpha:
-        corrected = min(1.0, count * smallest)
+    corrected = smallest_of_pairs(of.k, of.n)
+    if corrected > of.decided.alpha:
         why = (
-            f"{told(of.n)} cannot show it: the smallest p that {told(of.n, 'pair')} can give is {smallest:.4g}, after "
-            f"Holm's correction over {count} pairs {corrected:.4g}, which is above {of.decided.alpha:g}"
+            f"{told(of.n)} cannot show it: the smallest p that {told(of.n, 'pair')} can give is "
+            f"{smallest_of_pairs(2, of.n):.4g}, after Holm's correction over {count} pairs {corrected:.4g}, which is "
+            f"above {of.decided.alpha:g}"
         )
         return (), (Waiting(PAIRS, why),)
     differing = [one.item for one in omnibus if one.verdict in ("shown", "suggested")]
     if not differing:
         return (), (Waiting(PAIRS, "no statement shows a difference between the settings"),)
     return _over_all_pairs(of, differing), ()
+
+
+def smallest_of_pairs(settings: int, participants: int) -> float:
+    """Return the smallest p that a comparison of two of the settings can have, corrected over all pairs by Holm."""
+    return min(1.0, math.comb(settings, 2) * 2.0 ** (1 - participants))
 
 
 def _over_all_pairs(of: Asked, items: list[str]) -> tuple[Pair, ...]:

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from study_app.analysis.decided import Decided
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.failures import Failures
 from study_app.analysis.report.answers import Answer, answers, common_ms, given, recognised
@@ -114,6 +115,44 @@ def test_the_page_holds_pictures_limits_and_how_often_it_is_wrong() -> None:
     assert page.index("Up to which delay") < page.index("What this study cannot show")
     assert "&lt;nothing&gt;" in page
     assert "In how many of a hundred empty studies would this page say something?" in page
+
+
+def ordered(people: int, decided: Decided = DECIDED) -> Results:
+    """Return a study of three liquids that everybody puts in the same order in the second statement."""
+    settings = liquids(3)
+    trials = list(everybody(settings, people, lambda _p, _s, code, i: 2 * int(code[1:]) if i == ITEMS[1] else 4))
+    results = evaluate(study(settings, trials, decided), planning=False)
+    return replace(results, blocks=(replace(results.blocks[0], named=None),))
+
+
+def test_liquids_that_differ_are_told_where_too_few_people_can_show_no_pair() -> None:
+    told = named(ordered(5), "distinguished")
+    assert told.told == (
+        "The liquids were rated differently in “Harder”; which ones cannot be shown with five participants."
+    )
+    assert told.claims
+    assert not told.exploratory
+    assert any("“Harder”: Kendall's W 1.00" in line for line in told.sizes)
+    assert named(ordered(5, replace(DECIDED, primary=ITEMS[:1])), "distinguished").exploratory
+    results = ordered(7)
+    assert named(results, "distinguished").told.startswith("Rated differently: liquid1 – liquid2")
+    unclear = replace(
+        results.blocks[0],
+        pairs=tuple(replace(one, tested=replace(one.tested, verdict="not shown")) for one in results.blocks[0].pairs),
+    )
+    assert named(replace(results, blocks=(unclear,)), "distinguished").told == (
+        "The liquids were rated differently in “Harder”; which ones is not shown."
+    )
+
+
+def test_pairs_that_only_exploratory_statements_tell_apart_are_marked() -> None:
+    results = ordered(8)
+    block = results.blocks[0]
+    first = replace(block.pairs[0], tested=replace(block.pairs[0].tested, verdict="suggested"))
+    marked = named(replace(results, blocks=(replace(block, pairs=(first, *block.pairs[1:])),)), "distinguished")
+    assert marked.told.startswith("Rated differently: liquid1 – liquid2 (exploratory), liquid1 – liquid3 and")
+    assert not marked.exploratory
+    assert "exploratory" not in named(results, "distinguished").told
 
 
 def test_a_threshold_is_no_claim_at_a_smaller_alpha_that_was_decided() -> None:

@@ -11,6 +11,7 @@ from itertools import combinations
 from typing import Final, Literal, TypeAlias
 
 from study_app.analysis.decided import Decided
+from study_app.analysis.liquids_found import smallest_of_pairs
 from study_app.analysis.report.words import all_of, beyond, counted, interval, listed, ms, name, number, percent, short
 from study_app.analysis.results import Against, BlockFound, Named, Results, Tested
 from study_app.analysis.statistics.families import holm
@@ -82,7 +83,7 @@ def _of_block(found: BlockFound, decided: Decided) -> tuple[Answer, ...]:
         return tuple(Answer(question, found.id, found.title, waits, ()) for question in questions)
     if found.kind == "delays":
         return _noticed_from(found, decided), _unchanged(found)
-    return (_distinguished(found),)
+    return (_distinguished(found, decided),)
 
 
 def recognised(named: Named) -> tuple[int, ...]:
@@ -108,22 +109,28 @@ def given(named: Named, label: str) -> float:
     return sum(row[place] for row in named.found.table) / asked if asked else 0.0
 
 
-def _distinguished(found: BlockFound) -> Answer:
-    compared = _compared(found)
-    apart = {pair: tests for pair, tests in compared.items() if tests}
-    of_pairs = _of_pairs(found, apart)
+def _distinguished(found: BlockFound, decided: Decided) -> Answer:
+    apart = {pair: tests for pair, tests in _compared(found).items() if tests}
+    differing = [one for one in found.omnibus if one.verdict in FOUND]
+    decisive = [one for tests in apart.values() for one in tests] or differing
     named = found.named if found.named is not None and found.named.found.p is not None else None
     known = () if named is None else recognised(named)
+    exploratory = _suggested(decisive) and (named is None or not known or named.verdict == "suggested")
+    of_pairs = _of_pairs(found, apart, differing, decided, mark=not exploratory)
     told = of_pairs if named is None else _of_names(found, named, known)
-    decisive = [one for tests in apart.values() for one in tests]
-    exploratory = all(one.verdict == "suggested" for one in decisive) and (
-        named is None or not known or named.verdict == "suggested"
-    )
     claims = bool(decisive or known)
     if not claims:
         told = f"{told} {NO_EVIDENCE}"
-    sizes = (*(() if named is None else (_hits(found, named), of_pairs)), *_largest(found, apart))
+    sizes = (
+        *(() if named is None else (_hits(found, named), of_pairs)),
+        *(_largest(found, apart) if apart else _agreement(found, differing)),
+    )
     return Answer("distinguished", found.id, found.title, told, sizes, claims, claims and exploratory)
+
+
+def _suggested(tests: Sequence[Tested]) -> bool:
+    """Return whether no test of a primary statement is among these."""
+    return all(one.verdict == "suggested" for one in tests)
 
 
 def _of_names(found: BlockFound, named: Named, known: Sequence[int]) -> str:
@@ -185,17 +192,43 @@ def _compared(found: BlockFound) -> dict[tuple[str, str], list[Tested]]:
     }
 
 
-def _of_pairs(found: BlockFound, apart: dict[tuple[str, str], list[Tested]]) -> str:
-    """Return which settings were rated differently in some statement, and which were not."""
+def _of_pairs(
+    found: BlockFound,
+    apart: dict[tuple[str, str], list[Tested]],
+    differing: Sequence[Tested],
+    decided: Decided,
+    *,
+    mark: bool,
+) -> str:
+    """Return which settings were rated differently in some statement, and which were not.
+
+    ``mark``: say of single pairs and statements that they are exploratory.
+    """
     pairs = list(combinations([setting.code for setting in found.settings], 2))
     if not pairs:
         return "There is only one setting, and nothing to compare it with."
-    yes = [_pair(found, pair) for pair in pairs if pair in apart]
+    yes = [f"{_pair(found, pair)}{_mark(apart[pair], mark)}" for pair in pairs if pair in apart]
     no = [_pair(found, pair) for pair in pairs if pair not in apart]
+    if not yes and differing:
+        items = listed([f"“{short(found, one.item)}”{_mark([one], mark)}" for one in differing])
+        out_of_reach = smallest_of_pairs(len(found.settings), found.n) > decided.alpha
+        rest = f"cannot be shown with {counted(found.n, 'participant')}" if out_of_reach else "is not shown"
+        return f"The liquids were rated differently in {items}; which ones {rest}."
     if not yes:
         return "In no statement were two of them shown to be rated differently."
     rest = f"; not shown to be: {listed(no)}" if no else ""
     return f"Rated differently: {listed(yes)}{rest}."
+
+
+def _mark(tests: Sequence[Tested], mark: bool) -> str:
+    return " (exploratory)" if mark and _suggested(tests) else ""
+
+
+def _agreement(found: BlockFound, differing: Sequence[Tested]) -> Iterator[str]:
+    """Yield of each statement in which the settings differ how much, over all of them."""
+    for one in differing:
+        if one.outcome.effect is not None:
+            yield f"“{short(found, one.item)}”: {one.outcome.effect_name} {number(one.outcome.effect)}."
 
 
 def _pair(found: BlockFound, pair: tuple[str, str]) -> str:
