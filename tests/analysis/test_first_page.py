@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -153,6 +154,51 @@ def test_pairs_that_only_exploratory_statements_tell_apart_are_marked() -> None:
     assert marked.told.startswith("Rated differently: liquid1 – liquid2 (exploratory), liquid1 – liquid3 and")
     assert not marked.exploratory
     assert "exploratory" not in named(results, "distinguished").told
+
+
+def test_the_headline_is_of_primary_statements_and_exploratory_ones_follow_it_marked() -> None:
+    """The primary statement changes from 150 ms on, the exploratory one from 50 ms on."""
+    settings = delays(DELAYS)
+    high = {("D4", "harder"), ("D2", "different"), ("D3", "different"), ("D4", "different")}
+    noise = np.random.default_rng(1).integers(0, 2, (16, 4, 2))
+
+    def answer(person: int, _session: int, code: str, item: str) -> int:
+        up = 4 * ((code, item) in high)
+        wobble = int(noise[person, int(code[1:]) - 1, ITEMS.index(item)])
+        return (6 - up if item == "harder" else 1 + up) + wobble
+
+    made = study(settings, list(everybody(settings, 16, answer)), replace(DECIDED, primary=ITEMS[1:]))
+    results = evaluate(made, planning=False)
+    found = named(results, "noticed from")
+    assert found.told == (
+        "From 150 ms on at the latest: “Harder” changes with the delay up to there. Shorter delays may be noticed too. "
+        "In exploratory statements, from 50 ms on at the latest: “Different” changes with the delay up to there. "
+        "Shorter delays may be noticed too."
+    )
+    assert not found.exploratory
+    assert found.at_ms == 150
+    assert [line.startswith("Exploratory: ") for line in found.sizes] == [True, False, True]
+    block = replace(results.blocks[0], lowest=tuple(one for one in results.blocks[0].lowest if one.item != "harder"))
+    block = replace(block, against=tuple(one for one in block.against if one.item != "harder"))
+    alone = named(replace(results, blocks=(block,)), "noticed from")
+    assert alone.exploratory
+    assert alone.told.startswith("From 50 ms on at the latest: “Different”")
+    assert not any(line.startswith("Exploratory") for line in alone.sizes)
+
+
+@pytest.mark.parametrize(
+    ("decided", "exploratory"),
+    [({}, False), ({"changed": True}, True), ({"primary": ITEMS[1:]}, True), ({"primary": ITEMS[:1]}, False)],
+)
+def test_a_threshold_alone_is_exploratory_unless_its_statement_is_primary(
+    decided: dict[str, Any], exploratory: bool
+) -> None:
+    results = rising(3)
+    block = replace(results.blocks[0], lowest=(), against=())
+    assert block.threshold is not None
+    assert block.threshold.effect is not None
+    found = named(replace(results, blocks=(block,), decided=replace(results.decided, **decided)), "noticed from")
+    assert (found.claims, found.exploratory) == (True, exploratory)
 
 
 def test_a_threshold_is_no_claim_at_a_smaller_alpha_that_was_decided() -> None:

@@ -5,7 +5,7 @@ An answer is a sentence, then directions, sizes and intervals; the p that decide
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Final, Literal, TypeAlias
@@ -34,7 +34,8 @@ class Answer:
     """An answer to one question about one block (its id).
 
     ``claims`` says whether it claims that settings differ or that a delay is noticed, which would be false in a study
-    where nothing differs; ``exploratory`` whether that was not decided on before the study.
+    where nothing differs; ``exploratory`` whether that was not decided on before the study. ``at_ms`` is the shortest
+    delay that it says is noticed.
     """
 
     question: Question
@@ -44,6 +45,7 @@ class Answer:
     sizes: tuple[str, ...]
     claims: bool = False
     exploratory: bool = False
+    at_ms: float | None = None
 
 
 def answers(results: Results) -> tuple[Answer, ...]:
@@ -68,7 +70,7 @@ def _unless_claimed_alone(answer: Answer, p_over_all: float | None, alpha: float
         "Nothing is claimed here: single tests in the sections below find something, but the test over all statements "
         f"does not find a difference. {NO_EVIDENCE}"
     )
-    return replace(answer, told=told, sizes=(), claims=False, exploratory=False)
+    return replace(answer, told=told, sizes=(), claims=False, exploratory=False, at_ms=None)
 
 
 def _of_block(found: BlockFound, decided: Decided) -> tuple[Answer, ...]:
@@ -275,43 +277,73 @@ def _noticed_from(found: BlockFound, decided: Decided) -> Answer:
     lowest = {one.item: one.over_all_ms for one in found.lowest if one.over_all_ms is not None}
     different = [one for one in found.against if one.verdict == "different"]
     threshold = found.threshold
-    fitted = threshold is not None and threshold.effect is not None
+    of_primary, of_others = (
+        _shortest(
+            found,
+            {item: at for item, at in lowest.items() if decided.is_primary(item) == primary},
+            [one for one in different if decided.is_primary(one.item) == primary],
+        )
+        for primary in (True, False)
+    )
+    fitted = None
+    if threshold is not None and threshold.effect is not None:
+        fitted = None, "More people notice a difference with longer delays, but no single delay is shown to be noticed."
+    primary_threshold = decided.noticed is not None and decided.is_primary(decided.noticed)
+    confirmed = of_primary or (fitted if primary_threshold else None)
+    headline = confirmed or of_others or fitted
+    at_ms, told = headline or (None, f"No delay was shown to be noticed. {NO_EVIDENCE}")
+    if confirmed and of_others:
+        told += f" In exploratory statements, {_first_lower(of_others[1])}"
+    exploratory = headline is not None and confirmed is None
+    sizes = _noticed_sizes(found, decided, lowest, different, mark=confirmed is not None)
+    return Answer("noticed from", found.id, found.title, told, tuple(sizes), headline is not None, exploratory, at_ms)
+
+
+def _shortest(found: BlockFound, lowest: Mapping[str, float], different: Sequence[Against]) -> tuple[float, str] | None:
+    """Return the shortest delay that changes a statement of those given and the sentence of it; None without any."""
     if lowest:
         at = min(lowest.values())
         first = [f"“{short(found, item)}”" for item, delay in lowest.items() if delay == at]
-        told = (
+        return at, (
             f"From {ms(at)} on at the latest: {listed(first)} {'changes' if len(first) == 1 else 'change'} with the "
             "delay up to there. Shorter delays may be noticed too."
         )
-    elif different:
+    if different:
         at = min(one.delay_ms for one in different)
-        told = f"No trend is shown, but answers at {ms(at)} differ from those at {ms(different[0].control_ms)}."
-    elif fitted:
-        told = "More people notice a difference with longer delays, but no single delay is shown to be noticed."
-    else:
-        told = f"No delay was shown to be noticed. {NO_EVIDENCE}"
+        return at, f"No trend is shown, but answers at {ms(at)} differ from those at {ms(different[0].control_ms)}."
+    return None
+
+
+def _noticed_sizes(
+    found: BlockFound, decided: Decided, lowest: Mapping[str, float], different: Sequence[Against], *, mark: bool
+) -> list[str]:
+    """Return the changes of all statements and the threshold; ``mark``: say which of them are exploratory."""
+
+    def marked(item: str | None) -> str:
+        return "Exploratory: " if mark and (item is None or not decided.is_primary(item)) else ""
+
     sizes = [
-        f"“{short(found, item)}” from {ms(delay)} on at the latest{_change(found, item, delay)}"
+        f"{marked(item)}“{short(found, item)}” from {ms(delay)} on at the latest{_change(found, item, delay)}"
         for item, delay in sorted(lowest.items(), key=lambda one: one[1])
     ]
     sizes += [
-        f"“{short(found, one.item)}” differs at {ms(one.delay_ms)}{_change(found, one.item, one.delay_ms)}"
-        f"{'' if one.as_expected else ', against the direction stated'}"
+        f"{marked(one.item)}“{short(found, one.item)}” differs at {ms(one.delay_ms)}"
+        f"{_change(found, one.item, one.delay_ms)}{'' if one.as_expected else ', against the direction stated'}"
         for one in _first_of_each(different)
         if one.item not in lowest
     ]
     if sizes and found.against:
         sizes[-1] += f". {_level(found.against)}"
+    threshold = found.threshold
     if threshold is not None and threshold.effect is not None:
         ends = "no interval" if threshold.interval is None else f"95 % interval {interval(threshold.interval, 0)} ms"
-        sizes.append(f"Detection threshold, half-way between guesses and lapses: {threshold.effect:.0f} ms ({ends}).")
+        sizes.append(
+            f"{marked(decided.noticed)}Detection threshold, half-way between guesses and lapses: "
+            f"{threshold.effect:.0f} ms ({ends})."
+        )
     elif threshold is not None:
         sizes.append(f"No detection threshold: {threshold.note}.")
-    primary = [decided.is_primary(item) for item in (*lowest, *(one.item for one in different))]
-    claims = bool(lowest or different or fitted)
-    return Answer(
-        "noticed from", found.id, found.title, told, tuple(sizes), claims, claims and not any(primary or [fitted])
-    )
+    return sizes
 
 
 def _first_of_each(different: Iterable[Against]) -> Iterator[Against]:
@@ -384,3 +416,7 @@ def _unchanged(found: BlockFound) -> Answer:
 
 def _first_upper(words: str) -> str:
     return words[:1].upper() + words[1:]
+
+
+def _first_lower(words: str) -> str:
+    return words[:1].lower() + words[1:]

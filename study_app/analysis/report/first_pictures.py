@@ -29,7 +29,7 @@ def draw(answer: Answer, found: BlockFound) -> tuple[bytes, str] | None:
     if answer.question == "distinguished":
         words = _names(sheet, found.named, found) if found.named is not None else _ratings(sheet, found)
     elif answer.question == "noticed from":
-        words = _noticed(sheet, found)
+        words = _noticed(sheet, found, answer.at_ms)
     else:
         words = _differences(sheet, found)
     return None if words is None else (style.file_bytes(sheet.figure, "png", words), words)
@@ -109,13 +109,12 @@ def _levels(sheet: Sheet, axes: Axes) -> None:
         axes.axvline(level, color=style.GRID, linewidth=0.6, zorder=0)
 
 
-def _noticed(sheet: Sheet, found: BlockFound) -> str | None:
+def _noticed(sheet: Sheet, found: BlockFound, at_ms: float | None) -> str | None:
     if found.threshold is None or not any(found.threshold.asked):
         return None
     axes = sheet.axes(32, 6, WIDTH_PT - 46, HEIGHT_PT - FOOT_PT - 16)
-    lowest = [one.over_all_ms for one in found.lowest if one.over_all_ms is not None]
-    psychometric_figure.curve(sheet, axes, found.threshold, min(lowest, default=None))
-    dashed = "; dashed: the answer" if lowest else ""
+    psychometric_figure.curve(sheet, axes, found.threshold, at_ms)
+    dashed = "" if at_ms is None else "; dashed: the answer"
     _foot(sheet, f"Share that noticed, over delay in ms{dashed}")
     curve = "" if found.threshold.effect is None else ", with the fitted curve"
     return f"Share of answers that noticed the delay, over the delay in ms{curve}"
