@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, TypeVar
 
@@ -30,6 +30,9 @@ U = TypeVar("U")
 SEALED: Final = "after unblinding: the key is sealed, and this needs to know which setting is which"
 OMNIBUS: Final = "test of settings"
 OVER_ALL: Final = "test over all statements"
+MEASURES: Final = "measures of settings"
+COUNTS: Final = "counts of answers"
+NUMBERS: Final = "numbers of sessions"
 SESSIONS: Final = "comparison of sessions"
 AGAIN: Final = "the same asked with other assumptions"
 
@@ -151,7 +154,10 @@ def of_tables(
 def head(study: Study | None, of: Asked) -> dict[str, Any]:
     """Return what every block's finding says: settings, statements, counts; without a study no measures."""
     block = of.block
-    (by_session, absent), failed = of.attempt(SESSIONS, lambda: compared_sessions(of), ((), ()))
+    measures, no_measures = of.attempt(MEASURES, lambda: _measures(study, block), ())
+    counts, no_counts = of.attempt(COUNTS, lambda: presented(of.single.values()), (0, 0))
+    numbers, no_numbers = of.attempt(NUMBERS, lambda: session_numbers(of.sessions.values()), ())
+    (by_session, absent), failed = of.attempt(SESSIONS, lambda: compared_sessions(of, numbers), ((), ()))
     return {
         "id": block.id,
         "title": block.title,
@@ -162,16 +168,20 @@ def head(study: Study | None, of: Asked) -> dict[str, Any]:
         "names": tuple(block.name(setting) for setting in block.settings),
         "items": block.items,
         "labels": block.labels,
-        "measures": tuple(
-            {str(name): None if pd.isna(value) else value for name, value in row.items()}
-            for row in ([] if study is None else study.aggregate(block).to_dict("records"))
-        ),
-        "presentations": presented(of.single.values()),
+        "measures": measures,
+        "presentations": counts,
         "replicated_ms": _replicated(block),
-        "sessions": session_numbers(of.sessions.values()),
+        "sessions": numbers,
         "by_session": by_session,
-        "absent": (*absent, *failed),
+        "absent": (*no_measures, *no_counts, *no_numbers, *absent, *failed),
     }
+
+
+def _measures(study: Study | None, block: Block) -> tuple[dict[str, Any], ...]:
+    return tuple(
+        {str(name): None if pd.isna(value) else value for name, value in row.items()}
+        for row in ([] if study is None else study.aggregate(block).to_dict("records"))
+    )
 
 
 def presented(single: Iterable[Array]) -> tuple[int, int]:
@@ -194,12 +204,11 @@ def _replicated(block: Block) -> tuple[float, ...]:
     return tuple(delay for place, delay in enumerate(block.delays_ms) if columns.count(place) > 1)
 
 
-def compared_sessions(of: Asked) -> tuple[tuple[Tested, ...], tuple[Waiting, ...]]:
+def compared_sessions(of: Asked, numbers: Sequence[int]) -> tuple[tuple[Tested, ...], tuple[Waiting, ...]]:
     """Test in every statement whether sessions are answered alike, by the participants who came to all of them.
 
     A participant's answers in a session are their median over the settings that he or she answered in all sessions.
     """
-    numbers = session_numbers(of.sessions.values())
     if len(numbers) < 2:
         return (), ()
     outcomes = {}

@@ -16,6 +16,9 @@ from study_app.protocol.load import load
 from tests.analysis.conftest import Results, make_results, twelve
 
 TESTS = {
+    "tables.Study.aggregate": ("liquids", "measures of settings"),
+    "answered.presented": ("delays", "counts of answers"),
+    "answered.session_numbers": ("delays", "numbers of sessions"),
     "answered.friedman": ("liquids", "test of settings"),
     "answered.global_permutation": ("liquids", "test over all statements"),
     "liquids_found.recognition": ("liquids", "test of recognition"),

@@ -86,6 +86,8 @@ def _ratings(sheet: Sheet, found: BlockFound) -> str | None:
     item = max(tested, key=lambda one: abs(one.outcome.effect or 0.0)).item
     rows = {str(row["code"]): row for row in found.measures if row["item"] == item and row["median"] is not None}
     codes = [setting.code for setting in found.settings if setting.code in rows]
+    if not codes:
+        return None
     left = 4 + max(sheet.text_width(name(found, code), 9) for code in codes)
     axes = sheet.axes(left + 6, 4, WIDTH_PT - left - 14, HEIGHT_PT - FOOT_PT - 10)
     axes.set_xlim(0.7, 7.3)
