@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from study_app.analysis.answered import of_tables
 from study_app.analysis.evaluate import found_in
 from study_app.analysis.power.planned import plan
+from study_app.analysis.statistics.threshold import noticed
 from study_app.analysis.validation import single, studies
 from study_app.analysis.validation.counting import CLAIMED, LOST, Cell, count
 from study_app.analysis.validation.listed import markdown, table
@@ -121,5 +124,15 @@ def test_every_kind_of_study_is_counted(rek: Simulated, generator: Generator, mo
 def test_single_tests_are_counted() -> None:
     (leaning,) = single.count(("one in five differs by 5 points, the others by 0", 24), 1, 0, 4)
     assert (leaning.of, leaning.limit) == (4, "at most 5 %")
-    (covered,) = single.count(("one threshold for all", 12), 1, 0, 4)
+    printed, covered = single.count(("one threshold for all", 12), 1, 0, 4)
+    assert (printed.what, printed.hits, printed.of, printed.limit) == (single.PRINTED, 4, 4, "at least 93 %")
     assert covered.hits >= 2
+
+
+def test_an_interval_that_is_not_printed_covers_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(single, "noticed", lambda *_args, **_named: noticed([[np.nan] * 7], single.LEVELS_MS))
+    printed, covered = single.count(("one threshold for all", 12), 1, 0, 4)
+    assert (printed.hits, printed.of) == (0, 4)
+    assert (covered.hits, covered.of) == (0, 0)
+    assert covered.holds == "too few studies"
+    assert replace(printed, of=100).holds == "no"

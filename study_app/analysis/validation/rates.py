@@ -57,6 +57,8 @@ class Rate:
             return "counted"
         if self.limit == "none":
             return "no" if self.hits else "yes"
+        if not self.of:
+            return "too few studies"
         lowest, highest, least, most = ALLOWED[self.limit]
         low, high = binomtest(self.hits, self.of).proportion_ci(SURE, method="wilson")
         if high < lowest or low > highest:

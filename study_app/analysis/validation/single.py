@@ -18,8 +18,11 @@ from study_app.analysis.validation.rates import Limit, Rate
 Case: TypeAlias = tuple[str, int]
 """What is simulated, and how many participants take part."""
 
-Trial: TypeAlias = Callable[[np.random.Generator], bool]
-"""Simulates one study and says whether it counts as a hit."""
+Trial: TypeAlias = Callable[[np.random.Generator], bool | None]
+"""Simulates one study and says whether it counts as a hit; None: it prints nothing that could be one."""
+
+COVERS: Final = "interval covers the threshold, where one is printed"
+PRINTED: Final = "threshold printed, with its interval"
 
 BOUND: Final = 1.0
 LEVELS_MS: Final = np.array([0, 50, 75, 100, 125, 150, 200])
@@ -49,7 +52,7 @@ def cases() -> Mapping[Case, tuple[Limit, str, Trial]]:
         (12, 60.0, 0.0, "thresholds of people, SD 60 ms"),
         (12, 15.0, 1 / 6, "one in six never agrees"),
     ):
-        found[words, n] = ("at least 93 %", "interval covers the threshold", _covered(n, spread_ms, never))
+        found[words, n] = ("at least 93 %", COVERS, _covered(n, spread_ms, never))
     for sd in (0.7, 1.0, 1.5):
         n = _needed(sd)
         words = f"whole-number differences about 0, SD {sd:g}, printed n {n}"
@@ -59,11 +62,13 @@ def cases() -> Mapping[Case, tuple[Limit, str, Trial]]:
 
 
 def count(case: Case, seed: int, batch: int, studies: int) -> tuple[Rate, ...]:
-    """Return the rate of so many studies of a case, those of batch number ``batch``."""
+    """Return the rates of so many studies of a case, those of batch number ``batch``."""
     limit, what, trial = cases()[case]
     number = list(cases()).index(case)
     rng = np.random.default_rng([seed, number, batch])
-    return (Rate(case[0], case[1], what, limit, sum(trial(rng) for _ in range(studies)), studies),)
+    hits = [hit for _ in range(studies) if (hit := trial(rng)) is not None]
+    rate = Rate(*case, what, limit, sum(hits), len(hits))
+    return (Rate(*case, PRINTED, "at least 93 %", len(hits), studies), rate) if what == COVERS else (rate,)
 
 
 def _leaning(n: int, most: tuple[float, ...]) -> Trial:
@@ -74,9 +79,9 @@ def _leaning(n: int, most: tuple[float, ...]) -> Trial:
 
 
 def _covered(n: int, spread_ms: float, never: float) -> Trial:
-    def trial(rng: np.random.Generator) -> bool:
-        found = noticed(_people(rng, n, spread_ms, never), LEVELS_MS.tolist())
-        return (found.lower or 0.0) <= TRUE_MS <= (found.upper or np.inf)
+    def trial(rng: np.random.Generator) -> bool | None:
+        found = noticed(_people(rng, n, spread_ms, never), LEVELS_MS.tolist()).interval
+        return None if found is None else found.low <= TRUE_MS <= found.high
 
     return trial
 
