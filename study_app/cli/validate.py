@@ -10,6 +10,8 @@ import click
 
 from study_app.cli.words import EXIT_FOUND, Target
 
+EXIT_UNDECIDED = 4
+
 
 @click.command("validate-report")
 @click.option("--studies", type=click.IntRange(1, 1_000_000), default=1000, show_default=True, help="Of each cell.")
@@ -22,7 +24,8 @@ def validate_report(studies: int, jobs: int, seed: int, to: Path | None) -> None
     Studies of rek2024 with 5, 12 and 24 participants, by the rehearsals' answer model and by an ordinal probit model
     with random effects, go through the report's own tests. Of every rate the Wilson interval is printed, and whether
     it keeps to its limit: "at most 5 %" holds if the interval reaches down to 5 % and ends below 7.5 %. Ctrl-C ends
-    with what was simulated until then. Ends with exit code 3 where a rate is beyond its limit by its 99.9 % interval.
+    with what was simulated until then. Ends with exit code 3 where a rate is beyond its limit by its 99.9 % interval,
+    else with 4 where the studies are too few to decide about one.
     """
     if jobs == 0:
         raise click.BadParameter("0 jobs do nothing: give 1 or more, or -1 for one a core", param_hint="--jobs")
@@ -36,11 +39,11 @@ def validate_report(studies: int, jobs: int, seed: int, to: Path | None) -> None
     from study_app.session.feelings import feelings
 
     protocol = load("rek2024")
-    of = simulated(protocol, plan(protocol, feelings(protocol, seed=seed)))
+    studied = simulated(protocol, plan(protocol, feelings(protocol, seed=seed)))
     rates: tuple[Rate, ...] = ()
     begun, done = time.monotonic(), 0
     try:
-        for done, so_far in validate(of, studies, seed, jobs=jobs):
+        for done, so_far in validate(studied, studies, seed, jobs=jobs):
             rates = so_far
             if sys.stderr.isatty():
                 click.echo(f"\r\033[K{done} studies", err=True, nl=False)
@@ -51,5 +54,21 @@ def validate_report(studies: int, jobs: int, seed: int, to: Path | None) -> None
     if to is not None:
         for path in write_files(to, {"rates.md": words.encode(), "rates.csv": table(rates)}):
             click.echo(path)
-    if any(one.holds == "no" for one in rates):
+    beyond, undecided = (sum(one.holds == verdict for one in rates) for verdict in ("no", "too few studies"))
+    limited = sum(one.holds != "counted" for one in rates)
+    click.echo(_summary(beyond, undecided, limited))
+    if beyond:
         click.get_current_context().exit(EXIT_FOUND)
+    if undecided or not limited:
+        click.get_current_context().exit(EXIT_UNDECIDED)
+
+
+def _summary(beyond: int, undecided: int, limited: int) -> str:
+    """Return how many of the rates that have a limit are beyond it, or may be."""
+    if not limited:
+        return "nothing was counted"
+    if beyond:
+        return f"{beyond} of {limited} rates beyond their limits, {undecided} undecided"
+    if undecided:
+        return f"{undecided} of {limited} rates undecided: simulate more studies"
+    return "every rate keeps to its limit"

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 from study_app.analysis.answered import of_tables
 from study_app.analysis.evaluate import found_in
@@ -25,6 +26,7 @@ from study_app.analysis.validation.studies import (
     answers,
     simulated,
 )
+from study_app.cli import commands
 from study_app.protocol.answers import Felt
 from study_app.protocol.load import load
 
@@ -119,6 +121,29 @@ def test_every_kind_of_study_is_counted(rek: Simulated, generator: Generator, mo
     }
     assert rates == [rate for extent in EXTENTS for rate in count(rek, Cell(generator, extent, 5), 1, 0, 2)]
     assert len(markdown(rates).splitlines()) == len(table(rates).splitlines()) + 1 == len(rates) + 2
+
+
+@pytest.mark.parametrize(
+    ("hits", "code", "last"),
+    [
+        ((20, 0), 0, "every rate keeps to its limit"),
+        ((62, 0), 4, "1 of 2 rates undecided: simulate more studies"),
+        ((62, 300), 3, "1 of 2 rates beyond their limits, 1 undecided"),
+        ((), 4, "nothing was counted"),
+    ],
+)
+def test_the_command_tells_rates_that_are_undecided_from_rates_that_hold(
+    hits: tuple[int, ...], code: int, last: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rates = tuple(Rate("cell", 5, f"what {at}", "at most 5 %", hit, 1000) for at, hit in enumerate(hits))
+    rates += (Rate("cell", 5, "size", "counted", 7, 1000),) if rates else ()
+    monkeypatch.setattr("study_app.session.feelings.feelings", lambda *_args, **_named: None)
+    monkeypatch.setattr("study_app.analysis.power.planned.plan", lambda *_args: None)
+    monkeypatch.setattr("study_app.analysis.validation.studies.simulated", lambda *_args: None)
+    monkeypatch.setattr("study_app.analysis.validation.running.validate", lambda *_args, **_named: [(1000, rates)])
+    done = CliRunner().invoke(commands, ["validate-report"])
+    assert done.exit_code == code, done.output
+    assert done.output.splitlines()[-1] == last
 
 
 def test_single_tests_are_counted() -> None:
