@@ -13,7 +13,7 @@ from study_app.analysis.evaluate import found_in
 from study_app.analysis.power.planned import plan
 from study_app.analysis.statistics.threshold import noticed
 from study_app.analysis.validation import single, studies
-from study_app.analysis.validation.counting import CLAIMED, LOST, Cell, count
+from study_app.analysis.validation.counting import CLAIMED, LOST, Cell, count, truth
 from study_app.analysis.validation.listed import markdown, table
 from study_app.analysis.validation.rates import Limit, Rate
 from study_app.analysis.validation.studies import (
@@ -111,7 +111,8 @@ def test_verdicts_alone_are_those_of_the_whole_evaluation(rek: Simulated, partic
 @pytest.mark.parametrize("generator", GENERATORS)
 def test_every_kind_of_study_is_counted(rek: Simulated, generator: Generator, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(studies, "TRUTH", 200)
-    rates = [rate for extent in EXTENTS for rate in count(rek, Cell(generator, extent, 5), 1, 0, 2)]
+    cells = [Cell(generator, extent, 5) for extent in EXTENTS]
+    rates = [rate for cell in cells for rate in count(rek, cell, truth(rek, cell), 1, 0, 2)]
     assert {rate.of for rate in rates} == {2}
     assert {rate.cell for rate in rates} == {f"{generator}, {extent}" for extent in EXTENTS}
     assert [rate.hits for rate in rates if rate.what == LOST[0]] == [0, 0, 0]
@@ -119,8 +120,20 @@ def test_every_kind_of_study_is_counted(rek: Simulated, generator: Generator, mo
     assert {"detection threshold printed (delays)", "equal liquids distinguished (liquids)"} <= {
         one.what for one in rates
     }
-    assert rates == [rate for extent in EXTENTS for rate in count(rek, Cell(generator, extent, 5), 1, 0, 2)]
+    assert rates == [rate for cell in cells for rate in count(rek, cell, truth(rek, cell), 1, 0, 2)]
     assert len(markdown(rates).splitlines()) == len(table(rates).splitlines()) + 1 == len(rates) + 2
+
+
+def test_two_studies_in_one_process_have_truths_of_their_own(rek: Simulated, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(studies, "TRUTH", 200)
+    decided = replace(rek.decided, rising=rek.decided.falling, falling=rek.decided.rising)
+    turned = replace(rek, plan=replace(rek.plan, decided=decided))
+    cell = Cell("ordinal probit", "full", 5)
+    first, second = (truth(of, cell) for of in (rek, turned))
+    place = [block.kind for block in rek.blocks].index("delays")
+    clear = np.abs(first[place]) > 1
+    assert clear.any()
+    assert (np.sign(second[place]) == -np.sign(first[place]))[clear].all()
 
 
 @pytest.mark.parametrize(

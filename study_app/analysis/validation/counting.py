@@ -26,6 +26,9 @@ DRAWS: Final = 999
 Event: TypeAlias = tuple[str, Limit]
 """What is counted, and its limit."""
 
+Truth: TypeAlias = tuple[Array, ...]
+"""True differences of means to the first setting (settings, items), of each block."""
+
 LOST: Final[Event] = ("a part of the report is lost", "none")
 CLAIMED: Final = "the first page claims something"
 
@@ -44,18 +47,23 @@ class Cell:
         return f"{self.generator}, {self.extent}"
 
 
-def count(of: Simulated, cell: Cell, seed: int, batch: int, studies: int) -> tuple[Rate, ...]:
+def truth(of: Simulated, cell: Cell) -> Truth:
+    """Return what is true in the studies of a cell, which does not depend on their size."""
+    return true_differences(of, cell.generator, cell.extent)
+
+
+def count(of: Simulated, cell: Cell, truth: Truth, seed: int, batch: int, studies: int) -> tuple[Rate, ...]:
     """Return the rates of so many studies of a cell, those of batch number ``batch``."""
     events: dict[Event, int] = {}
     for study in range(batch * BATCH, batch * BATCH + studies):
-        for event, happened in _study(of, cell, seed, study).items():
+        for event, happened in _study(of, cell, truth, seed, study).items():
             events[event] = events.get(event, 0) + happened
     return tuple(
         Rate(cell.name, cell.participants, what, limit, hits, studies) for (what, limit), hits in events.items()
     )
 
 
-def _study(of: Simulated, cell: Cell, seed: int, study: int) -> dict[Event, bool]:
+def _study(of: Simulated, cell: Cell, truth: Truth, seed: int, study: int) -> dict[Event, bool]:
     failures = Failures()
     given = answers(of, cell.generator, cell.extent, cell.participants, seed, study)
     people = tuple(f"P{number:03d}" for number in range(cell.participants))
@@ -79,7 +87,7 @@ def _study(of: Simulated, cell: Cell, seed: int, study: int) -> dict[Event, bool
             result = replace(result, overall=over_all(replace(asked, seed=1 + study), DRAWS))
         results.append(result)
         judged = _in_delays if block.kind == "delays" else _in_liquids
-        for (what, at_most), hit in judged(of, asked, result, cell, place):
+        for (what, at_most), hit in judged(asked, result, cell, truth[place]):
             found[f"{what} ({block.kind})", at_most] = hit
         if cell.extent == "empty":
             differs = result.overall is not None and (result.overall.p or 1.0) <= of.decided.alpha
@@ -92,9 +100,7 @@ def _study(of: Simulated, cell: Cell, seed: int, study: int) -> dict[Event, bool
     return found
 
 
-def _in_liquids(
-    of: Simulated, asked: Asked, found: BlockFound, cell: Cell, _place: int
-) -> Iterator[tuple[Event, bool]]:
+def _in_liquids(asked: Asked, found: BlockFound, cell: Cell, _truth: Array) -> Iterator[tuple[Event, bool]]:
     if cell.extent == "empty":
         yield ("settings differ in a statement", "at most 5 %"), any(one.verdict in FOUND for one in found.omnibus)
         yield ("liquids recognised", "at most 5 %"), found.named is not None and found.named.verdict in FOUND
@@ -119,7 +125,7 @@ def _equal_pairs(block: Block, extent: Extent) -> set[tuple[str, str]]:
     }
 
 
-def _in_delays(of: Simulated, asked: Asked, found: BlockFound, cell: Cell, place: int) -> Iterator[tuple[Event, bool]]:
+def _in_delays(asked: Asked, found: BlockFound, cell: Cell, truth: Array) -> Iterator[tuple[Event, bool]]:
     block = asked.block
     null = [block.settings[at].delay_ms or 0.0 for at in alike(block, cell.extent)]
     if cell.extent == "empty":
@@ -131,7 +137,7 @@ def _in_delays(of: Simulated, asked: Asked, found: BlockFound, cell: Cell, place
         differ = any(one.verdict == "different" and one.delay_ms <= max(null) for one in found.against)
         yield ("equal delays called different", "at most 5 %"), differ
     if cell.extent != "empty":
-        yield from _equivalence(of, found, cell, place)
+        yield from _equivalence(asked, found, truth)
     if cell.extent == "full":
         yield ("lowest delay stated", "counted"), any(one.over_all_ms is not None for one in found.lowest)
         yield ("detection threshold printed", "counted"), _printed(found)
@@ -141,16 +147,15 @@ def _printed(found: BlockFound) -> bool:
     return found.threshold is not None and found.threshold.effect is not None
 
 
-def _equivalence(of: Simulated, found: BlockFound, cell: Cell, place: int) -> Iterator[tuple[Event, bool]]:
+def _equivalence(asked: Asked, found: BlockFound, truth: Array) -> Iterator[tuple[Event, bool]]:
     """Yield whether a delay is called equivalent that is not: the one nearest to the bound, and on the first page."""
-    bound = of.decided.equivalence_bound
+    bound = asked.decided.equivalence_bound
     if bound is None or not found.against:
         return
-    block = of.blocks[place]
     beyond = {
         (item.id, setting.delay_ms or 0.0): float(away)
-        for setting, row in zip(block.settings, np.abs(_truth(of, cell.generator, cell.extent, place)), strict=True)
-        for item, away in zip(block.items, row, strict=True)
+        for setting, row in zip(asked.block.settings, np.abs(truth), strict=True)
+        for item, away in zip(asked.block.items, row, strict=True)
         if away >= bound
     }
     if not beyond:
@@ -161,14 +166,3 @@ def _equivalence(of: Simulated, found: BlockFound, cell: Cell, place: int) -> It
     up_to = common_ms(found)
     too_far = up_to is not None and any(delay <= up_to for _, delay in beyond)
     yield ("“unchanged up to” too long", "at most 5 %"), too_far
-
-
-_TRUTHS: Final[dict[tuple[str, str], tuple[Array, ...]]] = {}
-
-
-def _truth(of: Simulated, generator: Generator, extent: Extent, place: int) -> Array:
-    """Return the true differences of a block, computed once in each process."""
-    key = (generator, extent)
-    if key not in _TRUTHS:
-        _TRUTHS[key] = true_differences(of, generator, extent)
-    return _TRUTHS[key][place]

@@ -32,11 +32,17 @@ def validate(
     jobs : how many processes work at once; -1: as many as there are cores. What is counted does not depend on it.
     """
     batches = [(first // BATCH, min(BATCH, studies - first)) for first in range(0, studies, BATCH)]
+    every = cells(sizes)
+    kinds = {(cell.generator, cell.extent): cell for cell in every}
+    truths = {kind: counting.truth(of, cell) for kind, cell in kinds.items()}
     work = [
         task
         for batch, many in batches
         for task in (
-            *(delayed(counting.count)(of, cell, seed, batch, many) for cell in cells(sizes)),
+            *(
+                delayed(counting.count)(of, cell, truths[cell.generator, cell.extent], seed, batch, many)
+                for cell in every
+            ),
             *(delayed(single.count)(case, seed, batch, many) for case in single.cases()),
         )
     ]
