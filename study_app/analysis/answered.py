@@ -49,7 +49,7 @@ class Asked:
 
     ``values`` (participants, settings) are the medians of ``single`` answers (participants, settings, presentations);
     ``sessions`` of the same shape are the sessions in which these were given. ``verdicts_only``: leave out what decides
-    no verdict, for thousands of simulated studies; and without ``equivalence`` also what decides only that.
+    no verdict, for thousands of simulated studies.
     """
 
     block: Block
@@ -63,7 +63,6 @@ class Asked:
     sessions: Mapping[str, Array]
     planning: bool = True
     verdicts_only: bool = False
-    equivalence: bool = True
 
     @property
     def n(self) -> int:
@@ -129,7 +128,6 @@ def of_tables(
     failures: Failures | None = None,
     planning: bool = True,
     verdicts_only: bool = False,
-    equivalence: bool = True,
 ) -> Asked:
     """Return a block's answers from tables of single answers (participants, settings, presentations) of each item.
 
@@ -147,7 +145,6 @@ def of_tables(
         {item: np.ones_like(answers) for item, answers in single.items()} if sessions is None else sessions,
         planning,
         verdicts_only,
-        equivalence,
     )
 
 

@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import lru_cache
 from typing import Final
 
 import numpy as np
-from scipy.special import stdtr
 
 from study_app.analysis.answered import AGAIN, MANY, OVER_ALL, Asked, asked_again, head, over_all
 from study_app.analysis.judging import judged
-from study_app.analysis.measures import Array
 from study_app.analysis.results import Against, BlockFound, Lowest, Tested, Waiting
-from study_app.analysis.statistics.equivalence import SAME, Equivalence, p_unseen, tost
+from study_app.analysis.statistics.equivalence import tost
 from study_app.analysis.statistics.equivalence_power import participants_needed
 from study_app.analysis.statistics.families import holm
-from study_app.analysis.statistics.paired import signed, signed_p
 from study_app.analysis.statistics.threshold import Threshold, noticed
 from study_app.analysis.statistics.trend import page, step_down
 from study_app.analysis.tables import Study
@@ -104,7 +100,14 @@ def _against(of: Asked, delays_ms: list[float]) -> tuple[tuple[Against, ...], tu
         values = of.values[item.id]
         for place, delay_ms in enumerate(delays_ms[1:], start=1):
             differences = values[:, place] - values[:, 0]
-            tested = _tost(of, differences, bound)
+            tested = tost(
+                differences,
+                bound,
+                alpha=of.decided.alpha,
+                seed=of.seed,
+                checks=of.n <= MANY,
+                verdict_only=of.verdicts_only,
+            )
             if of.planning:
                 tested = replace(tested, n_needed=participants_needed(differences, bound, of.decided.alpha))
             found.append((item.id, delay_ms, tested))
@@ -113,48 +116,6 @@ def _against(of: Asked, delays_ms: list[float]) -> tuple[tuple[Against, ...], tu
         Against(item, delay_ms, delays_ms[0], tested.judged(p, len(found)), p, len(found), of.decided.direction(item))
         for (item, delay_ms, tested), p in zip(found, adjusted, strict=True)
     ), ()
-
-
-def _tost(of: Asked, differences: Array, bound: float) -> Equivalence:
-    """Compare one delay with the shortest; where verdicts alone are asked for, only as far as they need it."""
-    found = _at_once(of, differences, bound) if of.verdicts_only else None
-    if found is not None:
-        return found
-    return tost(differences, bound, alpha=of.decided.alpha, seed=of.seed, checks=of.n <= MANY)
-
-
-def _at_once(of: Asked, differences: Array, bound: float) -> Equivalence | None:
-    """Return a comparison without what its verdict does not need; None where it needs all tests.
-
-    That is so where it may be equivalent; where equivalence is not asked for, only if it may be different, too.
-    """
-    n, sd, alpha = (
-        len(differences),
-        float(np.std(differences, ddof=1)) if len(differences) > 1 else 0.0,
-        of.decided.alpha,
-    )
-    if np.isnan(differences).any() or sd <= SAME:
-        return None
-    mean, error = float(differences.mean()), sd / np.sqrt(n)
-    by_t = float(stdtr(n - 1, (abs(mean) - bound) / error))
-    p: float | None = by_t
-    p_different = 2 * float(stdtr(n - 1, -abs(mean) / error))
-    if by_t <= alpha and p_unseen(n, equal=False) <= alpha:
-        if of.equivalence or p_different <= alpha:
-            return None
-        p = None
-    by_ranks = None
-    if p_different <= alpha:
-        ranks, signs = signed(differences)
-        by_ranks, _, _ = signed_p(ranks, int(ranks[signs > 0].sum()), "two-sided")
-    found = _of_size(n, bound, alpha)
-    return replace(found, effect=mean, sd=sd, p=p, p_different=p_different, p_different_ranks=by_ranks)
-
-
-@lru_cache(maxsize=64)
-def _of_size(n: int, bound: float, alpha: float) -> Equivalence:
-    """Return a comparison of so many participants whose numbers are to be replaced."""
-    return replace(tost(np.arange(n) * bound, bound, alpha=alpha, checks=False), interval=None, beyond=None)
 
 
 def _up_to(against: tuple[Against, ...]) -> dict[str, float | None]:

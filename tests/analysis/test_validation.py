@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -99,6 +99,11 @@ def test_verdicts_alone_are_those_of_the_whole_evaluation(rek: Simulated, partic
             )
             assert [one.verdict for one in quick.against] == [one.verdict for one in whole.against]
             assert [one.found.effect for one in quick.against] == [one.found.effect for one in whole.against]
+            for one, other in zip(quick.against, whole.against, strict=True):
+                told = {field.name: getattr(one.found, field.name) for field in fields(one.found)}
+                told = {name: value for name, value in told.items() if value not in (None, "") and name != "note"}
+                told.pop("checks_agree", None)
+                assert told == {name: getattr(other.found, name) for name in told}
             assert quick.equivalent_up_to == whole.equivalent_up_to
             assert (quick.omnibus, quick.pairs) == (whole.omnibus, whole.pairs)
             assert [one.p_adjusted for one in quick.trends] == [one.p_adjusted for one in whole.trends]

@@ -13,8 +13,7 @@ from typing import Any, Final, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import stdtr
-from scipy.stats import ttest_1samp
+from scipy.special import stdtr, stdtrit
 
 from study_app.analysis.statistics.bootstrap_t import p_within, resamples_for
 from study_app.analysis.statistics.outcome import DRAWS, Array, Interval, Outcome, checked, clopper_pearson, told
@@ -104,7 +103,13 @@ class Equivalence(Outcome):
 
 
 def tost(
-    differences: ArrayLike, bound: float, *, alpha: float = 0.05, seed: int = 1, checks: bool = True
+    differences: ArrayLike,
+    bound: float,
+    *,
+    alpha: float = 0.05,
+    seed: int = 1,
+    checks: bool = True,
+    verdict_only: bool = False,
 ) -> Equivalence:
     """Test whether the mean of paired differences lies within ± ``bound``.
 
@@ -116,6 +121,9 @@ def tost(
         In points of the scale, set before the study.
     checks : bool
         Whether to ask without normality too, which takes long for many hundreds of participants.
+    verdict_only : bool
+        Whether to leave out those of these tests that cannot change the verdict: those for equivalence where the t
+        tests or ``p_unseen`` do not show it, and the one of a difference where the t test does not.
 
     Raises
     ------
@@ -126,7 +134,7 @@ def tost(
         raise AnalysisError(f"a bound of equivalence of {bound} means nothing; give one above 0 in points of the scale")
     array = checked(differences, "participants")
     kept = np.sort(array[~np.isnan(array)])
-    found = _compared(tuple(kept.tolist()), float(bound), alpha, seed, checks)
+    found = _compared(tuple(kept.tolist()), float(bound), alpha, seed, checks, verdict_only)
     return replace(found, dropped=len(array) - len(kept))
 
 
@@ -145,7 +153,9 @@ def fewest(alpha: float, *, equal: bool = False) -> int:
 
 
 @lru_cache(maxsize=4096)
-def _compared(differences: tuple[float, ...], bound: float, alpha: float, seed: int, checks: bool) -> Equivalence:
+def _compared(
+    differences: tuple[float, ...], bound: float, alpha: float, seed: int, checks: bool, verdict_only: bool
+) -> Equivalence:
     """Return the comparison of ascending ``differences``: answers in whole points repeat."""
     kept = np.array(differences)
     found = _described(kept, bound, alpha)
@@ -153,15 +163,14 @@ def _compared(differences: tuple[float, ...], bound: float, alpha: float, seed: 
         return found
     if found.sd is not None and found.sd > SAME:
         found = replace(found, no_interval="", **_by_t(kept, found.sd, bound, alpha))
-        found = replace(found, **_without_normality(kept, bound, seed, alpha)) if checks else found
+        if checks:
+            found = replace(found, **_without_normality(kept, found, seed, verdict_only))
     elif len(kept) > 1:
         found = replace(found, **_without_spread(kept, bound, seed))
     if found.p_ranks is not None and found.t is not None:
         asked = (found.p_permutation, found.p_ranks, found.p_bootstrap)
         by_t = found.p is not None and found.p <= alpha
         found = replace(found, checks_agree=all((p is None or p <= alpha) == by_t for p in asked))
-    if found.p is not None:
-        found = replace(found, p_unseen=p_unseen(found.n, equal=found.t is None))
     found = found.judged(found.p_difference, 1)
     return replace(found, note=_note(found)) if found.p is not None else found
 
@@ -199,34 +208,36 @@ def _beyond(kept: Array, bound: float) -> Beyond:
 
 def _by_t(kept: Array, sd: float, bound: float, alpha: float) -> dict[str, Any]:
     """Return what the t tests say."""
-    different = ttest_1samp(kept, 0.0)
-    ends = different.confidence_interval(1 - 2 * alpha)
-    lower, upper = (float((kept.mean() + side * bound) / (sd / math.sqrt(len(kept)))) for side in (1, -1))
-    p_lower, p_upper = float(stdtr(len(kept) - 1, -lower)), float(stdtr(len(kept) - 1, upper))
+    mean, error, df = float(kept.mean()), sd / math.sqrt(len(kept)), len(kept) - 1
+    lower, upper = ((mean + side * bound) / error for side in (1, -1))
+    p_lower, p_upper = float(stdtr(df, -lower)), float(stdtr(df, upper))
+    reach = float(stdtrit(df, 1 - alpha)) * error
     return {
         "statistic": min(lower, -upper),
         "p": max(p_lower, p_upper),
-        "method": f"t({len(kept) - 1}), bound ±{bound:g} points",
-        "interval": Interval(float(ends.low), float(ends.high), 1 - 2 * alpha, "t"),
-        "t": float(different.statistic),
+        "method": f"t({df}), bound ±{bound:g} points",
+        "interval": Interval(mean - reach, mean + reach, 1 - 2 * alpha, "t"),
+        "t": mean / error,
         "t_lower": lower,
         "t_upper": upper,
-        "p_different": float(different.pvalue),
+        "p_different": 2 * float(stdtr(df, -abs(mean) / error)),
         "p_lower": p_lower,
         "p_upper": p_upper,
+        "p_unseen": p_unseen(len(kept), equal=False),
         "smallest_check_p": None,
     }
 
 
-def _without_normality(kept: Array, bound: float, seed: int, alpha: float) -> dict[str, Any]:
-    """Return what changing signs, signed ranks and the bootstrap say to the same questions."""
-    return {
-        "p_permutation": max(_signs(kept + bound, seed), _signs(bound - kept, seed)),
-        "p_ranks": max(_ranks(kept + bound), _ranks(bound - kept)),
-        "p_bootstrap": float(p_within(kept[None], bound, seed, resamples_for(alpha))[0]),
-        "p_different_ranks": _ranks(kept, "two-sided"),
-        "smallest_check_p": _smallest(len(kept)),
-    }
+def _without_normality(kept: Array, found: Equivalence, seed: int, verdict_only: bool) -> dict[str, Any]:
+    """Return what changing signs, signed ranks and the bootstrap say to the questions that the t tests answered."""
+    bound, alpha, asked = found.bound, found.alpha, dict[str, Any](smallest_check_p=_smallest(len(kept)))
+    if found.equal or not verdict_only:
+        asked["p_permutation"] = max(_signs(kept + bound, seed), _signs(bound - kept, seed))
+        asked["p_ranks"] = max(_ranks(kept + bound), _ranks(bound - kept))
+        asked["p_bootstrap"] = float(p_within(kept[None], bound, seed, resamples_for(alpha))[0])
+    if (found.p_different or 0.0) <= alpha or not verdict_only:
+        asked["p_different_ranks"] = _ranks(kept, "two-sided")
+    return asked
 
 
 def _without_spread(kept: Array, bound: float, seed: int) -> dict[str, Any]:
@@ -239,6 +250,7 @@ def _without_spread(kept: Array, bound: float, seed: int) -> dict[str, Any]:
         "p_permutation": permuted,
         "p_ranks": ranked,
         "p_different_ranks": _ranks(kept, "two-sided"),
+        "p_unseen": p_unseen(len(kept), equal=True),
     }
 
 

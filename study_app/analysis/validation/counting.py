@@ -80,7 +80,6 @@ def _study(of: Simulated, cell: Cell, truth: Truth, seed: int, study: int) -> di
             failures=failures,
             planning=False,
             verdicts_only=True,
-            equivalence=cell.extent != "empty",
         )
         result = found_in(None, asked)
         if cell.extent != "partial":  # with draws of its own: the same draws in all studies would shift the rate
