@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from study_app.analysis.evaluate import evaluate
+from study_app.analysis.failures import Failures
 from study_app.analysis.report import listing, short
+from study_app.analysis.report.first_page import first_page
 from study_app.analysis.report.methods import methods
 from study_app.analysis.report.r_script import r_script
 from study_app.analysis.report.sections import block
@@ -55,10 +58,13 @@ def test_no_exception_leaves_the_evaluation_of_any_study(part: int) -> None:
         assert results.failures == (), number
         json.dumps(plain(results), allow_nan=False)
         short.findings(results)
-        short.limits(made, results)
         methods(made, results)
         r_script(made, results)
         listing.tests_csv(results)
+        failures = Failures()
+        page = first_page(results, short.limits(made, results), failures)
+        assert failures.found == [], number
+        assert not re.search(r"\bnan\b|\bNone\b|\binf\b", re.sub(r'src="[^"]*"', "", page)), number
         for found in results.blocks:
             page = " ".join(block(found, results, ()))
             assert "Not there: its computation failed" not in page, number
