@@ -70,7 +70,7 @@ def test_a_changed_journal_is_not_to_be_rebuilt_from(copy: StudyFolder) -> None:
     session = copy.sessions()[0]
     change(session.journal, b'"operator":"', b'"operator":"X')
     (line,) = told(copy)
-    assert line.startswith(f"{session.journal} has changed since the session ended")
+    assert line.startswith(f"{session.journal} is damaged")
     assert "restore it from a copy" in line
     assert "rebuild" not in line
 

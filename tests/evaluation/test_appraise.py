@@ -131,7 +131,6 @@ def test_what_is_withheld_depends_on_the_device_and_the_rate() -> None:
     late = withheld_share(scene, QUICK, Dynamics(3e-3))
     slow = withheld_share(scene.model_copy(update={"rate_hz": 500.0}), QUICK, Dynamics(1e-3))
     assert len({usual, light, late, slow}) == 4
-    assert light > usual
     t_s = np.arange(10) / 1000
     delays = samples_along(scene, Motion(t_s, np.zeros((10, 3))), Dynamics(2.5e-3)).delay_ticks
     assert set(delays) == {3}

@@ -17,11 +17,9 @@ from study_app.protocol.model import Protocol, StudyHead
 from study_app.store import journal, receipt
 from study_app.store import unblinding as module
 from study_app.store.blinding import open_or_draw_key, reveal
-from study_app.store.checksums import write_checksums
 from study_app.store.columns import SEALED, TRIALS, header, unsealed
 from study_app.store.description import description_bytes
 from study_app.store.layout import StudyFolder
-from study_app.store.open_session import table_files
 from study_app.store.rebuild import rebuild
 from study_app.store.resume import reopen
 from study_app.store.sealing import opened
@@ -29,6 +27,7 @@ from study_app.store.session import SessionStore
 from study_app.store.unblinding import unblind
 from study_app.store.verify import verify
 from tests.store.conftest import SOURCE
+from tests.store.forging import Lines, cover_up, forge
 
 Start = Callable[..., SessionStore]
 Attend = Callable[[SessionStore], None]
@@ -193,10 +192,13 @@ def test_a_sealed_text_that_was_changed_is_found(tmp_path: Path, start: Start, a
     store = start()
     attend(store)
     store.finish("completed")
-    path = store.folder.journal
-    text = path.read_text(encoding="utf-8")
-    at = text.index('"sealed":"') + 100
-    path.write_text(text[:at] + ("0" if text[at] != "0" else "1") + text[at + 1 :], encoding="utf-8")
+
+    def change(lines: Lines) -> None:
+        line = next(line for line in lines if "sealed" in line)
+        text = line["sealed"]
+        line["sealed"] = text[:100] + ("0" if text[100] != "0" else "1") + text[101:]
+
+    forge(store.folder.journal, change)
     assert "does not open with the study's key: it was changed" in "\n".join(
         map(str, verify(tmp_path / "study").errors)
     )
@@ -208,10 +210,12 @@ def in_clear(store: SessionStore, study: StudyHead) -> None:
     """Make of a finished session one of an earlier version, which sealed nothing."""
     lines = opened(journal.read(store.folder.journal), store.key)
     del lines[0]["measures_sealed"]
-    store.folder.journal.write_bytes(b"".join(map(journal.line_bytes, lines)))
-    for path, content in table_files(store.place, lines, None):
-        path.write_bytes(content)
-    write_checksums(store.folder, {})
+
+    def clear(held: Lines) -> None:
+        held[:] = lines
+
+    forge(store.folder.journal, clear)
+    cover_up(store.place.study_folder.path)
     store.place.study_folder.description.write_bytes(description_bytes(study, sealed=False))
 
 

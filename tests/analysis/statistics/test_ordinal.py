@@ -178,7 +178,7 @@ def test_answers_without_an_estimate_are_told(values: np.ndarray, note: str) -> 
 
 @pytest.mark.parametrize("columns", [[[0], [1]], [[1], [1], [1]], [[0, 0], [1, 2], [2, 4]], [[0], [1], [np.nan]]])
 def test_columns_that_do_not_tell_settings_apart_are_refused(columns: list[list[float]]) -> None:
-    with pytest.raises(AnalysisError, match="do not tell 3 settings apart"):
+    with pytest.raises(AnalysisError, match="do not distinguish 3 settings"):
         ordinal(made_up(12), columns)
 
 
