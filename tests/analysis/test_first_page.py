@@ -11,7 +11,10 @@ import pytest
 from study_app.analysis.decided import Decided
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.failures import Failures
-from study_app.analysis.report.answers import Answer, answers, common_ms, given, recognised
+from study_app.analysis.report.answer import Answer
+from study_app.analysis.report.answers_of_delays import common_ms
+from study_app.analysis.report.answers_of_liquids import given, recognised
+from study_app.analysis.report.claims import answers
 from study_app.analysis.report.first_page import first_page
 from study_app.analysis.report.measured import CLAIMS, STUDIES, empty_studies
 from study_app.analysis.results import Named, Results

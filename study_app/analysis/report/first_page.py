@@ -11,7 +11,8 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 
 from study_app.analysis.failures import Failure, Failures
 from study_app.analysis.report import first_pictures
-from study_app.analysis.report.answers import ASKED, Answer, answers
+from study_app.analysis.report.answer import ASKED, Answer
+from study_app.analysis.report.claims import answers
 from study_app.analysis.report.measured import empty_studies
 from study_app.analysis.results import BlockFound, Results
 

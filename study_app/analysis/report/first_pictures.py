@@ -8,7 +8,8 @@ from typing import Final
 from matplotlib.axes import Axes
 
 from study_app.analysis import psychometric_figure, style
-from study_app.analysis.report.answers import Answer, common_ms
+from study_app.analysis.report.answer import Answer
+from study_app.analysis.report.answers_of_delays import common_ms
 from study_app.analysis.report.words import ms, name, short
 from study_app.analysis.results import BlockFound, Named
 from study_app.analysis.sheet import Sheet

@@ -13,8 +13,9 @@ from study_app.analysis.evaluate import found_in
 from study_app.analysis.failures import Failures
 from study_app.analysis.measures import Array
 from study_app.analysis.questions import Block
-from study_app.analysis.report.answers import FOUND, common_ms
-from study_app.analysis.report.answers import answers as answered
+from study_app.analysis.report.answer import FOUND
+from study_app.analysis.report.answers_of_delays import common_ms
+from study_app.analysis.report.claims import answers as answered
 from study_app.analysis.results import BlockFound, Results
 from study_app.analysis.validation.rates import Limit, Rate
 from study_app.analysis.validation.studies import Extent, Generator, Simulated, alike, answers, true_differences
