@@ -1,0 +1,72 @@
+"""Commands on results, killed at any moment: no file is half there, and the next run ends as if nothing had been."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from study_app.store.verify import verify
+from tests.compiled import needs_servo
+from tests.faults import short
+from tests.faults.command_killer import COMMANDS
+
+pytestmark = [
+    needs_servo,
+    pytest.mark.skipif(not hasattr(os, "fork"), reason="needs processes that fork"),
+]
+
+
+@pytest.fixture(scope="module")
+def outcomes(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, Any]]:
+    folder = tmp_path_factory.mktemp("commands")
+    done = subprocess.run(
+        [sys.executable, "-m", "tests.faults.command_killer", str(short.write(folder)), str(folder), "1"],
+        cwd=Path(__file__).parents[2],
+        capture_output=True,
+        text=True,
+        timeout=150,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return [json.loads(line) for line in done.stdout.splitlines()]
+
+
+def seen(files: dict[str, str]) -> dict[str, str]:
+    """Return the files that are neither half-written nor tell when something was done."""
+    told_when = {"rebuilt.txt", "checksums.sha256", "reveals.jsonl"}
+    return {
+        path: held
+        for path, held in files.items()
+        if not Path(path).name.startswith(".") and Path(path).name not in told_when
+    }
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_file_is_as_before_or_as_after_and_the_next_run_finishes_them(
+    outcomes: list[dict[str, Any]], command: str
+) -> None:
+    whole, *killed = (outcome for outcome in outcomes if outcome["command"] == command)
+    assert whole["code"] == 0
+    assert whole["before"] != whole["left"]
+    assert len(killed) == COMMANDS[command][0]
+    assert sum(outcome["code"] == -signal.SIGKILL for outcome in killed) >= len(killed) / 4
+    for outcome in killed:
+        for name, held in seen(outcome["held"]).items():
+            assert held in (outcome["before"].get(name), whole["left"][name]), (outcome["after_s"], name)
+        assert outcome["again"] == 0, outcome["after_s"]
+        assert seen(outcome["left"]) == seen(whole["left"])
+
+
+@pytest.mark.parametrize("command", ["rebuild", "unblind"])
+def test_the_study_is_sound_in_the_end(outcomes: list[dict[str, Any]], command: str) -> None:
+    for outcome in outcomes:
+        if outcome["command"] == command:
+            findings = verify(Path(outcome["folder"]))
+            assert findings.sound, (outcome["after_s"], findings.errors)
