@@ -202,7 +202,7 @@ def test_slow_scenes_are_slowed_down_no_further_than_a_scene_may_be():
     assert [rung.every for rung in rungs if rung.every > 1] == [2, 4]
 
 
-@pytest.mark.parametrize(("speed_mps", "expects"), [(1e-4, "no resistance"), (0.6, "+ history")])
+@pytest.mark.parametrize(("speed_mps", "expects"), [(1e-3, "no resistance"), (0.6, "+ history")])
 def test_the_ladder_has_the_gates_own_choice(speed_mps, expects):
     box = MotionBox(speed_mps=speed_mps, acceleration_mps2=10 * speed_mps)
     rungs, choice = ladders.physical(REAL.model_copy(update={"motion": box}))
