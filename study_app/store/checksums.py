@@ -58,6 +58,27 @@ def renew_checksums(session: SessionFolder, rewritten: Collection[Path], known: 
     return True
 
 
+def replace_checksums(session: SessionFolder, contents: Mapping[str, tuple[bytes, bytes]]) -> None:
+    """Replace the SHA-256 of files by that of their new contents, where the list has that of the old.
+
+    ``contents`` are the old and the new by path in the session's folder. A file of which the list says something else
+    was changed since the session ended: that stays to be seen.
+
+    Raises
+    ------
+    StoreError
+        The list cannot be read, or not written.
+    """
+    listed = read_checksums(session)
+    new = {
+        name: hashlib.sha256(after).hexdigest()
+        for name, (before, after) in contents.items()
+        if listed.get(name) == hashlib.sha256(before).hexdigest()
+    }
+    if new:
+        write_file(session.checksums, checksum_bytes(listed | new))
+
+
 def note_rebuilt(session: SessionFolder, what: str) -> None:
     """Note for good what `rebuild` made again of what proves a session: nothing before then is proved by it.
 

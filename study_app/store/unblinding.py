@@ -14,14 +14,13 @@ from study_app.protocol.model import StudyHead
 from study_app.store import journal, receipt
 from study_app.store.atomic import is_there, write_file
 from study_app.store.blinding import Codes, Key, read_key, reveal
-from study_app.store.checksums import renew_checksums
+from study_app.store.checksums import replace_checksums
 from study_app.store.description import described_study, write_description
 from study_app.store.journal import Line
 from study_app.store.layout import SessionFolder, StudyFolder
 from study_app.store.open_session import Place, table_files
 from study_app.store.opening import open_alone
 from study_app.store.participants import write_participants
-from study_app.store.recorder import hashes_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +86,7 @@ def _rewrite(place: Place, lines: list[Line], key: Key) -> list[str]:
             write_file(path, content)
         ours.append(path)
     if is_there(place.folder.checksums):
-        renew_checksums(place.folder, ours, hashes_of(lines))
+        replace_checksums(place.folder, {path.name: (before[path], after[path]) for path in ours})
     return left
 
 

@@ -19,7 +19,7 @@ from study_app.store import unblinding as module
 from study_app.store.blinding import open_or_draw_key, reveal
 from study_app.store.columns import SEALED, TRIALS, header, unsealed
 from study_app.store.description import description_bytes
-from study_app.store.layout import StudyFolder
+from study_app.store.layout import REBUILT, StudyFolder
 from study_app.store.rebuild import rebuild
 from study_app.store.resume import reopen
 from study_app.store.sealing import opened
@@ -96,6 +96,7 @@ def test_unblinding_gives_what_an_open_study_would_have_held(
     assert ours == description
     assert sound(folders[0])
     assert sound(folders[1])
+    assert not list(folders[1].rglob(REBUILT)), "unblinding makes no proof again"
 
 
 def test_opening_again_changes_no_table_and_finishes_what_was_broken_off(
@@ -111,7 +112,7 @@ def test_opening_again_changes_no_table_and_finishes_what_was_broken_off(
     def killed(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(module, "renew_checksums", killed)
+    monkeypatch.setattr(module, "replace_checksums", killed)
     with pytest.raises(KeyboardInterrupt):
         unblind(folder, "AB", "done")
     monkeypatch.undo()
