@@ -97,6 +97,7 @@ def operator_plan(pages: Pages, size: tuple[int, int], qtbot: Any) -> OperatorWi
     """Return the operator's window at the end of the session."""
     made = OperatorWindow("rek2024", lateness_limit_s=0.002, reach_m=0.05, pointer=True)
     qtbot.addWidget(made)
+    made.header.page.show()  # as where both windows share a screen
     made.show_view(pages.ended_view())
     laid_out(made, size)
     return made
@@ -149,13 +150,9 @@ class ByMouse(Person):
     def __init__(self, program: Visitor, qtbot: Any) -> None:
         super().__init__(program)
         self._plan = ParticipantWindow(words("en"), clock=ManualClock(), windowed=True, strip=Strip())
+        self._plan.may_close = True
         qtbot.addWidget(self._plan)
         laid_out(self._plan, (WINDOWED_SIZE.width(), WINDOWED_SIZE.height()))
-        self._middle = self._plan.rect().center()
-
-    def leave(self) -> None:
-        self._plan.may_close = True
-        self._plan.close()
 
     def click(self, window: str, *places: QPoint) -> None:
         orders = [
@@ -225,25 +222,24 @@ class ByMouse(Person):
     def _reached_more(self, page: TaskPage, before: int, ended: Callable[[], bool]) -> bool:
         return self._reached(page) > before or ended()
 
-    def _astray(self) -> int:
-        """Return how far the pointer is from the middle [px]; the program puts it back there from beyond a quarter."""
-        x, y = self._pointer()
-        return abs(x - self._middle.x()) + abs(y - self._middle.y())
-
     def move(self, right_px: int) -> None:
-        """Move the mouse, no faster than the pointer is put back into the middle of the tank."""
-        strays = min(self._plan.width(), self._plan.height()) // 4
+        """Move the mouse, no faster than the pointer is put back into the middle of the tank from beyond a quarter."""
+        tank = self._plan.widget.geometry()  # below the strip
+        middle = self._place("getwindowgeometry", "--shell", self.window) + tank.center()
+        strays = min(tank.width(), tank.height()) // 4
         while right_px:
             step = max(-400, min(400, right_px))
             self.program.xdotool("mousemove_relative", "--", str(step), "0")
             right_px -= step
-            wait_for(lambda: self._astray() <= strays, "the pointer near the middle")
+            wait_for(lambda: (self._pointer() - middle).manhattanLength() <= strays, "the pointer near the middle")
 
-    def _pointer(self) -> tuple[int, int]:
-        place = dict(
-            line.split("=") for line in self.program.xdotool("getmouselocation", "--shell").splitlines() if "=" in line
-        )
-        return int(place["X"]), int(place["Y"])
+    def _pointer(self) -> QPoint:
+        return self._place("getmouselocation", "--shell")
+
+    def _place(self, *asked: str) -> QPoint:
+        """Return where on the screen something is."""
+        place = dict(line.split("=") for line in self.program.xdotool(*asked).splitlines() if "=" in line)
+        return QPoint(int(place["X"]), int(place["Y"]))
 
 
 def changed(program: Visitor, before: Any) -> bool:
@@ -344,7 +340,6 @@ def test_the_whole_study_by_the_mouse_alone_from_home_to_home(program: Visitor, 
     program.wait_for_event("session_started")
     pages = Pages(program.events("session_started")[0])
     given = person.walk(pages)
-    person.leave()
     operator = program.window("operator$")
     cockpit = operator_plan(pages, program.size(operator), qtbot)
     person.click(operator, place_in(cockpit, cockpit.buttons.close_session))
