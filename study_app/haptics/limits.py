@@ -25,11 +25,11 @@ CUT_INERTIA_SHARE: Final = 0.15
 
 MEASURED_KG: Final = 0.1
 """The free handle that the table was measured with."""
-LIGHTER: Final = 1.3
+LIGHTER: Final = 1.6
 """Power of the ratio of masses in which a lighter handle bears less: at 1, a freed handle of 30 g swung in honey; at
-1.2 in a dense liquid, where the delay was one tick longer than believed."""
-LIGHTER_KALMAN: Final = 1.7
-"""The same with "kalman", which bears as much more at 0.1 kg: at 1.3, two of 2301 handles of 30 and 50 g were restless
+1.45 in tar, where the delay was one tick longer than believed."""
+LIGHTER_KALMAN: Final = 2.0
+"""The same with "kalman", which bears as much more at 0.1 kg: at 1.7, a freed handle of 50 g was restless in honey,
 where the delay was one tick longer than believed."""
 SLEW_N: Final = 1.5
 """The most that the force on a handle of `MEASURED_KG` or more changes within a millisecond."""

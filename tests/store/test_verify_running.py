@@ -21,7 +21,7 @@ from study_app.store.verify import verify
 from tests.faults import short
 from tests.store.conftest import SOURCE, choose, study_tables, summary_of_trial
 
-ENOUGH = 3  # looks
+ENOUGH = 1  # looks
 MOST = 12  # sessions of a program
 
 forks = pytest.mark.skipif(not hasattr(os, "fork"), reason="needs processes that fork")
