@@ -25,12 +25,9 @@ CUT_INERTIA_SHARE: Final = 0.15
 
 MEASURED_KG: Final = 0.1
 """The free handle that the table was measured with."""
-LIGHTER: Final = 1.6
-"""Power of the ratio of masses in which a lighter handle bears less: at 1, a freed handle of 30 g swung in honey; at
-1.45 in tar, where the delay was one tick longer than believed."""
-LIGHTER_KALMAN: Final = 2.0
-"""The same with "kalman", which bears as much more at 0.1 kg: at 1.7, a freed handle of 50 g was restless in honey,
-where the delay was one tick longer than believed."""
+LIGHTER: Final = 2.0
+"""Power of the ratio of masses in which a lighter handle bears less: at 1.7, freed handles of 50 g were restless in
+honey, where the delay was one tick longer than believed; from 1.8 on none of 801 handles of 30 to 250 g was."""
 SLEW_N: Final = 1.5
 """The most that the force on a handle of `MEASURED_KG` or more changes within a millisecond."""
 KALMAN_SLEW: Final = 0.8

@@ -18,7 +18,6 @@ from study_app.haptics.gate import resolve
 from study_app.haptics.limits import (
     CUT_INERTIA_SHARE,
     LIGHTER,
-    LIGHTER_KALMAN,
     MEASURED_KG,
     Bearable,
     bearable,
@@ -180,8 +179,7 @@ def _rows_needed(scene: Scene) -> Rows:
 
 def _by_delay(scene: Scene, dynamics: Dynamics) -> Sequence[Bearable]:
     """Return what a loop of the scene's rate, estimator and device bears at each delay, 0 to `MOST_DELAY` ticks."""
-    power = LIGHTER_KALMAN if isinstance(scene.velocity, Kalman) else LIGHTER
-    lighter = min(dynamics.mass_kg / MEASURED_KG, 1.0) ** power
+    lighter = min(dynamics.mass_kg / MEASURED_KG, 1.0) ** LIGHTER
     found = (bearable(1 / scene.rate_hz, delay, scene.velocity) for delay in range(MOST_DELAY + 1))
     return [Bearable(lighter * limit.drag_nspm, lighter * limit.inertia_nspm) for limit in found]
 

@@ -198,7 +198,7 @@ TAR, THROWN_TAR = "speed_mps=0.1885 release_s=1.01667", "hand=thrown speed_mps=0
         SHORT.format(2, 1, "dense", 10, 0.1) + "speed_mps=0.1885 release_s=0.93333",
         SHORT.format(2, 1, "dense", 10, 0.03) + "speed_mps=0.37699 release_s=0.93333",  # LIGHTER
         SHORT.format(2, 1, "light_oil", 10, 0.05)
-        + "speed_mps=0.37699 release_s=1.05833 viscous_nspm=0.5 estimator=kalman",  # LIGHTER_KALMAN
+        + "speed_mps=0.37699 release_s=1.05833 viscous_nspm=0.5 estimator=kalman",  # LIGHTER
         SHORT.format(3, 2, "physical_tar", 3, 0.05)
         + "rate_hz=500 estimator=kalman motion=reaches "
         + THROWN_TAR,  # KALMAN_SHARE

@@ -80,7 +80,7 @@ def test_the_other_sides_kalman_filter_knows_the_force_that_was_sent() -> None:
     run(live, 1500)
     trace = live.trace()
     assert trace is not None
-    assert np.abs(trace.force_a_n - trace.force_b_n).max() > 0.5
+    assert np.abs(trace.force_a_n - trace.force_b_n).max() > 0.2
     assert trace.wake_a_mps.max() > 0.01
     assert np.array_equal(trace.wake_a_mps, trace.wake_b_mps)
     live.close()
