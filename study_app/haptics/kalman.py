@@ -3,7 +3,7 @@
 Per axis the state is position, velocity and acceleration, driven by white jerk of density q that grows with speed and
 acceleration; all axes share one covariance. The force, delayed as the loop is believed to be, passes two high-pass
 filters, since only its fast part is certain to meet the device's own mass and not the hand. Its effect is the state's
-response to it at 1 kg, V, times the inverse mass θ, estimated beside it: a two-stage filter (Friedland 1969, IEEE TAC
+response to it at 1 kg, V, times the inverse mass θ, estimated separately: a two-stage filter (Friedland 1969, IEEE TAC
 14:359). So the estimate lags neither behind the hand nor behind what the loop itself does to the handle.
 
 Innovations far outside their variance for 20 ms, or a delay that changes, are trouble: from that tick on the

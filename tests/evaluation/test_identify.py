@@ -165,7 +165,7 @@ def test_two_factors_of_the_same_force_cannot_be_told_apart():
     assert not found.told_apart
     assert found.correlation[0, 1] == pytest.approx(-1, abs=1e-6)
     (warning,) = found.warnings
-    assert "drag_coefficient and density_kg_m3 cannot be told apart" in warning
+    assert "drag_coefficient and density_kg_m3 cannot be distinguished" in warning
     assert found.intervals["drag_coefficient"] == (0, 10)
     known_kg_m3 = found.values["drag_coefficient"] * found.values["density_kg_m3"]
     assert known_kg_m3 == pytest.approx(470, rel=0.01)

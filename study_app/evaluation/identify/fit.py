@@ -26,7 +26,7 @@ from study_app.haptics.scene import Scene
 
 CONFIDENCE: Final = 0.95
 ALIKE: Final = 0.95
-"""Correlation of two estimates from which their parameters count as not told apart."""
+"""Correlation of two estimates from which their parameters count as not distinguishable."""
 FOLLOWING: Final = 0.1
 CHANCE: Final = 5.0
 """Residuals count as following one another from this correlation on, and this many deviations from what noise has."""
@@ -183,17 +183,17 @@ def _ends(it: Parameter, u: float, half: float) -> tuple[float, float]:
 
 
 def _alike(correlation: Floats) -> list[tuple[int, int]]:
-    """Return every two parameters that are not told apart."""
+    """Return every two parameters that cannot be distinguished."""
     count = len(correlation)
     return [(j, k) for k in range(count) for j in range(k) if abs(correlation[j, k]) > ALIKE]
 
 
 def _of_pairs(names: Sequence[str], pairs: Sequence[tuple[int, int]], correlation: Floats) -> Iterator[str]:
-    """Yield a sentence for every two parameters that are not told apart."""
+    """Yield a sentence for every two parameters that cannot be distinguished."""
     for j, k in pairs:
         alike = f"(correlation {correlation[j, k]:.3f})".replace("-", "−")
         yield (
-            f"{names[j]} and {names[k]} cannot be told apart by this motion {alike}: what "
+            f"{names[j]} and {names[k]} cannot be distinguished by this motion {alike}: what "
             "the one lacks the other makes up; fit one of them, or measure more kinds of motion"
         )
 

@@ -68,7 +68,7 @@ def residuals(found: Fit) -> Table:
 
 
 def preset(found: Fit, source: Path) -> str:
-    """Return the fitted scene as a scene file, each fitted number with its interval beside it.
+    """Return the fitted scene as a scene file, each fitted number with its interval in a comment.
 
     The fit takes velocities from the measured motion, never from an estimator; the file names that of new files.
     """

@@ -1,8 +1,8 @@
 """Every sample of a servo looked at once: what was promised of it, and what was counted on the way.
 
-Promised: no force beyond the limit or that is no number; none while it is stopped; between two forces sent at most
-1.5 N, unless a force stop, a fault or the energy account let go at once; no reading believed that is no place; a
-deadline every period, but for those passed over; every turn in telemetry, or counted as dropped.
+Promised: no force beyond the limit or not finite; none while it is stopped; between two forces sent at most
+1.5 N, unless a force stop, a fault or the passivity controller let go at once; no reading accepted that is not finite; a
+deadline every period, but for those passed over; every tick in telemetry, or counted as dropped.
 """
 
 from __future__ import annotations

@@ -156,7 +156,7 @@ def _limiters(swept: Swept) -> Iterator[str]:
 
 def _fidelity(fidelities: Sequence[Fidelity]) -> Iterator[str]:
     yield "force sent against the model clamped to 8 N, hand attached: rms difference in % of the rms force, the worst"
-    yield "of twelve motions; * more than 5 % and 0.05 N. Beside it the most ticks in which a force is as far off."
+    yield "of twelve motions; * more than 5 % and 0.05 N. The second number: the most ticks with such a difference."
     yield f"{'rate, ticks of delay':22}" + "".join(f"{f'{rate_hz:g} Hz, {delay}':>16}" for rate_hz, delay in LOOPS)
     for liquid, row in by_liquid(fidelities).items():
         cells = (f"{f'{one.share:.1%}' + ' *'[not one.within]} {one.beyond:6.1%}" for one in row)
