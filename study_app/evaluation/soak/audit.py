@@ -1,7 +1,7 @@
 """Every sample of a servo looked at once: what was promised of it, and what was counted on the way.
 
 Promised: no force beyond the limit or not finite; none while it is stopped; between two forces sent at most
-1.5 N, unless a force stop, a fault or the passivity controller let go at once; no reading accepted that is not finite; a
+1.5 N, unless a force stop, a fault or the passivity controller let go at once; no reading that is not finite; a
 deadline every period, but for those passed over; every tick in telemetry, or counted as dropped.
 """
 
