@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import signal
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack
 from typing import Any, Final, Literal, TypeAlias, get_args
@@ -75,8 +76,17 @@ def _started(engine: Engine) -> AbstractContextManager[Any]:
                 f"--engine {engine} needs the package {needed!r}, which is not installed: pip install {needed}, or "
                 "take --engine processes"
             ) from error
-    here: AbstractContextManager[Any] = parallel_config(backend={"processes": "loky", "threads": "threading"}[engine])
+    here: AbstractContextManager[Any] = (
+        parallel_config(backend="loky", initializer=_ignore_interrupts)
+        if engine == "processes"
+        else parallel_config(backend="threading")
+    )
     return here
+
+
+def _ignore_interrupts() -> None:
+    """Leave Ctrl-C to the process that started this one: it ends its workers itself, without their tracebacks."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _cluster(engine: Engine) -> AbstractContextManager[Any]:
