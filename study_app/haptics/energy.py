@@ -10,9 +10,9 @@ The account E begins at 0 with a scene and holds at most what the liquid can ret
 
 A wake of speed u gives a body of speed v the power c (u - v)² v, at most that at v = u/3, and it lasts for N ticks of
 T. m is the added mass and, with a history, its inertia in a sway of 1 Hz, 3πR² √(2µρ/ω) (Landau & Lifshitz, §24), as
-far as they are sent (`pack`). τ is the lag of the velocity estimator and P = max(-f·v̂, 0) the power that it takes: a
-filtered damper stores up to K τ P (`_filter_storage`). Without this term the lag of each quick reversal would count as
-a debt.
+far as they are sent (`pack`); with "kalman" both hold the energy of the velocity as they smooth it. τ is the lag of the
+velocity estimator and P = max(-f·v̂, 0) the power that it takes: a filtered damper stores up to K τ P (`storage`).
+Without these the lag of each quick reversal would count as a debt.
 
 A loop that is late and a force held for too long show as E < 0. E is kept three times: for a force that acts at once,
 for one that acts as late as the loop is believed to be, a tick at least, and for one that acts a tick later still; the
@@ -39,8 +39,6 @@ from typing import Any
 
 from study_app.haptics.compiled import kernel, part
 from study_app.haptics.dynamics import MOST_DELAY
-from study_app.haptics.effects.drag import resistance
-from study_app.haptics.effects.records import LAW_CONSTANT
 from study_app.haptics.incremental import (
     ALLOWANCE_J as INCREMENTAL_ALLOWANCE_J,
 )
@@ -49,21 +47,14 @@ from study_app.haptics.incremental import (
     close_incremental,
     observe_incremental,
 )
-from study_app.haptics.layout import (
-    EFFECT_ADDED_MASS,
-    EFFECT_HISTORY,
-    EFFECT_LOCAL_WAKE,
-    EFFECT_WAKE,
-    LIMITER_ENERGY,
-    Record,
-)
+from study_app.haptics.layout import LIMITER_ENERGY, Record
+from study_app.haptics.storage import filter_storage, liquid_storage
 from study_app.haptics.vector import clear, copy, distance, is_finite, norm, square
 
 ALLOWANCE_J = 1e-3
 SPENDING_S = 20e-3
 HALVING_J = 0.125e-3
 FORGIVEN_W = 1e-3
-HISTORY_PERIOD_S = 1.0
 SMOOTHING_S = 2e-3
 SURE_MPS = 0.04
 BRAKE = 0.5
@@ -141,11 +132,11 @@ def observe(model: Any, safety: Record, interval_s: float) -> None:
     close_incremental(account.fast, interval_s)
     if square_m2 > account.longest_m * account.longest_m:
         account.longest_m = math.sqrt(square_m2)
-    stored_j, forgiven_j = _filter_storage(model, account), FORGIVEN_W * interval_s
+    stored_j, forgiven_j = filter_storage(model, account), FORGIVEN_W * interval_s
     account.stored_j[account.turn] = stored_j
     late_j = max(stored_j, account.stored_j[_row_before(account, delay_ticks)])
     later_j = max(late_j, account.stored_j[_row_before(account, delay_ticks + 1)])
-    most_j = _liquid_storage(model, safety.delay_ticks)
+    most_j = liquid_storage(model, safety.delay_ticks)
     account.reserve_j = most_j + late_j
     per_time = 1.0 / account.impulse_s
     account.balance_j = min(_forgive(account.balance_j, forgiven_j) + work_j * per_time, most_j + stored_j)
@@ -178,64 +169,6 @@ def _left_j(account: Record) -> float:
 @part
 def _forgive(balance_j: float, forgiven_j: float) -> float:
     return min(balance_j + forgiven_j, -ALLOWANCE_J) if balance_j < -ALLOWANCE_J else balance_j
-
-
-@part
-def _liquid_storage(model: Any, delay_ticks: int) -> float:
-    """Return the most that the liquids can still give back [J at the hand]."""
-    parameters = model.parameters[0]
-    most_j = 0.0
-    for i in range(parameters.liquids):
-        liquid, local = model.liquids[i], model.liquid_states[i]
-        inertia_share = liquid.inertia_share[delay_ticks]
-        if local.share > 0.0:
-            if liquid.effects & EFFECT_WAKE:
-                most_j += _wake_power(liquid, local) * liquid.wake.length * parameters.period_s
-            if liquid.effects & EFFECT_LOCAL_WAKE:
-                most_j += _wake_power(liquid, local) * liquid.local_wake.length * parameters.period_s
-            if liquid.effects & EFFECT_ADDED_MASS:
-                most_j += 0.5 * inertia_share * liquid.added_mass.mass_kg * local.share * square(local.motion_mps)
-            if liquid.effects & EFFECT_HISTORY:
-                inertia_kg = 0.5 * liquid.history.factor_kg_rs * local.share * math.sqrt(HISTORY_PERIOD_S)
-                most_j += 0.5 * inertia_share * inertia_kg * square(local.motion_mps)
-    return float(most_j / parameters.scale)
-
-
-@part
-def _filter_storage(model: Any, account: Record) -> float:
-    """Return the energy [J at the hand] that the velocity estimator stores because it lags behind.
-
-    With v̂' = (v − v̂)/τ a damper F(v̂) takes ∫F v dt = ∫F v̂ dt + τ∫F dv̂ from the hand: the second term is a storage,
-    K τ F v̂ with K = 1/3 for a force that grows as v̂², 1/2 for one that grows as v̂. Where only the share s of F is left
-    at the force limit, K = 1 - 2/3 √s and 1 - s/2. A loop that has shown a debt is believed less of it, by the
-    controller's gain: a swinging loop would live on its storage.
-    """
-    parameters, state = model.parameters[0], model.state[0]
-    lag_s = parameters.fallback_lag_s if state.kalman.distrusted else parameters.filter_lag_s
-    if lag_s == 0.0:
-        return 0.0
-    sent_n = account.sent_n[account.turn]
-    power_w = 0.0
-    for axis in range(3):
-        power_w -= sent_n[axis] * (state.estimate_mps[axis] - state.drift_mps[axis])
-    if power_w <= 0.0:
-        return 0.0
-    share = 1.0 - 2.0 / 3.0 * math.sqrt(account.norm_share)
-    for i in range(parameters.liquids):
-        if model.liquids[i].drag.law != LAW_CONSTANT and model.liquid_states[i].share > 0.0:
-            share = max(share, 1.0 - 0.5 * account.norm_share)
-    return float(account.gain * share * lag_s * power_w / parameters.scale)
-
-
-@part
-def _wake_power(liquid: Record, local: Record) -> float:
-    """Return the greatest power [W, scene] that the wake gives to a body: max over v of R(u - v) (u - v) v.
-
-    For a constant coefficient that is (4/27) c u³; R of the other laws grows less, so R(u) u²/4 bounds it.
-    """
-    wake_mps = norm(local.wake_mps)
-    share = 4.0 / 27.0 if liquid.drag.law == LAW_CONSTANT else 0.25
-    return float(share * resistance(liquid.drag, wake_mps) * wake_mps * wake_mps)
 
 
 @part

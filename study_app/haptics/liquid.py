@@ -157,23 +157,23 @@ Current: TypeAlias = Annotated[Uniform | Channel | Vortex, Field(discriminator="
 class AddedMass(Frozen):
     """The liquid that is accelerated with the body (``effects.added_mass``).
 
-    ``coefficient`` C_a is ½ for a sphere; the acceleration is smoothed over ``filter_s``, but not where velocities are
-    given.
+    ``coefficient`` C_a is ½ for a sphere; the acceleration is smoothed over ``filter_s`` (None: as suits the velocity
+    estimator, `Scene.smoothing_s`), but not where velocities are given.
     """
 
     coefficient: Annotated[float, within(0, 10, "a sphere has 0.5")] = 0.5
-    filter_s: Smoothing = 0.025
+    filter_s: Smoothing | None = None
 
 
 class History(Frozen):
     """The Basset force: the boundary layer's memory of past accelerations (``effects.history``).
 
     Accelerations younger than ``window_s`` count one by one, older ones in ten exponentials. Velocities are smoothed
-    over ``smoothing_s`` before, but not where they are given.
+    over ``smoothing_s`` before (None: as suits the estimator, `Scene.smoothing_s`), but not where they are given.
     """
 
     window_s: Annotated[float, within(0.005, 0.5, "the window holds 5 to 500 accelerations at 1 kHz")] = 0.05
-    smoothing_s: Smoothing = 0.01
+    smoothing_s: Smoothing | None = None
 
 
 class Liquid(Frozen):

@@ -80,6 +80,11 @@ SceneScale: TypeAlias = Annotated[float, within(0.01, 100, "a stroke of 60 mm is
 
 MAX_WINDOW = 16
 
+ADDED_MASS_SMOOTHING_S = 0.025
+HISTORY_SMOOTHING_S = 0.01
+KALMAN_SMOOTHING_S = 0.015
+"""Of both effects with "kalman", whose velocity lags less and may be smoothed for longer before a history."""
+
 HAND_SPEED_MPS = 0.3
 HAND_ACCELERATION_MPS2 = 3.0  # 0.3 m/s at 1.6 Hz
 HAND_REACH_M = 0.04
@@ -209,6 +214,19 @@ class Scene(Frozen):
         if len(set(names)) < len(names):
             raise ValueError(f"two liquids share an id in {names}")
         return self
+
+    def smoothing_s(self, effect: AddedMass | History) -> float:
+        """Return over what time [s] an effect smooths what it measures; velocities that are given are not smoothed."""
+        if isinstance(self.velocity, Given):
+            return 0.0
+        said_s, usual_s = (
+            (effect.filter_s, ADDED_MASS_SMOOTHING_S)
+            if isinstance(effect, AddedMass)
+            else (effect.smoothing_s, HISTORY_SMOOTHING_S)
+        )
+        if said_s is not None:
+            return said_s
+        return KALMAN_SMOOTHING_S if isinstance(self.velocity, Kalman) else usual_s
 
     def motion_in(self, liquid: Liquid) -> MotionBox:
         """Return ``motion`` with what it leaves open filled in; without a top there is no depth."""

@@ -220,6 +220,8 @@ def value_of(scene: Scene, name: str) -> Value:
     found = resolve(scene).liquids[0].drag.law if name == "drag.law" else read(scene, name)
     if found is None and name == "local_wake.reach_m":
         return scene.body.diameter_m
+    if found is None and name in {"added_mass.filter_s", "history.smoothing_s"}:
+        return scene.smoothing_s(getattr(liquid, place))
     if found is None and place == "motion":
         return float(getattr(scene.motion_in(liquid), field))
     return found if found is None or isinstance(found, str) else float(found)

@@ -11,7 +11,7 @@ from typing import Any, Final
 from pydantic import BaseModel, ValidationError
 
 from study_app.errors import StudyError
-from study_app.haptics.scene import Liquid, Scene
+from study_app.haptics.scene import AddedMass, History, Liquid, Scene
 
 THRESHOLDS: Final = ("breaking_angle_deg", "breaking_span_m", "resolution_m")
 """These decide for or against: the force does not change with them, or jumps."""
@@ -94,8 +94,17 @@ def _tables(scene: Scene, liquid: Liquid) -> Iterator[tuple[str, BaseModel]]:
     for name in _OF_EFFECTS:
         table = getattr(liquid, name)
         if name in liquid.effects and table is not None:
-            yield name, table
+            yield name, _with_smoothing(scene, table)
     yield "body", scene.body
+
+
+def _with_smoothing(scene: Scene, table: BaseModel) -> BaseModel:
+    """Return a table with the time that it smooths over, where it leaves that open."""
+    if isinstance(table, AddedMass):
+        return table.model_copy(update={"filter_s": scene.smoothing_s(table)})
+    if isinstance(table, History):
+        return table.model_copy(update={"smoothing_s": scene.smoothing_s(table)})
+    return table
 
 
 def _parameter(tables: Mapping[str, BaseModel], name: str) -> Parameter:

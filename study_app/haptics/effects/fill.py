@@ -8,7 +8,6 @@ from typing import NamedTuple
 from study_app.haptics import layout
 from study_app.haptics.effects import records
 from study_app.haptics.liquid import (
-    AddedMass,
     Box,
     Channel,
     Current,
@@ -20,7 +19,7 @@ from study_app.haptics.liquid import (
     Uniform,
     Wake,
 )
-from study_app.haptics.scene import Body, Given, Scene
+from study_app.haptics.scene import Body, Scene
 
 GRAVITY_MPS2 = 9.80665
 WAKE_RATE_HZ = 1000.0
@@ -86,7 +85,7 @@ def bits(liquid: Liquid) -> int:
 
 def fill(record: layout.Record, liquid: Liquid, scene: Scene, first: Rows) -> None:
     """Write what a liquid's effects need, and nothing else, for rows from ``first`` on."""
-    effects, given = liquid.effects, isinstance(scene.velocity, Given)
+    effects = liquid.effects
     record.effects = bits(liquid)
     _fill_region(record.region, liquid.region)
     if "drag" in effects:
@@ -100,9 +99,10 @@ def fill(record: layout.Record, liquid: Liquid, scene: Scene, first: Rows) -> No
     if "buoyancy" in effects:
         record.buoyancy.lift_n = liquid.density_kg_m3 * volume_m3(scene.body) * GRAVITY_MPS2
     if "added_mass" in effects:
-        _fill_added_mass(record.added_mass, liquid.added_mass, liquid.density_kg_m3 * volume_m3(scene.body), given)
+        record.added_mass.mass_kg = liquid.added_mass.coefficient * liquid.density_kg_m3 * volume_m3(scene.body)
+        record.added_mass.filter_per_s = _per_s(scene.smoothing_s(liquid.added_mass))
     if liquid.viscosity_pa_s is not None and "history" in effects:
-        _fill_history(record.history, liquid.history, scene.rate_hz, given, first)
+        _fill_history(record.history, liquid.history, scene, first)
         stickiness = math.sqrt(math.pi * liquid.density_kg_m3 * liquid.viscosity_pa_s)
         record.history.factor_kg_rs = 1.5 * scene.body.diameter_m**2 * stickiness
 
@@ -176,17 +176,12 @@ def _fill_current(record: layout.Record, current: Current) -> None:
         record.peak_mps = current.peak_mps
 
 
-def _fill_added_mass(record: layout.Record, added: AddedMass, displaced_kg: float, given: bool) -> None:
-    record.mass_kg = added.coefficient * displaced_kg
-    record.filter_per_s = _per_s(added.filter_s, given)
-
-
-def _fill_history(record: layout.Record, history: History, rate_hz: float, given: bool, first: Rows) -> None:
+def _fill_history(record: layout.Record, history: History, scene: Scene, first: Rows) -> None:
     record.row = first.intervals
-    record.rows = _intervals(history.window_s, rate_hz)
+    record.rows = _intervals(history.window_s, scene.rate_hz)
     record.tail_row = first.exponentials
     record.window_s = history.window_s
-    record.filter_per_s = _per_s(history.smoothing_s, given)
+    record.filter_per_s = _per_s(scene.smoothing_s(history))
 
 
 def _intervals(window_s: float, rate_hz: float) -> int:
@@ -194,6 +189,6 @@ def _intervals(window_s: float, rate_hz: float) -> int:
     return math.ceil(window_s * rate_hz) + 4
 
 
-def _per_s(time_s: float, given: bool) -> float:
-    """Return the rate of a filter; velocities that are given are not filtered."""
-    return math.inf if given or time_s == 0 else 1 / time_s
+def _per_s(time_s: float) -> float:
+    """Return the rate of a filter."""
+    return math.inf if time_s == 0 else 1 / time_s
