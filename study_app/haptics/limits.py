@@ -12,6 +12,7 @@ from importlib import resources
 from typing import Final, NamedTuple
 
 from study_app.errors import StudyError
+from study_app.haptics.dynamics import Dynamics
 from study_app.haptics.scene import Ewma, Given, Kalman, Velocity
 
 SLOWEST_HZ: Final = 500.0
@@ -87,13 +88,13 @@ def bearable(period_s: float, delay_ticks: int, velocity: Velocity = _THESIS) ->
     return Bearable(*(beyond * min(limits) for limits in zip(*found, strict=True)))
 
 
-def slew_limit_n(period_s: float, mass_kg: float, velocity: Velocity = _THESIS) -> float:
-    """Return the most that the force on a handle of this mass [kg] changes within a tick [N].
+def slew_limit_n(period_s: float, dynamics: Dynamics, velocity: Velocity = _THESIS) -> float:
+    """Return the most that the force on a device's handle changes within a tick [N].
 
-    A loop slower than 1 kHz gets as much a millisecond.
+    A loop slower than 1 kHz gets as much a millisecond. A device that measures no delay has "ewma" for "kalman".
     """
-    share = KALMAN_SLEW if isinstance(velocity, Kalman) else 1.0
-    return share * SLEW_N * min(mass_kg / MEASURED_KG, 1.0) * max(period_s / SLEW_S, 1.0)
+    share = KALMAN_SLEW if isinstance(velocity, Kalman) and dynamics.delay_s is not None else 1.0
+    return share * SLEW_N * min(dynamics.mass_kg / MEASURED_KG, 1.0) * max(period_s / SLEW_S, 1.0)
 
 
 def _rows(velocity: Velocity) -> tuple[tuple[str, float | None], ...]:

@@ -216,7 +216,7 @@ def _fill_constants(model: Model, scene: Scene, limits: Sequence[Bearable], dyna
     parameters.knee_threshold_mps = scene.knee.threshold_mps
     parameters.slope_limit_nspm = [limit.drag_nspm / scene.scale for limit in limits]
     parameters.force_limit_n = scene.force_limit_n
-    parameters.slew_n = slew_limit_n(1 / scene.rate_hz, dynamics.mass_kg, scene.velocity)
+    parameters.slew_n = slew_limit_n(1 / scene.rate_hz, dynamics, scene.velocity)
     parameters.count_m = dynamics.count_m
     parameters.mass_kg = dynamics.mass_kg
     first = Rows()

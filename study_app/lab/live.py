@@ -183,10 +183,9 @@ class Live:
 
     def limiters(self) -> tuple[Limiter, ...]:
         """Return which limiters acted in the last 10 s."""
-        limit_n = self.device.force_limit_n
-        if self._felt is not None:
-            limit_n = min(limit_n, self._felt.in_hand.scene.force_limit_n)
-        slew_n = slew_limit_n(1 / self.servo.rate_hz, self.device.dynamics.mass_kg)
+        scene = Scene() if self._felt is None else self._felt.in_hand.scene
+        limit_n = min(self.device.force_limit_n, scene.force_limit_n)
+        slew_n = slew_limit_n(1 / self.servo.rate_hz, self.device.dynamics, scene.velocity)
         return self._counts.told(limit_n, slew_n)
 
     def trace(self) -> Trace | None:

@@ -20,6 +20,7 @@ from study_app.cli import main
 from study_app.errors import ServoFault, StudyError
 from study_app.evaluation.soak.drift import Drift
 from study_app.evaluation.soak.run import Soak, soak
+from study_app.haptics.scene import Kalman
 from study_app.protocol.load import load_scenes
 
 SHORT_H = 2 / 60
@@ -116,6 +117,13 @@ def test_no_force_turns_to_and_fro_where_a_hand_keeps_still(scenes, seed):
     assert felt.any()
     turned = np.sum(force_n[1:] * force_n[:-1], axis=1) < 0
     assert np.count_nonzero(turned & felt) < 5
+
+
+def test_the_slew_limit_promised_is_the_greatest_of_the_scenes_estimators(scenes):
+    ewma = scenes["light_oil"]
+    kalman = ewma.model_copy(update={"velocity": Kalman()})
+    for felt, most_n in (({"a": kalman}, 1.2), ({"a": kalman, "b": ewma}, 1.5)):
+        assert Soak(felt, SHORT_H, virtual=True).audit.counts.slew_n == pytest.approx(most_n)
 
 
 @pytest.mark.parametrize("hours", [0.0, -1.0, math.nan, math.inf, 1e5, 1e-9])

@@ -17,6 +17,7 @@ from study_app.haptics.layout import (
     STATUS_NON_FINITE,
 )
 from study_app.haptics.limits import (
+    KALMAN_SLEW,
     LIGHTER,
     SLEW_N,
     bearable,
@@ -231,9 +232,17 @@ def test_the_force_changes_by_at_most_the_slew_limit_per_tick():
 
 @pytest.mark.parametrize(("period_s", "mass_kg", "expected"), [(1e-3, 0.25, 1.5), (1e-3, 0.04, 0.6), (4e-3, 0.1, 6.0)])
 def test_the_slew_limit_knows_rate_and_mass(period_s, mass_kg, expected):
-    assert slew_limit_n(period_s, mass_kg) == pytest.approx(expected)
+    device = Dynamics(0.0, 38e-6, mass_kg)
+    assert slew_limit_n(period_s, device) == pytest.approx(expected)
     felt = HONEY.model_copy(update={"rate_hz": 1 / period_s})
-    assert pack(felt, dynamics=Dynamics(0.0, 38e-6, mass_kg)).parameters[0].slew_n == pytest.approx(expected)
+    assert pack(felt, dynamics=device).parameters[0].slew_n == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(("delay_s", "share"), [(1e-3, KALMAN_SLEW), (None, 1.0)])
+def test_the_slew_limit_is_lower_with_the_kalman_filter_which_needs_a_measured_delay(delay_s, share):
+    device, felt = Dynamics(delay_s), HONEY.model_copy(update={"velocity": Kalman()})
+    assert slew_limit_n(1e-3, device, Kalman()) == pytest.approx(share * SLEW_N)
+    assert pack(felt, dynamics=device).parameters[0].slew_n == pytest.approx(share * SLEW_N)
 
 
 @pytest.mark.parametrize("velocity", [Ewma(), Kalman()])

@@ -13,9 +13,11 @@ from study_app.devices.mouse import MouseDevice
 from study_app.errors import ServoFault, StudyError
 from study_app.haptics.clock import VirtualClock
 from study_app.haptics.layout import LIMITER_ENERGY, LIMITER_FADE, LIMITER_NAMES, LIMITER_SLEW, LIMITER_STOP
+from study_app.haptics.scene import Kalman
 from study_app.haptics.servo import Servo
 from study_app.lab.live import Live, open_live
 from study_app.lab.programmes import REACHED, TITLES, led_to, programme
+from study_app.lab.workbench import Setting, Workbench
 from tests.haptics.probe import Probe
 from tests.lab.benches import SCENES, bench, live_with, run, scripted
 
@@ -299,6 +301,15 @@ def test_a_path_beside_a_hand_that_takes_no_orders_is_computed_alone() -> None:
     assert trace is not None
     assert np.abs(trace.force_a_n).max() == 0.0
     live.servo.stop()
+
+
+def test_the_slew_limit_told_is_that_of_the_estimator() -> None:
+    live = live_with(scripted())
+    assert "Slew, 1.5 N per tick" in [it.name for it in live.limiters()]
+    water = SCENES["water"].model_copy(update={"velocity": Kalman()})
+    live.feel(Workbench(Setting("water", water, water), bench().b))
+    assert "Slew, 1.2 N per tick" in [it.name for it in live.limiters()]
+    live.close()
 
 
 def test_limiters_are_counted_as_telemetry_has_them() -> None:

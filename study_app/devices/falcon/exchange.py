@@ -46,6 +46,7 @@ from study_app.haptics.cfunctions import (
     record_at,
 )
 from study_app.haptics.compiled import kernel
+from study_app.haptics.dynamics import Dynamics
 from study_app.haptics.layout import COMMAND, READING, records
 from study_app.haptics.limits import SLEW_S, slew_limit_n
 from study_app.haptics.vector import copy
@@ -191,7 +192,7 @@ def new_exchange(calls: BulkCalls, mechanism: Any, geometry: Geometry) -> Any:
     falcon.centre_m = geometry.centre_m
     falcon.position_m = START_M
     falcon.delay = 1
-    falcon.slew_n_per_s = slew_limit_n(SLEW_S, LEAST_MASS_KG) / SLEW_S
+    falcon.slew_n_per_s = slew_limit_n(SLEW_S, Dynamics(mass_kg=LEAST_MASS_KG)) / SLEW_S
     return memory
 
 

@@ -1,8 +1,8 @@
 """Every sample of a servo looked at once: what was promised of it, and what was counted on the way.
 
 Promised: no force beyond the limit or not finite; none while it is stopped; between two forces sent at most
-1.5 N, unless a force stop, a fault or the passivity controller let go at once; no reading that is not finite; a
-deadline every period, but for those passed over; every tick in telemetry, or counted as dropped.
+the slew limit, unless a force stop, a fault or the passivity controller let go at once; no reading that is not finite;
+a deadline every period, but for those passed over; every tick in telemetry, or counted as dropped.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ class Audit:
     Parameters
     ----------
     limit_n : the greatest force that may be sent [N]
-    slew_n : the most that it may change from tick to tick [N]
+    slew_n : the most that it may change from tick to tick [N]; of scenes with several estimators the greatest
     period_ns : of the servo
     reach_m : how far the device's handle gets from the middle at most [m]
     """

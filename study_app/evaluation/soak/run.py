@@ -124,7 +124,7 @@ class Soak:
         self._longest_wake = max(elements_needed(scene) for scene in self._scenes.values())
         self.servo = Servo(self.device, clock=clock, rate_hz=self._rate_hz, elements=self._longest_wake)
         limit_n = min(hand.force_limit_n, max(scene.force_limit_n for scene in self._scenes.values()))
-        slew_n = slew_limit_n(1 / self._rate_hz, hand.dynamics.mass_kg)
+        slew_n = max(slew_limit_n(1 / self._rate_hz, hand.dynamics, scene.velocity) for scene in self._scenes.values())
         self.audit = Audit(limit_n, slew_n, round(1e9 / self._rate_hz), max(hand.workspace_m))
         self.drift = Drift()
         self._reader = self.servo.telemetry.reader()

@@ -3,7 +3,7 @@
 Each liquid of the shipped studies at its own scale and with its own estimator, moved by a middling hand (0.55 kg,
 135 N/m, 6.5 N·s/m) along reaches, circles and strokes of 0.1 to 1 m/s, through several loops. The target is that of the
 choice of effects: 5 % or 0.05 N, whichever is more, taken of the mean square root over a motion. Single turns may be
-further off: a wake that breaks or a hand that turns back may ask for more than 1.5 N from one tick to the next.
+further off: a wake that breaks or a hand that turns back may change the force by more than the slew limit permits.
 """
 
 from __future__ import annotations

@@ -183,7 +183,7 @@ def test_a_minute_with_faulty_packets_has_no_jump_of_force_and_no_turn_unaccount
         counters = device.counters
         servo.stop()
     samples = np.concatenate(rows)
-    most_n = slew_limit_n(1e-3, device.dynamics.mass_kg)
+    most_n = slew_limit_n(1e-3, device.dynamics)
     assert len(samples) == 60_000
     assert (samples["status"] == STATUS_OK).all()
     for forces_n in (samples["device_force_n"], given_n):  # asked for, and made of it by the emulator's mechanics

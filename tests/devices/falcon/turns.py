@@ -11,6 +11,7 @@ from study_app.devices.falcon.geometry import GEOMETRIES
 from study_app.devices.falcon.kinematics import REACHED, inverse, new_mechanism
 from study_app.devices.falcon.packets import FLAGS_AT, NIBBLES, number, pack
 from study_app.devices.falcon.wire import ENDPOINT_IN, ERROR_TIMEOUT, HOMED_SHIFT, PACKET, SUCCESS, ZERO
+from study_app.haptics.dynamics import Dynamics
 from study_app.haptics.layout import new_command, new_reading
 from study_app.haptics.limits import SLEW_S, slew_limit_n
 
@@ -21,7 +22,7 @@ MODEM_STATUS = b"\x01\x60"
 CENTRE_M = (0.0, 0.0, 0.0)
 OUT_M = (0.0, 0.0, 0.045)
 PUSH_N = (1.0, -0.5, 2.0)
-GROWTH_N = slew_limit_n(SLEW_S, LEAST_MASS_KG)  # within a tick
+GROWTH_N = slew_limit_n(SLEW_S, Dynamics(mass_kg=LEAST_MASS_KG))  # within a tick
 SOMEWHERE_M = (0.02, -0.01, 0.015)
 
 BULK_CALL = ctypes.CFUNCTYPE(
