@@ -13,7 +13,18 @@ from study_app.errors import StudyError
 from study_app.haptics.gate import ORDER, resolve
 from study_app.haptics.override import override_all
 from study_app.haptics.scene import Scene
-from study_app.lab.parameters import AUTO, AXES, EFFECT_WORDS, ON, Parameter, Value, parameter, read, the_liquid
+from study_app.lab.parameters import (
+    AUTO,
+    AXES,
+    EFFECT_WORDS,
+    ON,
+    Parameter,
+    Value,
+    parameter,
+    read,
+    the_liquid,
+    value_of,
+)
 
 _WAKE: Final = {"length": 1700, "scaling": 1700.0}  # the thesis' water
 _TABLES: Final[dict[str, dict[str, Any]]] = {
@@ -49,6 +60,8 @@ def changed(scene: Scene, name: str, value: Value) -> Scene:
         if value == read(scene, name):
             return scene
         return override_all(scene, {f"liquid.{place}": _begun(scene, str(value))})
+    if read(scene, name) is None and value == value_of(scene, name):  # what is left open, and is so already
+        return scene
     by_hand = _named(scene) if name == "drag.law" else {}  # the gate would choose another
     return override_all(scene, by_hand | {name: value})
 

@@ -15,7 +15,7 @@ from pydantic import BaseModel
 
 from study_app.errors import StudyError
 from study_app.haptics.gate import ORDER, resolve
-from study_app.haptics.liquid import Liquid
+from study_app.haptics.liquid import AddedMass, History, Liquid
 from study_app.haptics.scene import Given, Scene
 from study_app.protocol.model import MAX_FORCE_N
 
@@ -156,6 +156,8 @@ _CHOICES: Final = {
         ),
     )
 }
+_SMOOTHING: Final = ("added_mass.filter_s", "history.smoothing_s")
+"""What follows from the velocity estimator where it is left open."""
 EFFECT_WORDS: Final = {
     "drag": "Drag",
     "wake": "Wake",
@@ -220,7 +222,7 @@ def value_of(scene: Scene, name: str) -> Value:
     found = resolve(scene).liquids[0].drag.law if name == "drag.law" else read(scene, name)
     if found is None and name == "local_wake.reach_m":
         return scene.body.diameter_m
-    if found is None and name in {"added_mass.filter_s", "history.smoothing_s"}:
+    if found is None and name in _SMOOTHING:
         return scene.smoothing_s(getattr(liquid, place))
     if found is None and place == "motion":
         return float(getattr(scene.motion_in(liquid), field))
@@ -315,7 +317,10 @@ def _model(scene: Scene, place: str) -> type[BaseModel]:
 
 def _default(scene: Scene, place: str, field: str, row: Parameter) -> Any:
     """Return what a field's model gives it; None where it gives nothing."""
-    info = _model(scene, place).model_fields[field]
+    model = _model(scene, place)
+    if row.name in _SMOOTHING:
+        return scene.smoothing_s(AddedMass() if place == "added_mass" else History())
+    info = model.model_fields[field]
     return row.default if info.is_required() or info.default is None else info.default
 
 

@@ -65,6 +65,16 @@ def test_a_preset_beyond_the_labs_range_widens_it() -> None:
     assert parameter(wide, "wake.scaling").most == 1e7
 
 
+def test_smoothing_left_open_follows_from_the_estimator() -> None:
+    scene = SCENES["physical_liquids/glycerin"]
+    kalman = changed(scene, "velocity.kind", "kalman")
+    for name, usual_s in (("added_mass.filter_s", 0.025), ("history.smoothing_s", 0.01)):
+        assert value_of(scene, name) == usual_s
+        assert value_of(kalman, name) == parameter(kalman, name).default == 0.015
+        said = changed(kalman, name, 0.02)
+        assert (value_of(said, name), parameter(said, name).default) == (0.02, 0.015)
+
+
 def test_a_liquid_without_viscosity_has_none_and_takes_one() -> None:
     scene = SCENES["rek2024/water"]
     assert value_of(scene, "liquid.viscosity_pa_s") is None
