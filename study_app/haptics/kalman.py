@@ -6,7 +6,8 @@ filters, since only its fast part is certain to meet the device's own mass and n
 response to it at 1 kg, V, times the inverse mass θ, estimated separately: a two-stage filter (Friedland 1969, IEEE TAC
 14:359). So the estimate lags neither behind the hand nor behind what the loop itself does to the handle.
 
-Innovations far outside their variance for 20 ms, or a delay that changes, are trouble: from that tick on the
+A position that stays the same while the handle must have moved is a sample that the device repeated: it is passed over,
+but a second one in a row is believed. Innovations far outside their variance for 20 ms, or a delay that changes, are trouble: from that tick on the
 estimate is that of EWMA, which runs along, and after a second without trouble the filter's again. What is then between
 the two is carried and fades, so that the estimate does not jump.
 """
@@ -38,6 +39,8 @@ FIRST_ACCELERATION_MPS2: Final = 1.0
 TROUBLE: Final = 16.0
 """Mean of Σ innovation² / its variance over three axes, from which on it is far outside; single ones count up to twice
 that."""
+REPEATED: Final = 9.0
+"""Innovation² / its variance from which on an unchanged position is taken for a repeated sample."""
 TROUBLE_S: Final = 20e-3
 """Over what time."""
 QUIET_S: Final = 1.0
@@ -65,6 +68,7 @@ def begin_filter(parameters: Record, filtered: Record) -> None:
     filtered.delay_ticks = filtered.believed_ticks
     filtered.surprise = 0.0
     filtered.quiet_s = 0.0
+    filtered.repeated = 0
 
 
 @part
@@ -133,7 +137,13 @@ def _correct(parameters: Record, state: Record, filtered: Record, interval_s: fl
     aa = p[5] + qt
 
     variance_m2 = pp + 0.5 * parameters.count_m * parameters.count_m + TIMING_S * TIMING_S * speed_m2ps2
-    to_p, to_v, to_a = pp / variance_m2, pv / variance_m2, pa / variance_m2
+    told = 1.0
+    if filtered.repeated:
+        filtered.repeated = 0
+    elif _repeats(parameters, state, filtered, t, variance_m2):
+        filtered.repeated = 1
+        told = 0.0
+    to_p, to_v, to_a = told * pp / variance_m2, told * pv / variance_m2, told * pa / variance_m2
     p[0], p[1], p[2] = pp * (1.0 - to_p), pv * (1.0 - to_p), pa * (1.0 - to_p)
     p[3], p[4], p[5] = vv - to_v * pv, va - to_v * pa, aa - to_a * pa
 
@@ -157,14 +167,29 @@ def _correct(parameters: Record, state: Record, filtered: Record, interval_s: fl
         squares_m2 += left_m * left_m
 
     uncertain = filtered.per_kg_variance
-    gain = uncertain / (responses_m2 * uncertain + variance_m2)
+    gain = told * uncertain / (responses_m2 * uncertain + variance_m2)
     per_kg = filtered.per_kg + gain * products_m2
     per_kg += (USUAL_PER_KG - per_kg) * t / FORGETTING_S
     filtered.per_kg = min(max(per_kg, 0.0), 1.0 / parameters.mass_kg)
     filtered.per_kg_variance = uncertain - gain * uncertain * responses_m2 + LEARNING_PKG2S * t
     for axis in range(3):
         filtered.estimate_mps[axis] = filtered.velocity_mps[axis] + filtered.response_mps[axis] * filtered.per_kg
-    return float(squares_m2 / (variance_m2 + responses_m2 * uncertain))
+    return float(told * squares_m2 / (variance_m2 + responses_m2 * uncertain))
+
+
+@part
+def _repeats(parameters: Record, state: Record, filtered: Record, t: float, variance_m2: float) -> bool:
+    """Return whether a sample is the one before where the handle must have moved on by far more than is uncertain."""
+    half, squares_m2 = 0.5 * t * t, 0.0
+    for axis in range(3):
+        if state.position_m[axis] != state.previous_m[axis]:
+            return False
+        response_m = filtered.response_m[axis] + t * filtered.response_mps[axis]
+        response_m += half * (filtered.response_mps2[axis] + filtered.input_n[axis])
+        left_m = filtered.offset_m[axis] + t * filtered.velocity_mps[axis] + half * filtered.acceleration_mps2[axis]
+        left_m += response_m * filtered.per_kg
+        squares_m2 += left_m * left_m
+    return squares_m2 > REPEATED * variance_m2
 
 
 @part

@@ -27,6 +27,7 @@ KALMAN_STATE = np.dtype(
         ("distrusted", np.int64),  # 1 while EWMA is used
         ("surprise", np.float64),  # mean of squared innovations over their variance
         ("quiet_s", np.float64),  # time since the last trouble
+        ("repeated", np.int64),  # 1 where the last sample was taken for a repeated one
     ],
     align=True,
 )

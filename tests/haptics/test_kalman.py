@@ -250,6 +250,23 @@ def test_positions_far_coarser_than_the_device_says_are_trouble():
     assert not calm[-1].limiters & LIMITER_ESTIMATOR
 
 
+def test_a_repeated_sample_in_motion_says_nothing_and_a_stop_is_believed_at_its_second_sample():
+    places = np.round(strokes(400) / COUNT_M) * COUNT_M
+    repeated = places.copy()
+    repeated[[300, 330]] = places[[299, 329]]
+    usual, moved = hand(), hand()
+    for k, (place, other) in enumerate(zip(places, repeated, strict=True)):
+        v, u = moved.turn(other).velocity_mps[0], usual.turn(place).velocity_mps[0]
+        assert moved.model.state[0].kalman.repeated == (k in {300, 330})
+        assert v == pytest.approx(u, abs=0.06), k  # of up to 3.8 m/s; 0.4 where the sample counted
+    stopped = [moved.turn(places[-1]) for _ in range(60)]
+    assert abs(stopped[-1].velocity_mps[0]) < 0.05
+    slow = hand()
+    for place in np.round(strokes(400) / 10 / COUNT_M) * COUNT_M:  # often within the same count
+        slow.turn(place)
+        assert not slow.model.state[0].kalman.repeated
+
+
 def test_what_it_did_is_computed_again_to_the_last_bit():
     moved = hand()
     samples = records(moved.sample.dtype, 700)

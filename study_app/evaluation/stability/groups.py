@@ -106,9 +106,8 @@ def groups(seed: str = "stability", count: int | None = None) -> tuple[Group, ..
     found.append(Group(f"{driven}, held", driven_held))
     driven_free = (dataclasses.replace(case, delay=1) for case in _releases(f"{seed} {driven}", (FALCON,), FALCONS_KG))
     found.append(Group(f"{driven}, let go in mid-stroke", some(tuple(driven_free), count)))
-    known = [Group("first plant", sweep(seed)), *(group for group in found if group.name not in DISTURBED)]
-    found += [_with_kalman(group, min(KALMAN_CASES, count or KALMAN_CASES)) for group in known]
-    return tuple(found)
+    fewer = min(KALMAN_CASES, count or KALMAN_CASES)
+    return (*found, *(_with_kalman(group, fewer) for group in (Group("first plant", sweep(seed)), *found)))
 
 
 def _with_kalman(group: Group, count: int) -> Group:
@@ -151,7 +150,6 @@ CHANGES: Final[Mapping[str, Callable[[Case], Case | None]]] = {
     "no sample for 20 ms, again and again": lambda case: dataclasses.replace(case, burst_ms=20.0),
 }
 MISJUDGED: Final = tuple(CHANGES)[:3]
-DISTURBED: Final = tuple(CHANGES)[3:]
 
 
 def _grid(
