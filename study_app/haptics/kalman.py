@@ -7,9 +7,9 @@ response to it at 1 kg, V, times the inverse mass θ, estimated separately: a tw
 14:359). So the estimate lags neither behind the hand nor behind what the loop itself does to the handle.
 
 A position that stays the same while the handle must have moved is a sample that the device repeated: it is passed over,
-but a second one in a row is believed. Innovations far outside their variance for 20 ms, or a delay that changes, are trouble: from that tick on the
-estimate is that of EWMA, which runs along, and after a second without trouble the filter's again. What is then between
-the two is carried and fades, so that the estimate does not jump.
+but a second one in a row is believed. Innovations far outside their variance for 20 ms, or a delay that changes, are
+trouble: from that tick on the estimate is that of EWMA, which runs along, and after a second without trouble the
+filter's again. What is then between the two is carried and fades, so that the estimate does not jump.
 """
 
 from __future__ import annotations
