@@ -74,7 +74,7 @@ def test_every_parameter_is_reached_by_its_table_and_most_by_their_name_alone(fe
     shared = {field for _, field in found} - set(plain)
     assert shared <= {
         *("density_kg_m3", "law", "centre_m", "viscosity_pa_s", "speed_mps", "acceleration_mps2", "depth_m", "reach_m"),
-        *("length", "scaling", "exponent", "decay", "axes", "samples", "tolerance_m"),
+        *("length", "scaling", "exponent", "decay", "axes", "samples", "tolerance_m", "filter_s", "smoothing_s"),
     }
 
 
