@@ -104,6 +104,33 @@ def append_line(path: Path, line: bytes, *, waits: bool = True) -> None:
         raise cannot_write(path, error) from error
 
 
+def replace_end(path: Path, start: int, content: bytes) -> None:
+    """Put ``content`` in the place of all that follows the first ``start`` bytes of ``path``, without a flush.
+
+    A program killed meanwhile leaves the first ``start`` bytes and the beginning of ``content``.
+
+    Raises
+    ------
+    StoreError
+        The file cannot be written; the old end is put back as far as the system takes it.
+    """
+    try:
+        with path.open("r+b", buffering=0) as file:
+            file.seek(start)
+            old = file.readall()
+            try:
+                file.truncate(start)
+                file.seek(start)
+                write_whole(file, content)
+            except OSError:
+                file.truncate(start)
+                file.seek(start)
+                write_whole(file, old)
+                raise
+    except OSError as error:
+        raise cannot_write(path, error) from error
+
+
 def write_whole(file: BinaryIO, content: bytes) -> None:
     """Write all of ``content`` to an unbuffered ``file``, however many writes the system makes of it."""
     rest = memoryview(content)

@@ -14,11 +14,11 @@ from typing import Any
 
 from study_app.errors import StoreError
 from study_app.store import receipt, tables
-from study_app.store.atomic import write_file
 from study_app.store.blinding import Key
 from study_app.store.checksums import write_checksums
 from study_app.store.columns import RESPONSES
 from study_app.store.fingerprints import fingerprint, note_fingerprint
+from study_app.store.growing_tables import GrowingTables
 from study_app.store.journal import Line
 from study_app.store.journal_writer import Journal
 from study_app.store.layout import SessionFolder, StudyFolder
@@ -67,7 +67,7 @@ class SessionStore:
         self._receipt = session_receipt
         self._opening = opening
         self._lines: list[Line] = list(lines)
-        self._written: dict[Path, bytes] = {}
+        self._tables = GrowingTables(*(place.folder.table(place.study, name) for name in ("responses", "trials")))
         self._kept: list[Kept] = []
         self._over = False
 
@@ -108,17 +108,14 @@ class SessionStore:
     def write_tables(self) -> None:
         """Bring the session's tables up to date with its journal.
 
-        While the session runs nobody waits until the disk has them, for the participant waits for the next page; at its
-        end they are flushed. A table that cannot be replaced now (open in another program, no space) stops no session:
-        nothing is lost, since tables are made from the journal. ``behind`` says why, and the next call tries again.
-        What became of recordings since the last call is journalled first.
+        While the session runs only rows that changed are written, and nobody waits until the disk has them, for the
+        participant waits for the next page; at its end the tables are written as wholes and flushed. A table that
+        cannot be written now (open in another program, no space) stops no session: nothing is lost, since tables are
+        made from the journal. ``behind`` says why, and the next call tries again. What became of recordings since the last call is journalled first.
         """
         try:
             self._keep_recordings()
-            for path, content in table_files(self.place, self._lines, opened_key(self.place.study_folder)):
-                if self._written.get(path) != content:
-                    write_file(path, content, waits=self._journal.closed)
-                    self._written[path] = content
+            self._tables.write(self._lines, opened_key(self.place.study_folder), whole=self._journal.closed)
         except StoreError as error:
             self.behind = error
         else:
@@ -139,7 +136,6 @@ class SessionStore:
             self.append("session_ended", status=status, reason=reason)
             self._journal.close()
             self._receipt |= {"status": status, "reason": reason, "ended_at": self._lines[-1]["at"]}
-            self._written.clear()
         self.write_tables()
         failures = [] if self.behind is None else [self.behind]
         for write in (self._write_receipt, self._write_participants, self._write_checksums):
@@ -223,9 +219,9 @@ def table_files(place: Place, lines: Sequence[Line], key: Key | None) -> tuple[t
     ``key`` is the study's once it was opened; without it the sealed columns are left out.
     """
     lines = opened(lines, key)
-    responses, trials = tables.responses(lines), tables.trials(lines)
+    rows = tables.SessionRows(lines)
     columns = tables.trial_columns(lines, opened=key is not None)
     return (
-        (place.folder.table(place.study, "responses"), tables.csv_bytes(RESPONSES, responses)),
-        (place.folder.table(place.study, "trials"), tables.csv_bytes(columns, trials)),
+        (place.folder.table(place.study, "responses"), tables.csv_bytes(RESPONSES, rows.responses)),
+        (place.folder.table(place.study, "trials"), tables.csv_bytes(columns, rows.trials)),
     )

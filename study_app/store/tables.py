@@ -9,7 +9,7 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, TypeAlias
 
 from study_app.errors import StoreError
@@ -35,45 +35,80 @@ _JUDGED = (
 )
 
 
+class SessionRows:
+    """The rows of a session's tables, followed line by line.
+
+    ``responses`` has one row per response, in the order of confirmation; ``trials`` one per presentation of a trial, in
+    order; the running one has no outcome yet. ``changed`` is the index of the first row of ``trials`` that was added or
+    changed since somebody set it; rows of ``responses`` never change.
+
+    Raises
+    ------
+    StoreError
+        The lines do not begin as a session's do, or tell of a trial that never started.
+    """
+
+    def __init__(self, lines: Sequence[Line]) -> None:
+        self.responses: list[Row] = []
+        self.trials: list[Row] = []
+        self.changed = 0
+        self._session = _session(lines)
+        self._limits = lines[0].get("limits", {})
+        self._started: dict[tuple[int, int], Line] = {}
+        self._places: dict[tuple[int, int], int] = {}  # in trials
+        for line in lines:
+            self.take(line)
+
+    def take(self, line: Line) -> None:
+        """Follow one more line."""
+        match line["event"]:
+            case "trial_started":
+                self._interrupt()
+                which = line["trial"], line["attempt"]
+                self._started[which], self._places[which] = line, len(self.trials)
+                self.trials.append(_trial(self._session, line))
+            case "trial_ended":
+                row = self._row_of(line)
+                row |= {name: line.get(name) for name in _MEASURED}
+                row |= {"outcome": line["outcome"], "valid": within_limits(row, self._limits)}
+            case "responses":
+                if (trial := self._started.get((line["trial"], line["attempt"]))) is None:
+                    raise _never_started(line)
+                self.responses += [_response(self._session, trial, answer, line["at"]) for answer in line["items"]]
+            case "session_ended" | "session_resumed":
+                self._interrupt()
+            case "recorded":
+                row = self._row_of(line)
+                row |= {name: line[name] for name in _RECORDED}
+            case "note" if self.trials:
+                _note(self._last(), line["text"], mark=line["kind"] == "mark")
+            case "repeat" if self.trials:
+                _note(self._last(), f"repeated: {line['reason']}")
+
+    def _row_of(self, line: Line) -> Row:
+        if (place := self._places.get((line["trial"], line["attempt"]))) is None:
+            raise _never_started(line)
+        self.changed = min(self.changed, place)
+        return self.trials[place]
+
+    def _last(self) -> Row:
+        self.changed = min(self.changed, len(self.trials) - 1)
+        return self.trials[-1]
+
+    def _interrupt(self) -> None:
+        """Say of a trial that was left without its end that it was interrupted."""
+        if self.trials and self.trials[-1]["outcome"] is None:
+            self._last()["outcome"] = "interrupted"
+
+
 def responses(lines: Sequence[Line]) -> list[Row]:
     """Return one row per response, in the order of confirmation."""
-    session = _session(lines)
-    started: dict[tuple[int, int], Line] = {}
-    rows: list[Row] = []
-    for line in lines:
-        if line["event"] == "trial_started":
-            started[line["trial"], line["attempt"]] = line
-        elif line["event"] == "responses":
-            if (trial := started.get((line["trial"], line["attempt"]))) is None:
-                raise _never_started(line)
-            rows += [_response(session, trial, answer, line["at"]) for answer in line["items"]]
-    return rows
+    return SessionRows(lines).responses
 
 
 def trials(lines: Sequence[Line]) -> list[Row]:
     """Return one row per presentation of a trial, in order; the running one has no outcome yet."""
-    session = _session(lines)
-    limits = lines[0].get("limits", {})
-    rows: list[Row] = []
-    for line in lines:
-        match line["event"]:
-            case "trial_started":
-                _interrupt(rows)
-                rows.append(_trial(session, line))
-            case "trial_ended":
-                row = _row_of(rows, line)
-                row |= {name: line.get(name) for name in _MEASURED}
-                row |= {"outcome": line["outcome"], "valid": within_limits(row, limits)}
-            case "session_ended" | "session_resumed":
-                _interrupt(rows)
-            case "recorded":
-                row = _row_of(rows, line)
-                row |= {name: line[name] for name in _RECORDED}
-            case "note" if rows:
-                _note(rows[-1], line["text"], mark=line["kind"] == "mark")
-            case "repeat" if rows:
-                _note(rows[-1], f"repeated: {line['reason']}")
-    return rows
+    return SessionRows(lines).trials
 
 
 def trial_columns(lines: Sequence[Line], *, opened: bool) -> tuple[Column, ...]:
@@ -83,12 +118,10 @@ def trial_columns(lines: Sequence[Line], *, opened: bool) -> tuple[Column, ...]:
 
 def participant(lines: Sequence[Line]) -> Row:
     """Return the session's row of the participants table."""
-    start = lines[0]
+    start, rows = lines[0], SessionRows(lines)
     ends = [line for line in lines if line["event"] == "session_ended"]
-    main = [
-        row for row in latest(trials(lines)) if row["phase"] == "main" and row["outcome"] in ("complete", "timeout")
-    ]
-    answered = [row for row in latest(responses(lines)) if row["phase"] == "main" and row["first_choice_s"] is not None]
+    main = [row for row in latest(rows.trials) if row["phase"] == "main" and row["outcome"] in ("complete", "timeout")]
+    answered = [row for row in latest(rows.responses) if row["phase"] == "main" and row["first_choice_s"] is not None]
     verdicts = [row["valid"] for row in main if row["valid"] is not None]
     return {
         **_session(lines),
@@ -150,9 +183,19 @@ def csv_bytes(columns: Sequence[Column], rows: Iterable[Mapping[str, Any]]) -> b
     Numbers are written in full (the shortest text that reads back as the same number). A cell's text is never changed;
     half a surrogate pair, which no file can hold, becomes a question mark.
     """
+    return b"".join([header_bytes(columns), *records(columns, rows)])
+
+
+def header_bytes(columns: Sequence[Column]) -> bytes:
+    """Return the first record of a table."""
+    return f"{','.join(header(tuple(columns)))}\n".encode()
+
+
+def records(columns: Sequence[Column], rows: Iterable[Mapping[str, Any]]) -> Iterator[bytes]:
+    """Yield each row of a table as `csv_bytes` writes it."""
     names = header(tuple(columns))
-    records = [",".join(names), *(",".join([cell_text(row[name]) for name in names]) for row in rows)]
-    return "".join(f"{record}\n" for record in records).encode("utf-8", "replace")
+    for row in rows:
+        yield f"{','.join([cell_text(row[name]) for name in names])}\n".encode("utf-8", "replace")
 
 
 def only(table: bytes, columns: Sequence[Column]) -> bytes:
@@ -218,21 +261,8 @@ def _trial(session: Row, line: Line) -> Row:
     return row
 
 
-def _row_of(rows: list[Row], line: Line) -> Row:
-    for row in reversed(rows):
-        if (row["trial"], row["attempt"]) == (line["trial"], line["attempt"]):
-            return row
-    raise _never_started(line)
-
-
 def _never_started(line: Line) -> StoreError:
     return StoreError(f"the journal's line {line['n']} is about trial {line['trial']}, which never started")
-
-
-def _interrupt(rows: list[Row]) -> None:
-    """Say of a trial that was left without its end that it was interrupted."""
-    if rows and rows[-1]["outcome"] is None:
-        rows[-1]["outcome"] = "interrupted"
 
 
 def _note(row: Row, text: str, *, mark: bool = False) -> None:
