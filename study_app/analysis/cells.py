@@ -1,7 +1,4 @@
-"""A frame as CSV, a column at a time: the same cells as ``store.tables`` writes, row by row, and much sooner.
-
-Only texts that a spreadsheet would compute have an apostrophe before them (``store.formulas``).
-"""
+"""A frame as CSV, a column at a time: the same cells as ``store.tables`` writes, row by row, and much sooner."""
 
 from __future__ import annotations
 
@@ -12,7 +9,6 @@ import pandas as pd
 
 from study_app.analysis.delivered import Delivered
 from study_app.store.columns import header
-from study_app.store.formulas import guarded
 from study_app.store.tables import cell_text
 
 ROWS_AT_ONCE: Final = 20_000
@@ -41,4 +37,4 @@ def _texts(column: pd.Series[Any]) -> list[str]:
 
 
 def _text(value: Any) -> str:
-    return cell_text(guarded(value) if isinstance(value, str) else None if value is pd.NA else value)
+    return cell_text(None if value is pd.NA else value)

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from study_app.errors import AnalysisError
 from study_app.store.atomic import read_regular
 from study_app.store.columns import LATER, MISSING, SEALED, Column, Kind, columns_held, header
+from study_app.store.formulas import unguarded
 from study_app.store.parsing import parse_json
 
 _ARRAYS: Final[dict[str, tuple[Any, Callable[[Any, Any], Any]]]] = {
@@ -196,7 +197,7 @@ def _flag(cell: str) -> bool:
 
 
 _PARSERS: Final[dict[str, Callable[[str], Any]]] = {
-    "text": str,
+    "text": unguarded,
     "time": str,
     "integer": _integer,
     "number": _number,

@@ -13,7 +13,7 @@ from study_app.errors import StoreError
 from study_app.store import journal
 from study_app.store.atomic import cannot_read, read_regular, write_file
 from study_app.store.columns import EXCLUSIONS, MISSING, header
-from study_app.store.formulas import guarded, unguarded
+from study_app.store.formulas import unguarded
 from study_app.store.layout import StudyFolder
 from study_app.store.opening import open_alone
 from study_app.store.progress import attempts
@@ -115,9 +115,7 @@ def without_mark(content: bytes) -> bytes:
 
 def exclusion_bytes(rows: tuple[Exclusion, ...]) -> bytes:
     """Return ``exclusions.csv``."""
-    cells = [{name: getattr(row, name) for name in header(EXCLUSIONS)} for row in rows]
-    texts = ("rule_or_person", "reason")
-    return csv_bytes(EXCLUSIONS, [row | {name: guarded(row[name]) for name in texts} for row in cells])
+    return csv_bytes(EXCLUSIONS, [{name: getattr(row, name) for name in header(EXCLUSIONS)} for row in rows])
 
 
 def _exclusion(path: Path, number: int, row: list[str]) -> Exclusion:

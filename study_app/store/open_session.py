@@ -111,7 +111,8 @@ class SessionStore:
         While the session runs only rows that changed are written, and nobody waits until the disk has them, for the
         participant waits for the next page; at its end the tables are written as wholes and flushed. A table that
         cannot be written now (open in another program, no space) stops no session: nothing is lost, since tables are
-        made from the journal. ``behind`` says why, and the next call tries again. What became of recordings since the last call is journalled first.
+        made from the journal. ``behind`` says why, and the next call tries again. What became of recordings since the
+        last call is journalled first.
         """
         try:
             self._keep_recordings()

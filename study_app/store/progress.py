@@ -75,8 +75,8 @@ def progress_of(lines: Sequence[Line]) -> Progress:
         raise StoreError("the journal does not begin with session_started: nothing was begun that could go on")
     now = Progress(lines[0], language=lines[0].get("language", ""))
     for line in lines[1:]:
-        now = replace(_after(now, line), t_s=max(now.t_s, line["t_s"]))
-    return now
+        now = _after(now, line)
+    return replace(now, t_s=max(0.0, *(line["t_s"] for line in lines)))
 
 
 def wrong_responses(lines: Sequence[Line]) -> Iterator[str]:

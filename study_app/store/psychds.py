@@ -150,7 +150,8 @@ def _table_errors(folder: Path, path: Path, metadata: Metadata, measured: set[st
             return
     if "row_id" in header and len({row[header.index("row_id")] for row in rows}) < len(rows):
         yield Issue("ROWID_VALUES_NOT_UNIQUE", name, "values of row_id come more than once")
-    if unknown := [column for column in header if column not in _variables(_metadata_of(folder, path, metadata))]:
+    described = _variables(_metadata_of(folder, path, metadata))
+    if unknown := [column for column in header if column not in described]:
         yield Issue("CSV_COLUMN_MISSING_FROM_METADATA", name, f"{', '.join(unknown)}: not in variableMeasured")
 
 

@@ -257,12 +257,12 @@ def check_table(
         return
     expected, columns = tables.in_columns_of(content, expected, TABLES[name])
     if differing := _differing_lines(content, expected):
-        may_lag = all(map(may_be_behind, differing))
-        if may_lag and expected.startswith(content):
-            found.warning(path, f"lacks the rows from line {differing[0]} on; rebuild renews it")
-            return
-        tell = found.warning if may_lag and _is_behind(content, expected, name) else found.error
+        beginning = expected.startswith(content)
+        behind = all(map(may_be_behind, differing)) and (beginning or _is_behind(content, expected, name))
+        tell = found.warning if behind else found.error
         tell(path, f"is not what the journal gives, from line {differing[0]} on; rebuild renews it")
+        if behind and beginning:  # a program killed while it wrote a row
+            return
     for problem in cells.problems(content, columns):
         found.error(path, problem)
 

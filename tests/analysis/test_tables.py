@@ -8,7 +8,7 @@ from study_app.analysis.tables import Study, load_study
 from study_app.errors import AnalysisError, StoreError
 from study_app.protocol.load import parse, source_bytes
 from study_app.store.columns import RESPONSES, TRIALS, header
-from study_app.store.tables import only
+from study_app.store.tables import csv_bytes, read_table
 from tests.analysis.conftest import CANNOT_JUDGE, Answer, Results, make_results
 from tests.store.earlier import TRIALS_HEADER
 
@@ -315,12 +315,13 @@ def test_a_table_of_an_earlier_version_is_read_as_if_its_later_columns_held_noth
     before = load_study(rek.folder).trials
     path = rek.trials("P001")
     earlier = tuple(column for column in TRIALS if column.name in TRIALS_HEADER.split(","))
-    path.write_bytes(only(path.read_bytes(), earlier))
+    path.write_bytes(csv_bytes(earlier, read_table(path.read_bytes(), earlier)))
     assert path.read_text(encoding="utf-8").startswith(TRIALS_HEADER + "\n")
     trials = load_study(rek.folder).trials
     assert trials[["withheld_share", "limiter_estimator"]].isna().all(axis=None)
     assert trials["force_mean_n"].equals(before["force_mean_n"])
-    path.write_bytes(only(path.read_bytes(), [column for column in earlier if column.name != "valid"]))
+    lacking = [column for column in earlier if column.name != "valid"]
+    path.write_bytes(csv_bytes(lacking, read_table(path.read_bytes(), lacking)))
     assert "does not begin with the columns" in refusal(rek.folder)
 
 

@@ -3,6 +3,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -157,3 +158,51 @@ def test_a_file_that_cannot_be_read_hides_no_session_and_stops_none(
     assert findings.sessions == 2
     assert any("P001/ses-01" in str(error) and name in str(error) for error in findings.errors)
     assert not any("P002" in str(error) for error in findings.errors)
+
+
+def age(study: Path, by_s: float) -> None:
+    """Let the study's files be from long ago, the table of participants a minute later than the others."""
+    for path in study.rglob("*"):
+        later = 60.0 if path.name.endswith("participants_data.csv") else 0.0
+        moment = path.stat().st_mtime - by_s + later
+        os.utime(path, (moment, moment))
+
+
+def test_a_list_reads_no_journal_that_is_older_than_the_table(
+    tmp_path: Path,
+    start: Callable[..., SessionStore],
+    attend: Callable[[SessionStore], None],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    for name in ("P001", "P002", "P003", "P004"):
+        store = start(name)
+        attend(store)
+        store.finish("completed")
+    study = StudyFolder(tmp_path / "study")
+    age(study.path, 3600.0)
+    rows = participants.participants(study)
+    with monkeypatch.context() as unread:
+        unread.setattr(journal, "scan", None)
+        assert participants.participants_at_once(study) == rows
+    damaged, gone, _, running = study.sessions()
+    damaged.journal.write_bytes(damaged.journal.read_bytes().replace(b"complete", b"commplete", 1))
+    gone.journal.unlink()
+    with running.journal.open("ab") as file:
+        file.write(b"torn")
+    start("P005").close()
+    age(study.path, 0.0)
+    known = participants.participants(study)
+    assert participants.participants_at_once(study) == known
+    assert [row["status"] for row in known] == ["damaged", "damaged", "completed", "completed", "unfinished"]
+
+
+@pytest.mark.parametrize("content", [b"", b"study\nx\n", b"\xff\xfe", b'"', None])
+def test_a_table_that_is_none_hides_no_session(
+    tmp_path: Path, start: Callable[..., SessionStore], content: bytes | None
+) -> None:
+    start("P001").finish("completed")
+    study = StudyFolder(tmp_path / "study")
+    path = study.participants("brackish")
+    path.write_bytes(path.read_bytes().replace(b",1,", b",one,") if content is None else content)
+    age(study.path, 3600.0)
+    assert participants.participants_at_once(study) == participants.participants(study)

@@ -14,11 +14,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from study_app.errors import StoreError
-from study_app.store.columns import RESPONSES, TABLES, TRIALS, Column, header, unsealed, variable
+from study_app.store.columns import MISSING, RESPONSES, TABLES, TRIALS, Column, header, unsealed, variable
+from study_app.store.formulas import guarded
 from study_app.store.journal import read
 from study_app.store.progress import progress_of
 from study_app.store.session import SessionStore
-from study_app.store.tables import csv_bytes, latest, participant, responses, trials
+from study_app.store.tables import csv_bytes, in_columns_of, latest, participant, read_table, responses, trials
 
 NASTY = [
     "plain",
@@ -72,17 +73,22 @@ class Script:
 def test_text_comes_back_through_the_csv_module_and_pandas(text: str) -> None:
     content = csv_bytes(TEXT, [{"first": text, "second": "end"}, {"first": "next", "second": text}])
     read_back = list(csv.reader(io.StringIO(content.decode("utf-8"), newline="")))
-    assert read_back == [["first", "second"], [text, "end"], ["next", text]]
+    cell = guarded(text)
+    assert read_back == [["first", "second"], [cell, "end"], ["next", cell]]
     frame = pd.read_csv(io.BytesIO(content), dtype=str, keep_default_na=False)
-    assert frame["first"].to_list() == [text, "next"]
-    assert frame["second"].to_list() == ["end", text]
+    assert frame["first"].to_list() == [cell, "next"]
+    assert frame["second"].to_list() == ["end", cell]
 
 
 @given(texts=st.lists(st.tuples(st.text(st.characters(codec="utf-8")), st.text(st.characters(codec="utf-8")))))
 def test_any_text_comes_back_through_the_csv_module(texts: list[tuple[str, str]]) -> None:
     content = csv_bytes(TEXT, [{"first": first, "second": second} for first, second in texts])
     read_back = list(csv.reader(io.StringIO(content.decode("utf-8"), newline="")))
-    assert read_back == [["first", "second"], *([first, second] for first, second in texts)]
+    assert read_back == [["first", "second"], *([guarded(first), guarded(second)] for first, second in texts)]
+    kept = [
+        {name: None if text == MISSING else text for name, text in zip(header(TEXT), row, strict=True)} for row in texts
+    ]
+    assert read_table(content, TEXT) == kept
 
 
 @given(number=st.floats(allow_nan=False, allow_infinity=False))
@@ -98,6 +104,26 @@ def test_numbers_are_written_in_full_with_a_point(number: float) -> None:
 )
 def test_what_is_not_known_or_not_a_text_has_one_spelling(value: Any, cell: str) -> None:
     assert csv_bytes(TEXT[:1], [{"first": value}]) == f"first\n{cell}\n".encode()
+
+
+def test_every_column_of_trials_reads_back_as_what_was_written(summary: dict[str, Any]) -> None:
+    script = Script()
+    script.trial(1)
+    script.end(1, **summary)
+    script.add("note", kind="mark", text="-1 and more")
+    rows = trials(script.lines)
+    content = csv_bytes(TRIALS, rows)
+    assert b",'-1 and more\n" in content
+    assert read_table(content, TRIALS) == rows
+
+
+def test_a_table_that_was_written_before_texts_were_guarded_is_what_the_journal_gives() -> None:
+    now = csv_bytes(TEXT, [{"first": "=1+2", "second": 'a, "b"'}, {"first": "'", "second": "+"}])
+    early = now.replace(b"'=", b"=").replace(b"'+", b"+")
+    assert early != now
+    assert in_columns_of(early, now, TEXT) == (early, TEXT)
+    changed = early.replace(b"=1+2", b"=1+3")
+    assert in_columns_of(changed, now, TEXT) == (now, TEXT)
 
 
 def test_half_a_surrogate_pair_does_not_stop_a_table() -> None:

@@ -12,7 +12,7 @@ from typing import Any
 from study_app.errors import StoreError
 from study_app.store.exclusions import Exclusion, exclusions
 from study_app.store.layout import StudyFolder
-from study_app.store.participants import participants
+from study_app.store.participants import participants_at_once
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +61,7 @@ def sessions(results: Path, answers_of: Mapping[str, int]) -> tuple[SessionFacts
     found: list[SessionFacts] = []
     for data in sorted(results.glob("*/data")):
         with contextlib.suppress(StoreError):  # not ours, or not readable: the commands say why when asked about it
-            rows = participants(StudyFolder(data.parent))
+            rows = participants_at_once(StudyFolder(data.parent))
             found += session_facts(data.parent, rows, _exclusions(data.parent), answers_of)
     return tuple(sorted(found, key=lambda session: (not session.needs_care, -session.started.timestamp())))
 
