@@ -62,7 +62,8 @@ class KeptSession(JournalPort, Protocol):
 class Ports:
     """The world: ``present`` shows a page, ``clock`` gives seconds since the session's origin.
 
-    ``recorder`` is None where no recordings are kept.
+    ``recorder`` is None where no recordings are kept. Without ``paints`` nobody shows a window: the first frame of a
+    trial is told of, and a later one need not come.
     """
 
     servo: ServoPort
@@ -70,3 +71,4 @@ class Ports:
     present: Callable[[Page], None]
     clock: Callable[[], float]
     recorder: RecorderPort | None = None
+    paints: bool = True

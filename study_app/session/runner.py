@@ -304,6 +304,7 @@ class Runner:
             servo=self._ports.servo,
             reader=self._reader,
             recording=self._recording,
+            paints=self._ports.paints,
         )
 
     def _stop_trial(self) -> None:

@@ -25,12 +25,14 @@ class TrialStatistics:
     delay_s : the visual delay asked for
     late_s : a frame counts as late if its delay is more than this over the one asked for
     due_ns : when the trial's first frame was due: when its page was asked for [ns]
+    paints : whether frames come as long as the trial runs; else its first frame may be the only one
     """
 
-    def __init__(self, *, rate_hz: float, delay_s: float, late_s: float, due_ns: int) -> None:
+    def __init__(self, *, rate_hz: float, delay_s: float, late_s: float, due_ns: int, paints: bool = True) -> None:
         self._rate_hz = rate_hz
         self._delay_s = delay_s
         self._late_s = late_s
+        self._fewest = 1 if paints else 2  # frames before the first of them can have stood
         self._times: list[Any] = []
         self._ages_ns: list[int] = []
         self._painted_ns = due_ns
@@ -78,11 +80,8 @@ class TrialStatistics:
         self._ages_ns.append(painted_ns - shown_ns)
 
     def frame_gap_ns(self, until_ns: int) -> int:
-        """Return the longest time that a frame stood, the newest one until a moment [ns]; 0 before the second frame.
-
-        Whoever paints no second frame has no window: only a trial's beginning is reported then.
-        """
-        return max(self._frame_gap_ns, until_ns - self._painted_ns) if len(self._ages_ns) > 1 else 0
+        """Return the longest time that a frame stood, the newest one until a moment [ns]; 0 before the first frame."""
+        return max(self._frame_gap_ns, until_ns - self._painted_ns) if len(self._ages_ns) >= self._fewest else 0
 
     def summary(self, *, samples_dropped: int, worst_gap_s: float, until_ns: int) -> dict[str, Any]:
         """Return the measured columns of the trial row, to six decimals; None where nothing was measured.
@@ -150,5 +149,5 @@ class TrialStatistics:
             "delay_error_p95_ms": float(np.percentile(errors_s, 95)) * 1e3 if seen else None,
             "delay_error_max_ms": float(errors_s.max()) * 1e3 if seen else None,
             "first_frame_gap_ms": self._first_gap_ns * 1e-6 if seen else None,
-            "worst_frame_gap_ms": self.frame_gap_ns(until_ns) * 1e-6 if errors_s.size > 1 else None,
+            "worst_frame_gap_ms": self.frame_gap_ns(until_ns) * 1e-6 if errors_s.size >= self._fewest else None,
         }

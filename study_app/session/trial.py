@@ -49,10 +49,19 @@ class RunningTrial:
     servo : presents the scene
     reader : the telemetry's reader that the samples given to `follow` come from; it counts those that were lost
     recording : takes frames and samples from the first frame on
+    paints : whether a window paints frames as long as the trial runs
     """
 
     def __init__(
-        self, command: StartTrial, scene: Scene, *, late_s: float, servo: ServoPort, reader: Any, recording: Recording
+        self,
+        command: StartTrial,
+        scene: Scene,
+        *,
+        late_s: float,
+        servo: ServoPort,
+        reader: Any,
+        recording: Recording,
+        paints: bool,
     ) -> None:
         self.trial = command.trial
         self._command = command
@@ -64,7 +73,7 @@ class RunningTrial:
         self._dropped_before = 0
         self._tracker = track(command.task)
         self._statistics = TrialStatistics(
-            rate_hz=servo.rate_hz, delay_s=command.delay_s, late_s=late_s, due_ns=servo.now_ns()
+            rate_hz=servo.rate_hz, delay_s=command.delay_s, late_s=late_s, due_ns=servo.now_ns(), paints=paints
         )
 
     @property

@@ -195,7 +195,9 @@ TRIALS: tuple[Column, ...] = (
         "From the trial's beginning to its first painted frame, with which force and task begin.",
         "ms",
     ),
-    _measure("worst_frame_gap_ms", "Longest time that one frame stood before the next was shown.", "ms"),
+    _measure(
+        "worst_frame_gap_ms", "Longest time that one frame stood before the next was shown or the task ended.", "ms"
+    ),
     Column(
         "valid",
         "flag",

@@ -99,7 +99,7 @@ def session(
         if isinstance(page, TaskPage):
             runner.frame_shown(servo.now_ns(), servo.now_ns())
 
-    ports = Ports(servo, store, present, clock.seconds)
+    ports = Ports(servo, store, present, clock.seconds, paints=False)
     runner = Runner(study, build_schedule(study, participant, 1), store.key.codes, ports, study.study.languages[0])
 
     def hear(event: Event) -> None:

@@ -83,7 +83,7 @@ def held(store: SessionStore, device: ScriptedDevice, servo: Servo) -> tuple[Run
             servo.advance(50)
             runner.poll()
 
-    ports = Ports(servo, store, present, store.clock.seconds, store.recorder)
+    ports = Ports(servo, store, present, store.clock.seconds, store.recorder, paints=False)
     runner = Runner(study, schedule, store.key.codes, ports, "en", resume_at(study, schedule, store.lines))
     device.follow(t_s, np.column_stack((0.03 * np.sin(6 * t_s), 0.01 * np.cos(9 * t_s), 0 * t_s)))
     return runner, wait

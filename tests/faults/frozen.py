@@ -1,14 +1,18 @@
-"""Holds a session in windows that stops itself within a trial, as SIGSTOP does: run as a program.
+"""Holds a session in windows that stands still within a trial: run as a program.
 
-It is held as `run` holds it, by a scripted hand in real time. Whoever started it sends SIGCONT after a while. Then the
-operator resumes what the program paused, and ends the session after that trial.
+It is held as `run` holds it, by a scripted hand in real time. What stands still is, by the second argument: the
+process, stopped when the liquid is felt ("felt") or right after the trial's first frame ("frame"), until whoever
+started it sends SIGCONT; or right after the first frame the window alone ("window"), for `WINDOW_S`, which is beyond
+the trial's end. Then the operator resumes what the program paused, and ends the session after that trial.
 """
 
 from __future__ import annotations
 
 import os
+import re
 import signal
 import sys
+import time
 from pathlib import Path
 
 from study_app import app
@@ -19,22 +23,45 @@ from study_app.gui.machine import Machine
 from study_app.gui.operator import OperatorWindow
 from study_app.gui.participant import ParticipantWindow
 from study_app.session.pages import PausePage, QuestionnairePage, TaskPage, TextPage
+from study_app.session.trial import RunningTrial
 from tests.faults import short
 from tests.faults.windows import Person
 
+LONGEST_S = "2"
+WINDOW_S = 5.0
 
-def main(folder: str) -> int:
+
+def stand_still_after_the_first_frame(how: str, stopped: list[int]) -> None:
+    """Let the first frame of the first trial be the last one for a while, and add to ``stopped`` then."""
+    show = RunningTrial.frame
+
+    def frame(trial: RunningTrial, painted_ns: int, sample_ns: int) -> None:
+        show(trial, painted_ns, sample_ns)
+        if stopped:
+            return
+        stopped.append(1)
+        if how == "frame":
+            os.kill(os.getpid(), signal.SIGSTOP)
+        else:
+            time.sleep(WINDOW_S)
+
+    RunningTrial.frame = frame  # type: ignore[method-assign]
+
+
+def main(folder: str, how: str) -> int:
     machines: list[Machine] = []
     open_machine = live_session.open_machine
     live_session.open_machine = lambda *a, **k: machines.append(open_machine(*a, **k)) or machines[-1]
     beginning.MEASURED_S = 0.1
     stopped: list[int] = []
+    if how != "felt":
+        stand_still_after_the_first_frame(how, stopped)
 
     def watch(participant: ParticipantWindow, operator: OperatorWindow) -> bool:
         if isinstance(participant.page, PausePage):
             operator.resume_asked.emit()
             return True
-        if not stopped and isinstance(participant.page, TaskPage):
+        if how == "felt" and not stopped and isinstance(participant.page, TaskPage):
             newest = machines[0].servo.telemetry.latest()
             if newest is not None and newest["scene"] > 0:  # the liquid is felt
                 stopped.append(int(newest["scene"]))
@@ -44,10 +71,16 @@ def main(folder: str) -> int:
             return True
         return False
 
+    protocol = short.write(Path(folder))
+    text, found = re.subn(
+        r"^max_s = 30\b", f"max_s = {LONGEST_S}", protocol.read_text(encoding="utf-8"), flags=re.MULTILINE
+    )
+    assert found == 1
+    protocol.write_text(text, encoding="utf-8")
     application = application_here()
     person = Person(watch)
     code = app.run(
-        str(short.write(Path(folder))),
+        str(protocol),
         participant="P001",
         device="scripted",
         windowed=True,

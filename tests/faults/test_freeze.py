@@ -25,35 +25,48 @@ pytestmark = [
 ]
 
 
-def held_with_a_freeze(folder: Path) -> None:
-    """Hold a session that stops itself in its first trial; let it go on after a while."""
+def held_with_a_freeze(folder: Path, how: str) -> tuple[dict[str, str], dict[str, str]]:
+    """Hold a session that stands still in its first trial; return that trial's rows, the interrupted and the next."""
     program = subprocess.Popen(
-        [sys.executable, "-m", "tests.faults.frozen", str(folder)],
+        [sys.executable, "-m", "tests.faults.frozen", str(folder), how],
         cwd=Path(__file__).parents[2],
         env=os.environ | {"QT_QPA_PLATFORM": "offscreen"},
     )
     try:
-        _, status = os.waitpid(program.pid, os.WUNTRACED)
-        assert os.WIFSTOPPED(status), status
-        time.sleep(FROZEN_S)
-        program.send_signal(signal.SIGCONT)
+        if how != "window":
+            _, status = os.waitpid(program.pid, os.WUNTRACED)
+            assert os.WIFSTOPPED(status), status
+            time.sleep(FROZEN_S)
+            program.send_signal(signal.SIGCONT)
         assert program.wait(150) == 0
     finally:
         program.kill()
         program.wait()
-
-
-def test_a_process_that_is_stopped_in_a_trial_has_it_interrupted_and_presents_it_again(tmp_path: Path) -> None:
-    held_with_a_freeze(tmp_path)
-    (session,) = StudyFolder(tmp_path / "results").sessions()
+    (session,) = StudyFolder(folder / "results").sessions()
     lines = journal.read(session.journal)
     assert [line["by"] for line in lines if line["event"] == "paused"] == ["program"]
     assert not any(line["event"] == "broke" for line in lines)
+    assert verify(folder / "results").errors == ()
     with session.table("demo", "trials").open(newline="", encoding="utf-8") as file:
         frozen, again = csv.DictReader(file)
     assert (frozen["trial"], frozen["attempt"], frozen["outcome"]) == ("1", "1", "interrupted")
-    assert float(frozen["worst_gap_ms"]) > 1000 * FROZEN_S
-    assert frozen["valid"] == "false"
     assert (again["trial"], again["attempt"], again["outcome"]) == ("1", "2", "complete")
     assert float(again["worst_gap_ms"]) < 1000
-    assert verify(tmp_path / "results").errors == ()
+    return frozen, again
+
+
+def test_a_process_that_is_stopped_in_a_trial_has_it_interrupted_and_presents_it_again(tmp_path: Path) -> None:
+    frozen, _ = held_with_a_freeze(tmp_path, "felt")
+    assert float(frozen["worst_gap_ms"]) > 1000 * FROZEN_S
+    assert frozen["valid"] == "false"
+
+
+def test_a_process_that_is_stopped_right_after_the_first_frame_has_the_trial_interrupted(tmp_path: Path) -> None:
+    held_with_a_freeze(tmp_path, "frame")
+
+
+def test_a_window_that_shows_the_first_frame_until_the_trial_is_over_has_it_interrupted(tmp_path: Path) -> None:
+    """The servo ran on: the hand felt a liquid whose tank stood still."""
+    frozen, _ = held_with_a_freeze(tmp_path, "window")
+    assert float(frozen["worst_frame_gap_ms"]) > 1000
+    assert frozen["valid"] == "false"

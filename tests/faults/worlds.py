@@ -38,7 +38,7 @@ class StoredWorld(World):
             clock=SessionClock(self.servo.now_ns),
         )
         plan = small.opened().plan
-        ports = Ports(self.servo, self.store, self._present, self.clock)
+        ports = Ports(self.servo, self.store, self._present, self.clock, paints=False)
         schedule = build_schedule(plan.protocol, participant, 1)
         self.runner = Runner(plan.protocol, schedule, self.store.key.codes, ports, "en")
 

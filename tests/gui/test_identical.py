@@ -48,7 +48,7 @@ class Held:
         self.page: Page | None = None
         self.clock = ManualClock()
         self.servo = FakeServo(log)
-        ports = Ports(self.servo, FakeJournal(log), self._present, self.clock)
+        ports = Ports(self.servo, FakeJournal(log), self._present, self.clock, paints=False)
         self.runner = Runner(protocol, schedule, key, ports, "en")
         self.delay_s = protocol.delay_s(condition)
         self.runner.post(Begin(self.clock()))

@@ -140,7 +140,7 @@ class World:
         self.on_page: Callable[[Any], None] = lambda _page: None
         self.paints = True
         plan = small.opened(seed).plan
-        ports = Ports(self.servo, self.journal, self._present, self.clock, recorder)
+        ports = Ports(self.servo, self.journal, self._present, self.clock, recorder, paints=False)
         self.runner = Runner(plan.protocol, plan.schedule, plan.key, ports, plan.language)
 
     def clock(self) -> float:

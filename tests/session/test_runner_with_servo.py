@@ -40,7 +40,7 @@ class Bench:
         self.pages: list[Any] = []
         self.paints = True
         plan = small.opened().plan
-        ports = Ports(servo, self.journal, self.present, self.clock)
+        ports = Ports(servo, self.journal, self.present, self.clock, paints=False)
         self.runner = Runner(plan.protocol, plan.schedule, plan.key, ports, plan.language)
         t_s = np.arange(0, 20, 0.005)
         device.follow(t_s, np.column_stack((0.03 * np.sin(6 * t_s), 0 * t_s, 0 * t_s)))
