@@ -14,7 +14,9 @@ EXIT_UNDECIDED = 4
 
 
 @click.command("validate-report")
-@click.option("--studies", type=click.IntRange(1, 1_000_000), default=1000, show_default=True, help="Of each cell.")
+@click.option(
+    "--studies", type=click.IntRange(1, 1_000_000), default=1000, show_default=True, help="In each cell, at first."
+)
 @click.option("--jobs", type=click.IntRange(-1), default=-1, metavar="N", help="At once; default: one a core.")
 @click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True)
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for rates.md and rates.csv.")
@@ -23,9 +25,10 @@ def validate_report(studies: int, jobs: int, seed: int, to: Path | None) -> None
 
     Studies of rek2024 with 5, 12 and 24 participants, by the rehearsals' answer model and by an ordinal probit model
     with random effects, go through the report's own tests. Of every rate the Wilson interval is printed, and whether
-    it keeps to its limit: "at most 5 %" holds if the interval reaches down to 5 % and ends below 7.5 %. Ctrl-C ends
-    with what was simulated until then. Ends with exit code 3 where a rate is beyond its limit by its 99.9 % interval,
-    else with 4 where the studies are too few to decide about one.
+    it keeps to its limit: "at most 5 %" holds if the interval reaches down to 5 % and ends below 7.5 %. A cell with an
+    undecided rate is continued with further studies, up to four times as many. Ctrl-C ends with what was simulated
+    until then. Ends with exit code 3 where a rate is beyond its limit by its 99.9 % interval, else with 4 where the
+    studies are too few to decide about one.
     """
     if jobs == 0:
         raise click.BadParameter("0 jobs do nothing: give 1 or more, or -1 for one a core", param_hint="--jobs")
@@ -42,11 +45,16 @@ def validate_report(studies: int, jobs: int, seed: int, to: Path | None) -> None
     studied = simulated(protocol, plan(protocol, feelings(protocol, seed=seed)))
     rates: tuple[Rate, ...] = ()
     begun, done = time.monotonic(), 0
+    clear = "\r\033[K" if sys.stderr.isatty() else ""
+
+    def line(text: str) -> None:
+        click.echo(f"{clear}{time.monotonic() - begun:.0f} s: {text}", err=True)
+
     try:
-        for done, so_far in validate(studied, studies, seed, jobs=jobs):
+        for done, so_far in validate(studied, studies, seed, jobs=jobs, progress=line):
             rates = so_far
-            if sys.stderr.isatty():
-                click.echo(f"\r\033[K{done} studies", err=True, nl=False)
+            if clear:
+                click.echo(f"{clear}{done} studies", err=True, nl=False)
     except KeyboardInterrupt:
         click.echo("ended early", err=True)
     words = f"{done} studies in {time.monotonic() - begun:.0f} s\n\n{markdown(rates)}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import fields, replace
 
 import numpy as np
@@ -12,10 +13,11 @@ from study_app.analysis.answered import of_tables
 from study_app.analysis.evaluate import found_in
 from study_app.analysis.power.planned import plan
 from study_app.analysis.statistics.threshold import noticed
-from study_app.analysis.validation import single, studies
+from study_app.analysis.validation import running, single, studies
 from study_app.analysis.validation.counting import CLAIMED, LOST, Cell, count, truth
 from study_app.analysis.validation.listed import markdown, table
 from study_app.analysis.validation.rates import Limit, Rate
+from study_app.analysis.validation.running import validate
 from study_app.analysis.validation.studies import (
     EXTENTS,
     GENERATORS,
@@ -179,3 +181,45 @@ def test_an_interval_that_is_not_printed_covers_nothing(monkeypatch: pytest.Monk
     assert (covered.hits, covered.of) == (0, 0)
     assert covered.holds == "too few studies"
     assert replace(printed, of=100).holds == "no"
+
+
+@pytest.fixture
+def continued(monkeypatch: pytest.MonkeyPatch) -> dict[str, list[tuple[int, int]]]:
+    """Two cells without any study; the batches that are counted of each."""
+    batches: dict[str, list[tuple[int, int]]] = {"clear": [], "unclear": []}
+
+    def counted(name: str, hits_of_25: int) -> Callable[[int, int, int], tuple[Rate, ...]]:
+        def count_(seed: int, batch: int, many: int) -> tuple[Rate, ...]:
+            assert seed == 1
+            batches[name].append((batch, many))
+            return (Rate(name, 5, "what", "at most 5 %", hits_of_25 if batch < 12 else 0, many),)
+
+        return count_
+
+    monkeypatch.setattr(
+        running, "_counts", lambda *_: {("clear", 5): counted("clear", 0), ("unclear", 5): counted("unclear", 2)}
+    )
+    return batches
+
+
+def test_cells_with_an_undecided_rate_are_continued_with_other_studies(
+    rek: Simulated, continued: dict[str, list[tuple[int, int]]]
+) -> None:
+    told: list[str] = []
+    *_, (done, rates) = validate(rek, 290, jobs=1, progress=told.append)
+    assert continued["clear"] == [(batch, 25) for batch in range(11)] + [(11, 15)]
+    assert [batch for batch, _ in continued["unclear"]] == list(range(24))  # 24 of 290 are undecided, of 580 4.1 % hold
+    assert [(rate.hits, rate.of, rate.holds) for rate in rates] == [(0, 290, "yes"), (24, 580, "yes")]
+    assert done == 3 * 290
+    assert told == ["continued: unclear, n = 5: what: 24 of 290, 8.3 % (5.6 to 12.0), at most 5 %: too few studies"]
+
+
+def test_a_cell_is_continued_until_it_is_beyond_or_has_four_times_the_studies(
+    rek: Simulated, continued: dict[str, list[tuple[int, int]]]
+) -> None:
+    told: list[str] = []
+    *_, (done, rates) = validate(rek, 10, jobs=1, progress=told.append)
+    assert [(rate.hits, rate.of, rate.holds) for rate in rates] == [(0, 40, "too few studies"), (6, 30, "no")]
+    assert continued == {"clear": [(batch, 10) for batch in range(4)], "unclear": [(batch, 10) for batch in range(3)]}
+    assert done == 70
+    assert len(told) == 5

@@ -44,6 +44,9 @@ RATES: Final = (0.0, 0.02, 0.06, 0.12, 0.2, 0.3, 0.4, 0.5)
 """Widths of the grid (their logarithms evenly spaced), and its rates of guesses and lapses."""
 
 STEPS: Final = np.array(list(product((0.0, -1.0, 1.0), repeat=3)))
+SAME_WIDTH: Final = 9
+"""So many neighbours in a row have the same width."""
+
 FIRST_STEP: Final = np.array([0.3, 0.03, 0.03])
 ROUNDS: Final = 40
 """A node moves to its best neighbour (log width, guesses, lapses), or halves its steps, so many times at most."""
@@ -147,16 +150,17 @@ def _refined(counts: Counts, shape: Shape, guess: Bounds, lapse: Bounds, thresho
     low, high = _log_widths(counts)
     lows, highs = np.array([low, guess[0], lapse[0]]), np.array([high, guess[1], lapse[1]])
     step = np.tile(np.minimum(FIRST_STEP, highs - lows), (len(thresholds), 1))
-    rows = np.arange(len(thresholds))
-    reached = _at(counts, shape, thresholds, found)
+    found, reached = found.copy(), _at(counts, shape, thresholds, found)
     for _ in range(ROUNDS):
-        near = np.clip(found[:, None] + step[:, None] * STEPS, lows, highs)
-        values = _at(counts, shape, thresholds[:, None], near)
-        best = values.argmax(axis=1)
-        found, reached = near[rows, best], values[rows, best]
-        step[best == 0] /= 2
-        if step[:, 0].max() < FINEST:
+        rows = np.flatnonzero(step[:, 0] >= FINEST)
+        if not len(rows):
             break
+        near = np.clip(found[rows, None] + step[rows, None] * STEPS, lows, highs)
+        grown = _grown(counts, shape, thresholds[rows, None], near[:, ::SAME_WIDTH, 0])
+        values = _log_likelihoods(counts, _with_rates(grown.repeat(SAME_WIDTH, axis=1), near))
+        best = values.argmax(axis=1)
+        found[rows], reached[rows] = near[np.arange(len(rows)), best], values.max(axis=1)
+        step[rows[best == 0]] /= 2
     return Profile(thresholds, reached, found)
 
 
@@ -221,10 +225,20 @@ def _at(counts: Counts, shape: Shape, thresholds: Array, others: Array) -> Array
 
 def _expected(counts: Counts, shape: Shape, thresholds: Array, others: Array) -> Array:
     """Return the shares of yes answers (…, levels) at ``thresholds`` (…) and ``others`` (…, 3)."""
+    return _with_rates(_grown(counts, shape, thresholds, others[..., 0]), others)
+
+
+def _grown(counts: Counts, shape: Shape, thresholds: Array, log_widths: Array) -> Array:
+    """Return F (…, levels) at ``thresholds`` (…) and ``log_widths`` (…)."""
     factor = LOGISTIC if shape == "logistic" else NORMAL
-    scale = factor / (np.exp(others[..., 0]) * counts.span)
+    scale = factor / (np.exp(log_widths) * counts.span)
     z = (counts.levels - thresholds[..., None]) * scale[..., None]
-    grown = expit(z) if shape == "logistic" else ndtr(z)
+    found: Array = expit(z) if shape == "logistic" else ndtr(z)
+    return found
+
+
+def _with_rates(grown: Array, others: Array) -> Array:
+    """Return the shares of yes answers (…, levels) where F is ``grown`` (…, levels)."""
     found: Array = others[..., 1, None] + (1 - others[..., 1] - others[..., 2])[..., None] * grown
     return found
 

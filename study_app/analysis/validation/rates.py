@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, Literal, TypeAlias
 
 from scipy.stats import binomtest
@@ -35,6 +35,18 @@ class Rate:
     limit: Limit
     hits: int
     of: int
+
+    def __add__(self, other: Rate) -> Rate:
+        """Return the rate of both counts together, of the same thing in the same cell."""
+        return replace(self, hits=self.hits + other.hits, of=self.of + other.of)
+
+    def __str__(self) -> str:
+        """Return the rate in one line."""
+        low, high = (100 * end for end in self.interval)
+        return (
+            f"{self.cell}, n = {self.participants}: {self.what}: {self.hits} of {self.of}, "
+            f"{100 * self.share:.1f} % ({low:.1f} to {high:.1f}), {self.limit}: {self.holds}"
+        )
 
     @property
     def share(self) -> float:
