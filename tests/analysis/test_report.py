@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import csv
 import io
 import json
@@ -14,6 +15,7 @@ from typing import Any
 
 import pytest
 from click.testing import CliRunner
+from fontTools.ttLib import TTFont
 
 from study_app.analysis.report.words import counted, listed, number, p_equals, p_value
 from study_app.analysis.report.writing import report
@@ -62,7 +64,7 @@ def read(folder: Path) -> str:
     page.feed((folder / "report.html").read_text(encoding="utf-8"))
     assert page.open == []
     assert not page.tags & {"script", "link", "iframe", "object", "form"}
-    assert all(place.startswith("data:image/png;base64,") for place in page.fetched)
+    assert all(place.startswith(("data:image/png;base64,", "#part-")) for place in page.fetched)
     told = re.sub(r"\s+", " ", " ".join(page.told))
     assert (found := FORBIDDEN.search(told)) is None, told[max(0, found.start() - 80) : found.end() + 40]
     return told
@@ -114,6 +116,30 @@ def test_a_study_of_twelve_tells_what_was_found(of_twelve: Path) -> None:
     assert set(found["versions"]) >= {"liquid-study", "numpy", "scipy"}
     assert "blinding/key.sealed" in found["files"]
     assert sum(name.endswith("receipt.json") for name in found["files"]) == 12
+
+
+def test_the_contents_lead_to_every_section(of_twelve: Path) -> None:
+    page = (of_twelve / "report.html").read_text(encoding="utf-8")
+    links = re.findall(r'<a href="#([^"]+)">([^<]+)</a>', page)
+    sections = re.findall(r'<details class="part" id="([^"]+)">\s*<summary><h2>([^<]+)</h2>', page)
+    assert len(links) == page.count('<details class="part"') == 9
+    for (target, title), (place, heading) in zip(links, sections, strict=True):
+        assert target == place
+        assert heading.startswith(title.split()[0])
+
+
+def test_the_page_says_when_the_sessions_took_place(of_twelve: Path) -> None:
+    assert "Twelve participants. Sessions on 2026-01-05." in read(of_twelve)
+
+
+def test_the_typeface_is_in_the_page_with_every_sign(of_twelve: Path) -> None:
+    page = (of_twelve / "report.html").read_text(encoding="utf-8")
+    fonts = re.findall(r"font-weight: (\d+); src: url\(data:font/woff;base64,([^)]+)\)", page)
+    assert [weight for weight, _ in fonts] == ["400", "600"]
+    assert "font-src data:" in page
+    signs = {sign for sign in read(of_twelve) if sign.isprintable()}
+    for _, data in fonts:
+        assert signs <= {chr(code) for code in TTFont(io.BytesIO(base64.b64decode(data))).getBestCmap()}
 
 
 def test_every_test_is_a_row_with_what_a_reader_needs(of_twelve: Path) -> None:
@@ -394,7 +420,7 @@ def test_missing_answers_are_counted_where_they_are_and_what_is_one_way_is_said_
 
 def test_what_a_block_cannot_have_is_said_and_validity_stands_beside_what_was_measured(of_twelve: Path) -> None:
     told = read(of_twelve)
-    sections = re.search(r"Motion and force (.*?) Delay effect (.*?) Reaches:", told)
+    sections = re.search(r".*Motion and force (.*?) Delay effect (.*?) Reaches:", told)
     assert sections is not None
     assert "No reaching task in this block" in sections[1]
     assert "No reaching task in this block" not in sections[2]

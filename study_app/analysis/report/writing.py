@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
+from html import escape, unescape
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +17,10 @@ from study_app.analysis.output import write_files
 from study_app.analysis.report import conduct_section, listing, sections, short
 from study_app.analysis.report.first_page import first_page
 from study_app.analysis.report.methods import methods, told_versions
-from study_app.analysis.report.page import box, bullets, folded, heading, not_there, page, paragraph, table
+from study_app.analysis.report.page import box, bullets, contents, folded, heading, not_there, page, paragraph, table
 from study_app.analysis.report.pictures import Picture, pictures
 from study_app.analysis.report.r_script import r_script
+from study_app.analysis.report.typeface import font_faces
 from study_app.analysis.report.words import counted
 from study_app.analysis.results import Results
 from study_app.analysis.tables import Study, load_study
@@ -142,11 +144,17 @@ def _page(study: Study, results: Results, drawn: Sequence[Picture], told: Mappin
         ("Answers, counted", lambda: sections.answers(results)),
     ]
     first = failures.attempt("first page", lambda: first_page(results, told["limits"], failures))
-    body = [not_there(first.why) if isinstance(first, Failure) else first]
+    parts: list[tuple[str, list[str]]] = []
     for title, make in sections_:
         found = failures.attempt(f"section “{title}”", partial(_made, make))
-        body += folded([heading(2, title), not_there(found.why)] if isinstance(found, Failure) else found)
-    return page(f"{study.title}: report", [*_head(study), *_failed(failures), *body])
+        part = [heading(2, title), not_there(found.why)] if isinstance(found, Failure) else found
+        parts += [(title, part)] if part else []
+    body = [not_there(first.why) if isinstance(first, Failure) else first]
+    for number, (_, part) in enumerate(parts, start=1):
+        body += folded(part, number)
+    html = "\n".join([*_head(study), contents(title for title, _ in parts), *_failed(failures), *body])
+    faces = failures.attempt("typeface", lambda: font_faces("".join(sorted(set(unescape(html))))))
+    return page(f"{study.title}: report", html, "" if isinstance(faces, Failure) else faces)
 
 
 def _made(make: Callable[[], Iterable[str]]) -> list[str]:
@@ -168,7 +176,6 @@ def _failed(failures: Failures) -> Iterator[str]:
 def _head(study: Study) -> Iterator[str]:
     yield heading(1, study.title)
     people = counted(study.n, "participant")
-    yield paragraph(f"Study {study.name}, {told_versions(study)}. {people[:1].upper()}{people[1:]}.", "soft")
     marks = []
     if study.simulated:
         marks.append('<span class="mark">SIMULATED participants, no people</span>')
@@ -176,8 +183,17 @@ def _head(study: Study) -> Iterator[str]:
         marks.append('<span class="mark">PILOT</span>')
     if not study.revealed:
         marks.append('<span class="sealed">Blinded: by code</span>')
-    if marks:
-        yield f"<p>{' '.join(marks)}</p>"
+    facts = f"Study {study.name}, {told_versions(study)}. {people[:1].upper()}{people[1:]}. {_days(study)}"
+    yield f'<p class="soft facts">{escape(facts)} {" ".join(marks)}</p>'
+
+
+def _days(study: Study) -> str:
+    """Say on which days the sessions that count began."""
+    here = study.participants
+    days = sorted({str(at)[:10] for at in here.loc[here["counted"], "started_at"]})
+    if not days:
+        return ""
+    return f"Sessions on {days[0]}." if len(days) == 1 else f"Sessions from {days[0]} to {days[-1]}."
 
 
 def _short(told: Mapping[str, Any]) -> Iterator[str]:
