@@ -10,7 +10,7 @@ from study_app.session.feelings import Feelings, Felt
 
 
 def made_up(name: str) -> Feelings:
-    """What every condition of a study feels like, told apart by force and delay alone."""
+    """What every condition of a study feels like: conditions differ in force and delay alone."""
     study = load(name)
     return {
         (block.id, condition): (Felt(0.5 + 0.4 * number, 4.0, 0.1, 0.02, 0.03, study.delay_s(condition)),)

@@ -84,7 +84,7 @@ def _see_off(process: BaseProcess) -> None:
 def serve(connection: Connection) -> None:
     """Carry out (number, order) one after the other until nobody is there any more; answers are (number, answer)."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the program; this ends with its connection
-    from study_app.analysis.answering import carry_out  # noqa: PLC0415 - the libraries: only in this process
+    from study_app.analysis.worker import carry_out  # noqa: PLC0415 - the libraries: only in this process
 
     with suppress(EOFError, BrokenPipeError, ConnectionResetError):
         while True:

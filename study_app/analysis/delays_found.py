@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from study_app.analysis.answered import AGAIN, MANY, OVER_ALL, Asked, asked_again, head, over_all
+from study_app.analysis.block_tests import AGAIN, MANY, OVER_ALL, Asked, asked_again, head, over_all
 from study_app.analysis.judging import judged
 from study_app.analysis.results import Against, BlockFound, Lowest, Tested, Waiting
 from study_app.analysis.statistics.equivalence import tost
@@ -24,19 +24,21 @@ ONE_DELAY: Final = "the block has one delay: there is nothing to compare it with
 THRESHOLD: Final = "detection threshold"
 
 
-def delays_found(study: Study | None, of: Asked) -> BlockFound:
+def delays_found(study: Study | None, answers: Asked) -> BlockFound:
     """Return the tests of a block of delays whose settings are known, shortest delay first."""
-    delays_ms = list(of.block.delays_ms)
-    overall, failed = of.attempt(OVER_ALL, lambda: over_all(of), None)
-    (trends, no_trends), failed_trends = of.attempt(TREND, lambda: _trends(of), ((), ()))
-    (lowest, no_lowest), failed_lowest = of.attempt(LOWEST, lambda: _lowest(of, trends, delays_ms), ((), ()))
-    (against, no_against), failed_against = of.attempt(EQUIVALENCE, lambda: _against(of, delays_ms), ((), ()))
-    (threshold, no_threshold), failed_threshold = of.attempt(THRESHOLD, lambda: _threshold(of, delays_ms), (None, ()))
-    per_100_ms = np.array(delays_ms)[:, None] / 100
-    (mixed, incomplete, not_again), failed_again = of.attempt(
-        AGAIN, lambda: asked_again(of, per_100_ms, "the delay"), ((), (), ())
+    delays_ms = list(answers.block.delays_ms)
+    overall, failed = answers.attempt(OVER_ALL, lambda: over_all(answers), None)
+    (trends, no_trends), failed_trends = answers.attempt(TREND, lambda: _trends(answers), ((), ()))
+    (lowest, no_lowest), failed_lowest = answers.attempt(LOWEST, lambda: _lowest(answers, trends, delays_ms), ((), ()))
+    (against, no_against), failed_against = answers.attempt(EQUIVALENCE, lambda: _against(answers, delays_ms), ((), ()))
+    (threshold, no_threshold), failed_threshold = answers.attempt(
+        THRESHOLD, lambda: _threshold(answers, delays_ms), (None, ())
     )
-    told = head(study, of)
+    per_100_ms = np.array(delays_ms)[:, None] / 100
+    (mixed, incomplete, not_again), failed_again = answers.attempt(
+        AGAIN, lambda: asked_again(answers, per_100_ms, "the delay"), ((), (), ())
+    )
+    told = head(study, answers)
     return BlockFound(
         **{name: value for name, value in told.items() if name != "absent"},
         overall=overall,
@@ -55,30 +57,30 @@ def delays_found(study: Study | None, of: Asked) -> BlockFound:
     )
 
 
-def _trends(of: Asked) -> tuple[tuple[Tested, ...], tuple[Waiting, ...]]:
-    if of.k < 2:
+def _trends(answers: Asked) -> tuple[tuple[Tested, ...], tuple[Waiting, ...]]:
+    if answers.k < 2:
         return (), (Waiting(TREND, ONE_DELAY),)
     outcomes = {}
-    for item in of.block.items:
-        direction = of.decided.direction(item.id)
+    for item in answers.block.items:
+        direction = answers.decided.direction(item.id)
         if direction is not None:
-            of.each(item.short)
-            outcomes[item.id] = page(of.values[item.id], direction, seed=of.intervals)
-    undirected = [item.short for item in of.block.items if item.id not in outcomes]
+            answers.each(item.short)
+            outcomes[item.id] = page(answers.values[item.id], direction, seed=answers.intervals)
+    undirected = [item.short for item in answers.block.items if item.id not in outcomes]
     why = f"the protocol does not say whether answers should rise or fall with delay ({', '.join(undirected)})"
-    found = judged(outcomes, of.decided, f"{of.block.id}: trend over delay")
+    found = judged(outcomes, answers.decided, f"{answers.block.id}: trend over delay")
     return found, (Waiting(TREND, why),) if undirected else ()
 
 
 def _lowest(
-    of: Asked, trends: tuple[Tested, ...], delays_ms: list[float]
+    answers: Asked, trends: tuple[Tested, ...], delays_ms: list[float]
 ) -> tuple[tuple[Lowest, ...], tuple[Waiting, ...]]:
     """Step down in the statements whose trend is there at all."""
     showing = [one for one in trends if one.verdict in ("shown", "suggested")]
     found = []
     for one in showing:
-        direction = of.decided.direction(one.item) or "increasing"
-        steps = step_down(of.values[one.item], delays_ms, direction, alpha=of.decided.alpha)
+        direction = answers.decided.direction(one.item) or "increasing"
+        steps = step_down(answers.values[one.item], delays_ms, direction, alpha=answers.decided.alpha)
         found.append(Lowest(one.item, steps, one.members))
     if trends and not showing:
         why = "no statement shows a trend over all delays; that is not evidence that none is noticed"
@@ -86,34 +88,36 @@ def _lowest(
     return tuple(found), ()
 
 
-def _against(of: Asked, delays_ms: list[float]) -> tuple[tuple[Against, ...], tuple[Waiting, ...]]:
+def _against(answers: Asked, delays_ms: list[float]) -> tuple[tuple[Against, ...], tuple[Waiting, ...]]:
     """Compare every delay with the shortest one, by the bound that was decided."""
-    bound = of.decided.equivalence_bound
-    if of.k < 2:
+    bound = answers.decided.equivalence_bound
+    if answers.k < 2:
         return (), (Waiting(EQUIVALENCE, ONE_DELAY),)
     if bound is None:
         why = "the protocol decided no bound of equivalence, and one chosen now would be chosen by the answers"
         return (), (Waiting(EQUIVALENCE, why),)
     found = []
-    for item in of.block.items:
-        of.each(item.short)
-        values = of.values[item.id]
+    for item in answers.block.items:
+        answers.each(item.short)
+        values = answers.values[item.id]
         for place, delay_ms in enumerate(delays_ms[1:], start=1):
             differences = values[:, place] - values[:, 0]
             tested = tost(
                 differences,
                 bound,
-                alpha=of.decided.alpha,
-                seed=of.seed,
-                checks=of.n <= MANY,
-                verdict_only=of.verdicts_only,
+                alpha=answers.decided.alpha,
+                seed=answers.seed,
+                checks=answers.n <= MANY,
+                verdict_only=answers.verdicts_only,
             )
-            if of.planning:
-                tested = replace(tested, n_needed=participants_needed(differences, bound, of.decided.alpha))
+            if answers.planning:
+                tested = replace(tested, n_needed=participants_needed(differences, bound, answers.decided.alpha))
             found.append((item.id, delay_ms, tested))
     adjusted = holm([tested.p_difference for _, _, tested in found])
     return tuple(
-        Against(item, delay_ms, delays_ms[0], tested.judged(p, len(found)), p, len(found), of.decided.direction(item))
+        Against(
+            item, delay_ms, delays_ms[0], tested.judged(p, len(found)), p, len(found), answers.decided.direction(item)
+        )
         for (item, delay_ms, tested), p in zip(found, adjusted, strict=True)
     ), ()
 
@@ -134,9 +138,9 @@ def _up_to(against: tuple[Against, ...]) -> dict[str, float | None]:
     return found
 
 
-def _threshold(of: Asked, delays_ms: list[float]) -> tuple[Threshold | None, tuple[Waiting, ...]]:
-    item = of.decided.noticed
-    if item is None or item not in of.values:
+def _threshold(answers: Asked, delays_ms: list[float]) -> tuple[Threshold | None, tuple[Waiting, ...]]:
+    item = answers.decided.noticed
+    if item is None or item not in answers.values:
         return None, (Waiting(THRESHOLD, "the protocol names no statement that asks for it"),)
-    of.each("detection threshold")
-    return noticed(of.single[item], delays_ms, alpha=of.decided.alpha, seed=of.seed), ()
+    answers.each("detection threshold")
+    return noticed(answers.single[item], delays_ms, alpha=answers.decided.alpha, seed=answers.seed), ()

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Final, TypeAlias
 
-from study_app.analysis.answered import Asked, asked, sealed
+from study_app.analysis.block_tests import Asked, asked, sealed
 from study_app.analysis.conduct import delivered, orders
 from study_app.analysis.delays_found import delays_found
 from study_app.analysis.failures import Ended, Failure, Failures
@@ -80,13 +80,13 @@ def _testing(progress: Progress, share: float, what: str) -> None:
 def _block(
     study: Study, block: Block, seed: int, each: Callable[[str], object], failures: Failures, *, planning: bool
 ) -> BlockFound:
-    of = asked(study, block, seed, each, failures, planning=planning)
-    return found_in(study, of) if block.revealed else sealed(study, of)
+    answers = asked(study, block, seed, each, failures, planning=planning)
+    return found_in(study, answers) if block.revealed else sealed(study, answers)
 
 
-def found_in(study: Study | None, of: Asked) -> BlockFound:
+def found_in(study: Study | None, answers: Asked) -> BlockFound:
     """Test everything that a block's answers can answer, its settings being known; without a study no measures."""
-    return delays_found(study, of) if of.block.kind == "delays" else liquids_found(study, of)
+    return delays_found(study, answers) if answers.block.kind == "delays" else liquids_found(study, answers)
 
 
 def _without_tests(block: Block, failure: Failure) -> BlockFound:
@@ -110,4 +110,6 @@ def _performance(study: Study, progress: Progress) -> Performance | None:
     """Measure motion and force; None while sealed, since a thick liquid is known by its force."""
     if not study.revealed:
         return None
-    return performance(study, lambda done, of: progress(f"reading recordings: {done} of {of}", 0.5 + 0.3 * done / of))
+    return performance(
+        study, lambda done, total: progress(f"reading recordings: {done} of {total}", 0.5 + 0.3 * done / total)
+    )

@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from study_app.analysis.answered import AGAIN, OMNIBUS, OVER_ALL, Asked, asked_again, compared, head, over_all
+from study_app.analysis.block_tests import AGAIN, OMNIBUS, OVER_ALL, Asked, asked_again, compared, head, over_all
 from study_app.analysis.judging import HOLM, in_family, verdict
 from study_app.analysis.results import BlockFound, Named, Pair, Tested, Waiting
 from study_app.analysis.statistics.families import holm
@@ -22,16 +22,16 @@ PAIRS: Final = "comparison of two settings"
 RECOGNITION: Final = "test of recognition"
 
 
-def liquids_found(study: Study | None, of: Asked) -> BlockFound:
+def liquids_found(study: Study | None, answers: Asked) -> BlockFound:
     """Return the tests of a block of liquids whose settings are known."""
-    overall, failed = of.attempt(OVER_ALL, lambda: over_all(of), None)
-    (omnibus, no_omnibus), failed_omnibus = of.attempt(OMNIBUS, lambda: compared(of), ((), ()))
-    (pairs, no_pairs), failed_pairs = of.attempt(PAIRS, lambda: pairs_of(of, omnibus), ((), ()))
-    (recognised, no_names), failed_names = of.attempt(RECOGNITION, lambda: _recognised(of), (None, ()))
-    (mixed, incomplete, not_again), failed_again = of.attempt(
-        AGAIN, lambda: asked_again(of, None, "the settings"), ((), (), ())
+    overall, failed = answers.attempt(OVER_ALL, lambda: over_all(answers), None)
+    (omnibus, no_omnibus), failed_omnibus = answers.attempt(OMNIBUS, lambda: compared(answers), ((), ()))
+    (pairs, no_pairs), failed_pairs = answers.attempt(PAIRS, lambda: pairs_of(answers, omnibus), ((), ()))
+    (recognised, no_names), failed_names = answers.attempt(RECOGNITION, lambda: _recognised(answers), (None, ()))
+    (mixed, incomplete, not_again), failed_again = answers.attempt(
+        AGAIN, lambda: asked_again(answers, None, "the settings"), ((), (), ())
     )
-    told = head(study, of)
+    told = head(study, answers)
     return BlockFound(
         **{name: value for name, value in told.items() if name != "absent"},
         overall=overall,
@@ -48,23 +48,23 @@ def liquids_found(study: Study | None, of: Asked) -> BlockFound:
     )
 
 
-def pairs_of(of: Asked, omnibus: tuple[Tested, ...]) -> tuple[tuple[Pair, ...], tuple[Waiting, ...]]:
+def pairs_of(answers: Asked, omnibus: tuple[Tested, ...]) -> tuple[tuple[Pair, ...], tuple[Waiting, ...]]:
     """Return the comparisons of settings two by two, in the statements that differ at all, and why there are none."""
-    count = math.comb(of.k, 2)
-    if of.k < 3:
+    count = math.comb(answers.k, 2)
+    if answers.k < 3:
         return (), ()
-    corrected = smallest_of_pairs(of.k, of.n)
-    if corrected > of.decided.alpha:
+    corrected = smallest_of_pairs(answers.k, answers.n)
+    if corrected > answers.decided.alpha:
         why = (
-            f"{told(of.n)} cannot show it: the smallest p that {told(of.n, 'pair')} can give is "
-            f"{smallest_of_pairs(2, of.n):.4g}, after Holm's correction over {count} pairs {corrected:.4g}, which is "
-            f"above {of.decided.alpha:g}"
+            f"{told(answers.n)} cannot show it: the smallest p that {told(answers.n, 'pair')} can give is "
+            f"{smallest_of_pairs(2, answers.n):.4g}, after Holm's correction over {count} pairs {corrected:.4g}, which "
+            f"is above {answers.decided.alpha:g}"
         )
         return (), (Waiting(PAIRS, why),)
     differing = [one.item for one in omnibus if one.verdict in ("shown", "suggested")]
     if not differing:
         return (), (Waiting(PAIRS, "no statement shows a difference between the settings"),)
-    return _over_all_pairs(of, differing), ()
+    return _over_all_pairs(answers, differing), ()
 
 
 def smallest_of_pairs(settings: int, participants: int) -> float:
@@ -72,40 +72,40 @@ def smallest_of_pairs(settings: int, participants: int) -> float:
     return min(1.0, math.comb(settings, 2) * 2.0 ** (1 - participants))
 
 
-def _over_all_pairs(of: Asked, items: list[str]) -> tuple[Pair, ...]:
+def _over_all_pairs(answers: Asked, items: list[str]) -> tuple[Pair, ...]:
     """Compare the settings two by two in the statements ``items``, all pairs of all of them in one Holm family.
 
     Where one liquid differs from all others, every statement is opened, and each holds pairs that do not differ.
     """
-    codes = of.block.codes
+    codes = answers.block.codes
     compared = {
         f"{item} {first} {second}": (item, first, second)
         for item in items
-        for first, second in combinations(range(of.k), 2)
+        for first, second in combinations(range(answers.k), 2)
     }
     outcomes: dict[str, Outcome] = {
-        name: paired(of.values[item][:, first], of.values[item][:, second], alpha=of.decided.alpha)
+        name: paired(answers.values[item][:, first], answers.values[item][:, second], alpha=answers.decided.alpha)
         for name, (item, first, second) in compared.items()
     }
-    family = f"{of.block.id}: all pairs of settings"
-    primary = [of.decided.is_primary(item) for item, _, _ in compared.values()]
-    judged = in_family(outcomes, of.decided.alpha, family, holm, HOLM, primary=primary)
+    family = f"{answers.block.id}: all pairs of settings"
+    primary = [answers.decided.is_primary(item) for item, _, _ in compared.values()]
+    judged = in_family(outcomes, answers.decided.alpha, family, holm, HOLM, primary=primary)
     return tuple(
         Pair(codes[first], codes[second], replace(one, item=item))
         for (item, first, second), one in zip(compared.values(), judged, strict=True)
     )
 
 
-def _recognised(of: Asked) -> tuple[Named | None, tuple[Waiting, ...]]:
+def _recognised(answers: Asked) -> tuple[Named | None, tuple[Waiting, ...]]:
     """Test whether settings were named for what they were."""
-    labels = of.decided.names
-    right = tuple(setting.label for setting in of.block.settings)
-    if not of.decided.named_in(of.block) or not any(right):
+    labels = answers.decided.names
+    right = tuple(setting.label for setting in answers.block.settings)
+    if not answers.decided.named_in(answers.block) or not any(right):
         return None, (Waiting(RECOGNITION, "the protocol does not say which statements name these liquids"),)
-    if not 2 <= of.k <= MOST or len(labels) < 2:
+    if not 2 <= answers.k <= MOST or len(labels) < 2:
         return None, (Waiting(RECOGNITION, f"it needs 2 to {MOST} settings and two names"),)
-    ratings = np.stack([of.values[label] for label in labels], axis=2)
+    ratings = np.stack([answers.values[label] for label in labels], axis=2)
     truth = [None if label is None else labels.index(label) for label in right]
-    found = recognition(named(ratings), truth, len(labels), seed=of.intervals)
-    said = verdict(found.p, found.smallest_p, of.decided.alpha, primary=of.decided.binding)
-    return Named(labels, of.block.codes, right, found, said), ()
+    found = recognition(named(ratings), truth, len(labels), seed=answers.intervals)
+    said = verdict(found.p, found.smallest_p, answers.decided.alpha, primary=answers.decided.binding)
+    return Named(labels, answers.block.codes, right, found, said), ()

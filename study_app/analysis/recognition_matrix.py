@@ -69,11 +69,11 @@ def draw(
     return sheet
 
 
-def _column(sheet: Sheet, axes: Axes, counts: Sequence[int], of: Sequence[int], right: Sequence[bool]) -> None:
+def _column(sheet: Sheet, axes: Axes, counts: Sequence[int], totals: Sequence[int], right: Sequence[bool]) -> None:
     rows = len(counts)
     axes.set_xlim(0, 1)
     axes.set_ylim(rows, 0)
-    for row, (count, total, is_right) in enumerate(zip(counts, of, right, strict=True)):
+    for row, (count, total, is_right) in enumerate(zip(counts, totals, right, strict=True)):
         share = count / total if total else 0.0
         axes.add_patch(
             Rectangle(

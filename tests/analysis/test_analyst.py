@@ -13,7 +13,6 @@ import pytest
 
 from study_app.analysis import captions, style
 from study_app.analysis.analyst import Analyst
-from study_app.analysis.answering import carry_out
 from study_app.analysis.export import export
 from study_app.analysis.orders import (
     Answer,
@@ -34,6 +33,7 @@ from study_app.analysis.orders import (
     WriteTables,
 )
 from study_app.analysis.tables import load_study
+from study_app.analysis.worker import carry_out
 from study_app.errors import AnalysisError, StoreError, StudyError
 from study_app.protocol.load import load
 from study_app.store.exclusions import exclusions
@@ -59,7 +59,7 @@ def told(order: Order, stop: Callable[[], bool] = lambda: False) -> list[Answer]
     return answers
 
 
-def of(kind: type, answers: list[Answer]) -> list:
+def of_kind(kind: type, answers: list[Answer]) -> list:
     return [answer for answer in answers if isinstance(answer, kind)]
 
 
@@ -68,7 +68,7 @@ def test_studies_are_found_whatever_else_lies_there(study: Path) -> None:
     (results / "notes").mkdir()
     (results / "readme.txt").write_text("x")
     (results / "empty" / "data").mkdir(parents=True)
-    (found,) = of(StudiesFound, told(FindStudies(results)))
+    (found,) = of_kind(StudiesFound, told(FindStudies(results)))
     assert [(one.folder.name, one.simulated, one.pilot) for one in found.studies] == [
         ("demo", True, False),
         ("empty", False, False),
@@ -77,7 +77,7 @@ def test_studies_are_found_whatever_else_lies_there(study: Path) -> None:
 
 
 def test_no_results_folder_is_no_study_and_an_unreadable_one_says_so(tmp_path: Path) -> None:
-    assert of(StudiesFound, told(FindStudies(tmp_path / "none")))[0].studies == ()
+    assert of_kind(StudiesFound, told(FindStudies(tmp_path / "none")))[0].studies == ()
     (tmp_path / "file").write_text("x")
     with pytest.raises(StoreError, match="file"):
         told(FindStudies(tmp_path / "file"))
@@ -85,12 +85,12 @@ def test_no_results_folder_is_no_study_and_an_unreadable_one_says_so(tmp_path: P
 
 def test_while_sealed_nothing_is_told_but_codes_and_nothing_is_tested(study: Path) -> None:
     answers = told(ReadStudy(study))
-    (sessions,), (found,) = of(SessionsFound, answers), of(StudyFound, answers)
+    (sessions,), (found,) = of_kind(SessionsFound, answers), of_kind(StudyFound, answers)
     assert [row["participant"] for row in sessions.rows] == ["P001", "P002", "P003"]
     assert (sessions.reveal, found.revealed, found.n) == (None, False, 3)
-    figures = of(FigureDrawn, answers)
+    figures = of_kind(FigureDrawn, answers)
     assert [figure.name for figure in figures] == ["liquids", "delays"]
-    assert not [one for one in of(Progress, answers) if one.what.startswith("testing")]
+    assert not [one for one in of_kind(Progress, answers) if one.what.startswith("testing")]
     said = b" ".join([*(figure.svg for figure in figures), repr((sessions, found)).encode()]).lower()
     assert b">l1<" in said
     assert b">d1<" in said
@@ -101,37 +101,40 @@ def test_while_sealed_nothing_is_told_but_codes_and_nothing_is_tested(study: Pat
 def test_once_open_names_are_told_and_what_tests_add_is_drawn_again(study: Path) -> None:
     told(OpenKey(study, "AK", "done"))
     answers = told(ReadStudy(study))
-    (sessions,), (found,) = of(SessionsFound, answers), of(StudyFound, answers)
+    (sessions,), (found,) = of_kind(SessionsFound, answers), of_kind(StudyFound, answers)
     assert sessions.reveal is not None
     assert (sessions.reveal["by"], found.revealed) == ("AK", True)
-    names = [figure.name for figure in of(FigureDrawn, answers)]
+    names = [figure.name for figure in of_kind(FigureDrawn, answers)]
     assert names[:2] == ["liquids", "delays"]
     assert sorted(set(names[2:])) == sorted({"liquids", "delays", *names[2:]})
-    shares = [one.share for one in of(Progress, answers) if one.what.startswith("testing")]
+    shares = [one.share for one in of_kind(Progress, answers) if one.what.startswith("testing")]
     assert shares == sorted(shares)
     assert shares
     block = load_study(study).blocks[0]
-    assert next(one.title for one in of(FigureDrawn, answers)) == captions.title(block)
+    assert next(one.title for one in of_kind(FigureDrawn, answers)) == captions.title(block)
 
 
 def test_every_print_colour_that_is_told_is_in_the_figures_or_the_style(study: Path) -> None:
     answers = told(ReadStudy(study))
-    (found,) = of(StudyFound, answers)
-    drawn = b"".join(figure.svg for figure in of(FigureDrawn, answers)).decode().lower()
+    (found,) = of_kind(StudyFound, answers)
+    drawn = b"".join(figure.svg for figure in of_kind(FigureDrawn, answers)).decode().lower()
     for role in ("text", "text2", "grid", "accent", "band"):
         assert found.colours[role].lower() in drawn, role
     assert found.colours["band"] == style.BAND
 
 
 def test_trials_can_be_named_for_leaving_out_and_then_do_not_count(study: Path) -> None:
-    (found,) = of(StudyFound, told(ReadStudy(study)))
+    (found,) = of_kind(StudyFound, told(ReadStudy(study)))
     number, words = found.trials["P001", 1][0]
     assert words.split(", ")[-1][:1] in "LD"
     told(LeaveOut(study, "P001", 1, number, "AK", "phone rang"))
     told(LeaveOut(study, "P002", 1, None, "AK", "asleep"))
     answers = told(ReadStudy(study))
-    assert [one.what for one in of(SessionsFound, answers)[0].exclusions] == [("P001", 1, number), ("P002", 1, None)]
-    assert of(StudyFound, answers)[0].n == 2
+    assert [one.what for one in of_kind(SessionsFound, answers)[0].exclusions] == [
+        ("P001", 1, number),
+        ("P002", 1, None),
+    ]
+    assert of_kind(StudyFound, answers)[0].n == 2
 
 
 def test_what_the_store_refuses_changes_nothing(study: Path) -> None:
@@ -146,7 +149,7 @@ def test_what_the_store_refuses_changes_nothing(study: Path) -> None:
 def test_a_study_without_a_whole_session_says_so_in_place_of_figures(study: Path) -> None:
     for one in ("P001", "P002", "P003"):
         told(LeaveOut(study, one, 1, None, "AK", "asleep"))
-    drawn = of(FigureDrawn, told(ReadStudy(study)))
+    drawn = of_kind(FigureDrawn, told(ReadStudy(study)))
     assert [(one.svg, one.caption) for one in drawn] == [(b"", "No completed session has answers here yet.")] * 2
 
 
@@ -156,11 +159,11 @@ def test_sessions_are_told_even_where_the_study_cannot_be_read(study: Path) -> N
     answers: list[Answer] = []
     with pytest.raises(AnalysisError, match="P002"):
         carry_out(ReadStudy(study), answers.append, lambda: False)
-    assert len(of(SessionsFound, answers)[0].rows) == 3
+    assert len(of_kind(SessionsFound, answers)[0].rows) == 3
 
 
 def test_tables_are_those_of_the_command(study: Path, tmp_path: Path) -> None:
-    (done,) = of(Done, told(WriteTables(study, tmp_path / "window", ("wide",))))
+    (done,) = of_kind(Done, told(WriteTables(study, tmp_path / "window", ("wide",))))
     by_command = export(study, tmp_path / "command", extras=["wide"])
     assert [path.name for path in done.files] == [path.name for path in by_command]
     assert [path.read_bytes() for path in done.files] == [path.read_bytes() for path in by_command]

@@ -13,7 +13,7 @@ import pytest
 from scipy.stats import binom
 
 from study_app.analysis import results
-from study_app.analysis.answered import of_tables
+from study_app.analysis.block_tests import of_tables
 from study_app.analysis.conduct import delivered, orders
 from study_app.analysis.decided import Decided
 from study_app.analysis.evaluate import evaluate

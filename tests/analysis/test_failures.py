@@ -17,12 +17,12 @@ from tests.analysis.conftest import Results, make_results, twelve
 
 TESTS = {
     "tables.Study.aggregate": ("liquids", "measures of settings"),
-    "answered.presented": ("delays", "counts of answers"),
-    "answered.session_numbers": ("delays", "numbers of sessions"),
-    "answered.friedman": ("liquids", "test of settings"),
-    "answered.global_permutation": ("liquids", "test over all statements"),
+    "block_tests.presented": ("delays", "counts of answers"),
+    "block_tests.session_numbers": ("delays", "numbers of sessions"),
+    "block_tests.friedman": ("liquids", "test of settings"),
+    "block_tests.global_permutation": ("liquids", "test over all statements"),
     "liquids_found.recognition": ("liquids", "test of recognition"),
-    "answered.ordinal": ("liquids", "the same asked with other assumptions"),
+    "block_tests.ordinal": ("liquids", "the same asked with other assumptions"),
     "delays_found.page": ("delays", "test of a trend (Page)"),
     "delays_found.step_down": ("delays", "lowest delay that shows"),
     "delays_found.tost": ("delays", "test of equivalence"),

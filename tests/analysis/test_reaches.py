@@ -79,7 +79,7 @@ def test_reaches_are_those_that_the_session_decided_and_absent_recordings_are_to
     lines = [json.loads(text) for text in session.journal.read_text().splitlines()]
     study = load_study(folder)
     told: list[tuple[int, int]] = []
-    measured = performance(study, lambda done, of: told.append((done, of)))
+    measured = performance(study, lambda done, total: told.append((done, total)))
     assert (measured.trials, measured.recorded, measured.unread) == (7, 7, ())
     assert told == [(done, 7) for done in range(7)]
     for trial in measured.reached:

@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from study_app.analysis.answered import of_tables
+from study_app.analysis.block_tests import of_tables
 from study_app.analysis.evaluate import found_in
 from study_app.analysis.power.planned import plan
 from study_app.analysis.statistics.threshold import noticed
-from study_app.analysis.validation import running, single, studies
-from study_app.analysis.validation.counting import CLAIMED, LOST, Cell, count, truth
-from study_app.analysis.validation.listed import markdown, table
+from study_app.analysis.validation import running, single_test_rates, studies
+from study_app.analysis.validation.rate_tables import markdown, table
 from study_app.analysis.validation.rates import Limit, Rate
 from study_app.analysis.validation.running import validate
 from study_app.analysis.validation.studies import (
@@ -28,6 +27,7 @@ from study_app.analysis.validation.studies import (
     answers,
     simulated,
 )
+from study_app.analysis.validation.study_rates import CLAIMED, LOST, Cell, count, truth
 from study_app.cli import commands
 from study_app.protocol.answers import Felt
 from study_app.protocol.load import load
@@ -49,7 +49,7 @@ def rek() -> Simulated:
 
 
 @pytest.mark.parametrize(
-    ("limit", "hits", "of", "holds"),
+    ("limit", "hits", "studies", "holds"),
     [
         ("at most 5 %", 50, 1000, "yes"),
         ("at most 5 %", 62, 1000, "too few studies"),
@@ -66,8 +66,8 @@ def rek() -> Simulated:
         ("counted", 10, 10, "counted"),
     ],
 )
-def test_a_rate_holds_as_far_as_its_interval_tells(limit: Limit, hits: int, of: int, holds: str) -> None:
-    assert Rate("cell", 5, "what", limit, hits, of).holds == holds
+def test_a_rate_holds_as_far_as_its_interval_tells(limit: Limit, hits: int, studies: int, holds: str) -> None:
+    assert Rate("cell", 5, "what", limit, hits, studies).holds == holds
 
 
 @pytest.mark.parametrize("generator", GENERATORS)
@@ -120,7 +120,7 @@ def test_every_kind_of_study_is_counted(rek: Simulated, generator: Generator, mo
     monkeypatch.setattr(studies, "TRUTH", 200)
     cells = [Cell(generator, extent, 5) for extent in EXTENTS]
     rates = [rate for cell in cells for rate in count(rek, cell, truth(rek, cell), 1, 0, 2)]
-    assert {rate.of for rate in rates} == {2}
+    assert {rate.studies for rate in rates} == {2}
     assert {rate.cell for rate in rates} == {f"{generator}, {extent}" for extent in EXTENTS}
     assert [rate.hits for rate in rates if rate.what == LOST[0]] == [0, 0, 0]
     assert sum(rate.what == CLAIMED for rate in rates) == 2
@@ -136,7 +136,7 @@ def test_two_studies_in_one_process_have_truths_of_their_own(rek: Simulated, mon
     decided = replace(rek.decided, rising=rek.decided.falling, falling=rek.decided.rising)
     turned = replace(rek, plan=replace(rek.plan, decided=decided))
     cell = Cell("ordinal probit", "full", 5)
-    first, second = (truth(of, cell) for of in (rek, turned))
+    first, second = (truth(one, cell) for one in (rek, turned))
     place = [block.kind for block in rek.blocks].index("delays")
     clear = np.abs(first[place]) > 1
     assert clear.any()
@@ -167,20 +167,27 @@ def test_the_command_tells_rates_that_are_undecided_from_rates_that_hold(
 
 
 def test_single_tests_are_counted() -> None:
-    (leaning,) = single.count(("one in five differs by 5 points, the others by 0", 24), 1, 0, 4)
-    assert (leaning.of, leaning.limit) == (4, "at most 5 %")
-    printed, covered = single.count(("one threshold for all", 12), 1, 0, 4)
-    assert (printed.what, printed.hits, printed.of, printed.limit) == (single.PRINTED, 4, 4, "at least 93 %")
+    (leaning,) = single_test_rates.count(("one in five differs by 5 points, the others by 0", 24), 1, 0, 4)
+    assert (leaning.studies, leaning.limit) == (4, "at most 5 %")
+    printed, covered = single_test_rates.count(("one threshold for all", 12), 1, 0, 4)
+    assert (printed.what, printed.hits, printed.studies, printed.limit) == (
+        single_test_rates.PRINTED,
+        4,
+        4,
+        "at least 93 %",
+    )
     assert covered.hits >= 2
 
 
 def test_an_interval_that_is_not_printed_covers_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(single, "noticed", lambda *_args, **_named: noticed([[np.nan] * 7], single.LEVELS_MS))
-    printed, covered = single.count(("one threshold for all", 12), 1, 0, 4)
-    assert (printed.hits, printed.of) == (0, 4)
-    assert (covered.hits, covered.of) == (0, 0)
+    monkeypatch.setattr(
+        single_test_rates, "noticed", lambda *_args, **_named: noticed([[np.nan] * 7], single_test_rates.LEVELS_MS)
+    )
+    printed, covered = single_test_rates.count(("one threshold for all", 12), 1, 0, 4)
+    assert (printed.hits, printed.studies) == (0, 4)
+    assert (covered.hits, covered.studies) == (0, 0)
     assert covered.holds == "too few studies"
-    assert replace(printed, of=100).holds == "no"
+    assert replace(printed, studies=100).holds == "no"
 
 
 @pytest.fixture
@@ -209,7 +216,7 @@ def test_cells_with_an_undecided_rate_are_continued_with_other_studies(
     *_, (done, rates) = validate(rek, 290, jobs=1, progress=told.append)
     assert continued["clear"] == [(batch, 25) for batch in range(11)] + [(11, 15)]
     assert [batch for batch, _ in continued["unclear"]] == list(range(24))  # 24 of 290 are undecided, of 580 4.1 % hold
-    assert [(rate.hits, rate.of, rate.holds) for rate in rates] == [(0, 290, "yes"), (24, 580, "yes")]
+    assert [(rate.hits, rate.studies, rate.holds) for rate in rates] == [(0, 290, "yes"), (24, 580, "yes")]
     assert done == 3 * 290
     assert told == ["continued: unclear, n = 5: what: 24 of 290, 8.3 % (5.6 to 12.0), at most 5 %: too few studies"]
 
@@ -219,7 +226,7 @@ def test_a_cell_is_continued_until_it_is_beyond_or_has_four_times_the_studies(
 ) -> None:
     told: list[str] = []
     *_, (done, rates) = validate(rek, 10, jobs=1, progress=told.append)
-    assert [(rate.hits, rate.of, rate.holds) for rate in rates] == [(0, 40, "too few studies"), (6, 30, "no")]
+    assert [(rate.hits, rate.studies, rate.holds) for rate in rates] == [(0, 40, "too few studies"), (6, 30, "no")]
     assert continued == {"clear": [(batch, 10) for batch in range(4)], "unclear": [(batch, 10) for batch in range(3)]}
     assert done == 70
     assert len(told) == 5

@@ -22,26 +22,26 @@ def moved(person: int, _session: int, code: str, _item: str) -> int:
     return min(7, 1 + person % 3 + 2 * (int(code[1:]) - 1))
 
 
-def of(people: int, *, changed: bool = False, alpha: float = 0.05, levels: tuple[float, ...] = LEVELS) -> Study:
+def study_of(people: int, *, changed: bool = False, alpha: float = 0.05, levels: tuple[float, ...] = LEVELS) -> Study:
     settings = delays(levels)
     decided = replace(DECIDED, changed=changed, alpha=alpha)
     return study(settings, list(everybody(settings, people, moved)), decided)
 
 
 def test_decisions_that_changed_are_told_as_that_and_not_as_none() -> None:
-    made = of(8, changed=True)
+    made = study_of(8, changed=True)
     told = methods(made, evaluate(made, planning=False))
     assert "The decisions about the analysis changed between sessions" in told
     assert "decided before the first session" not in told.lower()
     assert "Nothing was decided beforehand" not in told
-    kept = of(8)
+    kept = study_of(8)
     told = methods(kept, evaluate(kept, planning=False))
     assert "a bound of ±1 point, decided before the first session, and 90 % intervals" in told
 
 
 @pytest.mark.parametrize(("alpha", "level"), [(0.05, "90 %"), (0.0005, "99.9 %"), (0.025, "95 %")])
 def test_alpha_is_told_whole(alpha: float, level: str) -> None:
-    made = of(8, alpha=alpha)
+    made = study_of(8, alpha=alpha)
     results = evaluate(made, planning=False)
     assert f"alpha = {alpha:g}, " in methods(made, results)
     page = " ".join(block(results.blocks[0], results, ()))
@@ -51,14 +51,14 @@ def test_alpha_is_told_whole(alpha: float, level: str) -> None:
 
 
 def test_pooled_versions_of_a_protocol_are_named() -> None:
-    made = of(4)
+    made = study_of(4)
     people = made.participants.assign(protocol_version=["1", "1", "2", "2"])
     both = replace(made, participants=people)
     assert "versions 1 and 2, pooled" in methods(both, evaluate(both, planning=False))
 
 
 def test_a_difference_that_could_not_be_shown_has_no_p() -> None:
-    few = of(4)
+    few = study_of(4)
     results = evaluate(few, planning=False)
     (found,) = results.blocks
     assert {one.verdict for one in found.against} == {"out of reach"}
@@ -66,7 +66,7 @@ def test_a_difference_that_could_not_be_shown_has_no_p() -> None:
 
 
 def test_the_verdict_of_unanimity_holds_after_the_correction() -> None:
-    made = of(12)
+    made = study_of(12)
     (found,) = evaluate(made, planning=False).blocks
     assert {one.verdict for one in found.against if one.delay_ms > 0} == {"different"}
     assert all(one.found.interval is None for one in found.against)

@@ -29,7 +29,7 @@ WALL_CLOCK = ("answered_at", "trial_started_at", "session_started_at", "session_
 
 
 def made_up(name: str = "rek2024") -> Feelings:
-    """What every condition of a study feels like, told apart by force and delay alone."""
+    """What every condition of a study feels like: conditions differ in force and delay alone."""
     study = load(name)
     return {
         (block.id, condition): (

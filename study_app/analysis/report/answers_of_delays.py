@@ -102,8 +102,8 @@ def _change(found: BlockFound, item: str, delay_ms: float) -> str:
 
 
 def _difference(one: Against) -> str:
-    effect, of = one.found.effect or 0.0, one.found.interval
-    return f"{'+' if effect > 0 else ''}{number(effect)} {'(no interval)' if of is None else interval(of)} points"
+    effect, ends = one.found.effect or 0.0, one.found.interval
+    return f"{'+' if effect > 0 else ''}{number(effect)} {'(no interval)' if ends is None else interval(ends)} points"
 
 
 def _level(against: Sequence[Against]) -> str:

@@ -102,8 +102,8 @@ def _hits(found: BlockFound, named: Named) -> str:
     return f"Named right (95 % intervals): {'; '.join(told)}."
 
 
-def _share(of: Interval | None) -> str:
-    return "" if of is None else f" ({100 * of.low:.0f} to {100 * of.high:.0f} %)"
+def _share(ends: Interval | None) -> str:
+    return "" if ends is None else f" ({100 * ends.low:.0f} to {100 * ends.high:.0f} %)"
 
 
 def _compared(found: BlockFound) -> dict[tuple[str, str], list[Tested]]:
@@ -194,10 +194,10 @@ def _points(difference: float) -> str:
 
 def _either(outcome: Paired) -> str:
     """Return the interval of an effect in the direction of its sign."""
-    of = outcome.interval
-    if of is None or (outcome.effect or 0.0) > 0:
-        return interval(of)
-    return interval(Interval(-of.high, -of.low, of.level, of.method))
+    ends = outcome.interval
+    if ends is None or (outcome.effect or 0.0) > 0:
+        return interval(ends)
+    return interval(Interval(-ends.high, -ends.low, ends.level, ends.method))
 
 
 def _first_upper(words: str) -> str:

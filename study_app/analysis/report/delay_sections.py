@@ -81,9 +81,9 @@ def against(found: BlockFound) -> Iterator[str]:
     yield paragraph(" ".join(_about_against(found.against)), "soft")
 
 
-def _without_normality(of: Equivalence) -> float | None:
+def _without_normality(tested: Equivalence) -> float | None:
     """Return the largest p of the tests for equivalence that do not ask for normality."""
-    return max((p for p in (of.p_permutation, of.p_ranks, of.p_bootstrap) if p is not None), default=None)
+    return max((p for p in (tested.p_permutation, tested.p_ranks, tested.p_bootstrap) if p is not None), default=None)
 
 
 def _p_different(one: Against) -> str:

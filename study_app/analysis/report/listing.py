@@ -234,7 +234,7 @@ def files(study: Study) -> dict[str, str]:
     place = StudyFolder(study.folder)
     found = [place.exclusions, place.key, place.reveals]
     for session in place.sessions():
-        tables = [session.table(study.name, of) for of in ("responses", "trials")]
+        tables = [session.table(study.name, name) for name in ("responses", "trials")]
         found += [session.receipt, session.journal, session.checksums, *tables]
     return {_within(study, path): sha256(path) for path in found if path.is_file()}
 

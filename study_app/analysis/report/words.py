@@ -59,9 +59,9 @@ def p_equals(p: float) -> str:
     return f"p {told}" if told.startswith("<") else f"p = {told}"
 
 
-def interval(of: Interval | None, digits: int = 2) -> str:
+def interval(ends: Interval | None, digits: int = 2) -> str:
     """Return an interval in brackets; a dash where there is none."""
-    return "–" if of is None else f"[{number(of.low, digits)}, {number(of.high, digits)}]"
+    return "–" if ends is None else f"[{number(ends.low, digits)}, {number(ends.high, digits)}]"
 
 
 def percent(share: float) -> str:
@@ -69,12 +69,12 @@ def percent(share: float) -> str:
     return f"{round(100 * share, 6):g} %"
 
 
-def beyond(of: Equivalence) -> str:
+def beyond(tested: Equivalence) -> str:
     """Return how many participants differ by more than the bound, and the interval of their share."""
-    if of.beyond is None:
+    if tested.beyond is None:
         return "–"
-    ends = of.beyond.interval
-    return f"{of.beyond.count} of {of.beyond.n} [{100 * ends.low:.0f}, {100 * ends.high:.0f}] %"
+    ends = tested.beyond.interval
+    return f"{tested.beyond.count} of {tested.beyond.n} [{100 * ends.low:.0f}, {100 * ends.high:.0f}] %"
 
 
 def listed(words: Sequence[str]) -> str:

@@ -81,7 +81,7 @@ def doubled_ranks(values: Array) -> Whole:
     if not values.size:
         return np.zeros(values.shape, dtype=np.int64)
     if values.shape[0] * values.shape[1] ** 2 <= COMPARED:
-        below, equal = (of(values[:, None], values[:, :, None]).sum(axis=2) for of in (np.less, np.equal))
+        below, equal = (compare(values[:, None], values[:, :, None]).sum(axis=2) for compare in (np.less, np.equal))
         return np.asarray(2 * below + equal + 1)
     ranks: Whole = np.rint(2 * rankdata(values, axis=1)).astype(np.int64)
     return ranks

@@ -75,7 +75,7 @@ def ordinal(
         NaN where an answer is missing; the others of that participant are used.
     sessions : array of the shape of ``values``, optional
         In which session each answer was given: a factor beside the settings, which is not tested. It is left out where
-        all answers are of one, or where sessions cannot be told apart from settings.
+        all answers are of one, or where the effects of sessions and settings cannot be separated.
     columns : (settings, columns) array, optional
         What is tested: 0 and 1 for factors, numbers for amounts (a delay in units of 100 ms). Without, every setting is
         compared with the first.

@@ -73,6 +73,6 @@ def _rearranged(yes: Array, asked: Array, seed: int, alpha: float) -> Array:
     rng = np.random.default_rng(seed)
     draws = draws_for(alpha, min(DRAWS, CELLS // max(1, int(asked.sum()))))
     drawn = np.zeros((draws, asked.shape[1]))
-    for said, of in zip(yes.astype(np.int64), asked.astype(np.int64), strict=True):
-        drawn += rng.multivariate_hypergeometric(of, int(said.sum()), size=draws, method="marginals")
+    for said, presented in zip(yes.astype(np.int64), asked.astype(np.int64), strict=True):
+        drawn += rng.multivariate_hypergeometric(presented, int(said.sum()), size=draws, method="marginals")
     return drawn

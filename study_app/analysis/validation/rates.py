@@ -34,29 +34,29 @@ class Rate:
     what: str
     limit: Limit
     hits: int
-    of: int
+    studies: int
 
     def __add__(self, other: Rate) -> Rate:
         """Return the rate of both counts together, of the same thing in the same cell."""
-        return replace(self, hits=self.hits + other.hits, of=self.of + other.of)
+        return replace(self, hits=self.hits + other.hits, studies=self.studies + other.studies)
 
     def __str__(self) -> str:
         """Return the rate in one line."""
         low, high = (100 * end for end in self.interval)
         return (
-            f"{self.cell}, n = {self.participants}: {self.what}: {self.hits} of {self.of}, "
+            f"{self.cell}, n = {self.participants}: {self.what}: {self.hits} of {self.studies}, "
             f"{100 * self.share:.1f} % ({low:.1f} to {high:.1f}), {self.limit}: {self.holds}"
         )
 
     @property
     def share(self) -> float:
         """The share of studies."""
-        return self.hits / self.of if self.of else 0.0
+        return self.hits / self.studies if self.studies else 0.0
 
     @property
     def interval(self) -> tuple[float, float]:
         """Wilson's 95 % interval of the share."""
-        return interval(self.share, self.of) if self.of else (0.0, 1.0)
+        return interval(self.share, self.studies) if self.studies else (0.0, 1.0)
 
     @property
     def holds(self) -> Verdict:
@@ -69,10 +69,10 @@ class Rate:
             return "counted"
         if self.limit == "none":
             return "no" if self.hits else "yes"
-        if not self.of:
+        if not self.studies:
             return "too few studies"
         lowest, highest, least, most = ALLOWED[self.limit]
-        low, high = binomtest(self.hits, self.of).proportion_ci(SURE, method="wilson")
+        low, high = binomtest(self.hits, self.studies).proportion_ci(SURE, method="wilson")
         if high < lowest or low > highest:
             return "no"
         low, high = self.interval

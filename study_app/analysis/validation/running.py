@@ -9,10 +9,10 @@ from typing import Final, TypeAlias
 
 from joblib import Parallel, delayed
 
-from study_app.analysis.validation import counting, single
-from study_app.analysis.validation.counting import BATCH, Cell
+from study_app.analysis.validation import single_test_rates, study_rates
 from study_app.analysis.validation.rates import Rate
 from study_app.analysis.validation.studies import EXTENTS, GENERATORS, Simulated
+from study_app.analysis.validation.study_rates import BATCH, Cell
 
 SIZES: Final = (5, 12, 24)
 
@@ -32,7 +32,7 @@ def cells(sizes: Sequence[int] = SIZES) -> tuple[Cell, ...]:
 
 
 def validate(
-    simulated: Simulated,
+    simulation: Simulated,
     studies: int,
     seed: int = 1,
     *,
@@ -54,7 +54,7 @@ def validate(
     progress : callable
         Is called with a line for each cell that is continued.
     """
-    counts = _counts(simulated, sizes)
+    counts = _counts(simulation, sizes)
     done, total = 0, dict[tuple[str, int, str], Rate]()
     for finished in range(ROUNDS):
         with ExitStack() as running:
@@ -65,7 +65,7 @@ def validate(
             )
             running.callback(results.close)
             for rates in results:
-                done += rates[0].of
+                done += rates[0].studies
                 for rate in rates:
                     key = (rate.cell, rate.participants, rate.what)
                     total[key] = total[key] + rate if key in total else rate
@@ -79,19 +79,19 @@ def validate(
                 progress(f"continued: {rate}")
 
 
-def _counts(simulated: Simulated, sizes: Sequence[int]) -> Mapping[Key, Count]:
+def _counts(simulation: Simulated, sizes: Sequence[int]) -> Mapping[Key, Count]:
     """Return how the rates of every cell are counted."""
     every = cells(sizes)
     kinds = {(cell.generator, cell.extent): cell for cell in every}
-    truths = {kind: counting.truth(simulated, cell) for kind, cell in kinds.items()}
+    truths = {kind: study_rates.truth(simulation, cell) for kind, cell in kinds.items()}
     return {
         **{
             (cell.name, cell.participants): partial(
-                counting.count, simulated, cell, truths[cell.generator, cell.extent]
+                study_rates.count, simulation, cell, truths[cell.generator, cell.extent]
             )
             for cell in every
         },
-        **{case: partial(single.count, case) for case in single.cases()},
+        **{case: partial(single_test_rates.count, case) for case in single_test_rates.cases()},
     }
 
 

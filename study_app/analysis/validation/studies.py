@@ -78,15 +78,15 @@ def alike(block: Block, extent: Extent) -> Mapping[int, int]:
 
 
 def answers(
-    of: Simulated, generator: Generator, extent: Extent, participants: int, seed: int, study: int
+    simulation: Simulated, generator: Generator, extent: Extent, participants: int, seed: int, study: int
 ) -> tuple[Array, ...]:
     """Return the answers (participants, settings, items) of one simulated study, block by block."""
     if generator == "answer model":
-        thought = people(of.plan, participants, seed, study)
-        return tuple(_opined(block, one, extent) for block, one in zip(of.blocks, thought, strict=True))
+        thought = people(simulation.plan, participants, seed, study)
+        return tuple(_opined(block, one, extent) for block, one in zip(simulation.blocks, thought, strict=True))
     rng = np.random.default_rng([seed, study])
     leaning, slope = LEANING * rng.normal(size=participants), 1 + SLOPE * rng.normal(size=participants)
-    return tuple(_probit(of, block, extent, leaning, slope, rng) for block in of.blocks)
+    return tuple(_probit(simulation, block, extent, leaning, slope, rng) for block in simulation.blocks)
 
 
 def _opined(block: Block, opinions: Opinions, extent: Extent) -> Array:
@@ -100,33 +100,36 @@ def _opined(block: Block, opinions: Opinions, extent: Extent) -> Array:
 
 
 def _probit(
-    of: Simulated, block: Block, extent: Extent, leaning: Array, slope: Array, rng: np.random.Generator
+    simulation: Simulated, block: Block, extent: Extent, leaning: Array, slope: Array, rng: np.random.Generator
 ) -> Array:
-    effects = _effects(of, block)
+    effects = _effects(simulation, block)
     for place, other in alike(block, extent).items():
         effects[place] = effects[other]
     latent = leaning[:, None, None] + slope[:, None, None] * effects + rng.normal(size=(len(leaning), *effects.shape))
     return np.add(np.searchsorted(LEVELS, latent), 1, dtype=np.float64)
 
 
-def _effects(of: Simulated, block: Block) -> Array:
+def _effects(simulation: Simulated, block: Block) -> Array:
     """Return the latent effect of each setting on each item (settings, items)."""
     k, items = len(block.settings), len(block.items)
     if block.kind == "delays":
-        signs = [{"increasing": 1.0, "decreasing": -1.0, None: 0.0}[of.decided.direction(it.id)] for it in block.items]
+        signs = [
+            {"increasing": 1.0, "decreasing": -1.0, None: 0.0}[simulation.decided.direction(it.id)]
+            for it in block.items
+        ]
         return np.outer(np.linspace(-1.0, 1.0, k), signs)
     found = np.outer(np.resize([0.0, 1.5, -0.8], k), np.resize([1.0, -1.0], items))
     for place, setting in enumerate(block.settings):
         for column, item in enumerate(block.items):
-            if item.id in of.decided.names:
+            if item.id in simulation.decided.names:
                 found[place, column] = 1.0 if setting.label == item.id else -1.0
     return np.asarray(found)
 
 
-def true_differences(of: Simulated, generator: Generator, extent: Extent) -> tuple[Array, ...]:
+def true_differences(simulation: Simulated, generator: Generator, extent: Extent) -> tuple[Array, ...]:
     """Return the true differences of mean answers to the first setting (settings, items), block by block."""
     found = []
-    for block, given in zip(of.blocks, answers(of, generator, extent, TRUTH, 0, 0), strict=True):
+    for block, given in zip(simulation.blocks, answers(simulation, generator, extent, TRUTH, 0, 0), strict=True):
         means = given.mean(axis=0)
         for place, other in alike(block, extent).items():
             means[place] = means[other]

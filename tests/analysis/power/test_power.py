@@ -39,7 +39,7 @@ SIZES = (5, 9)
 
 
 def felt_in(protocol: Any) -> dict[tuple[str, str], tuple[Felt, ...]]:
-    """Liquids that are told apart by their force, delays by what was seen."""
+    """Liquids that differ in force, delays that differ in what was seen."""
     return {
         (block.id, condition): (
             Felt(0.3 + 0.6 * number, 4.0, 0.1, 0.01, 0.03, 0.006 + protocol.delay_s(condition)),
@@ -55,8 +55,8 @@ def planned(name: str = "rek2024") -> Plan:
     return plan(protocol, felt_in(protocol))
 
 
-def swept(of: Plan, studies: int = 30, **how: Any) -> tuple[int, Counts]:
-    *_, last = sweep(of, SIZES, studies, 1, **{"jobs": 1, **how})
+def swept(study: Plan, studies: int = 30, **how: Any) -> tuple[int, Counts]:
+    *_, last = sweep(study, SIZES, studies, 1, **{"jobs": 1, **how})
     return last
 
 
@@ -75,8 +75,8 @@ def found(counted: tuple[int, Counts]) -> Powers:
     return powers(planned(), SIZES, studies, studies, 1, counts)
 
 
-def curves(of: Powers, question: str, item: str | None = None) -> dict[str | None, Curve]:
-    return {one.setting: one for one in of.curves if (one.question, one.item) == (question, item)}
+def curves(found: Powers, question: str, item: str | None = None) -> dict[str | None, Curve]:
+    return {one.setting: one for one in found.curves if (one.question, one.item) == (question, item)}
 
 
 @pytest.mark.parametrize("how", [{"jobs": 2}, {"jobs": 2, "by": "threads"}], ids=["processes", "threads"])
@@ -99,8 +99,8 @@ def test_a_size_is_answered_alike_whichever_others_are_asked_for(counted: tuple[
 
 
 def test_the_first_studies_of_many_are_those_of_few() -> None:
-    of = planned()
-    few, many = (people(of, size, 1, 3) for size in SIZES)
+    study_plan = planned()
+    few, many = (people(study_plan, size, 1, 3) for size in SIZES)
     for one, other in zip(few, many, strict=True):
         assert np.array_equal(one.thought, other.thought[:5])
         assert np.array_equal(one.beside, other.beside[:5])
@@ -124,27 +124,27 @@ def test_power_grows_with_participants_and_effects_and_is_alpha_without_any(coun
 
 def test_the_answers_are_those_of_the_answer_model() -> None:
     """Without spread over draws, the mean answer over many people is the model's opinion, rounded now and then."""
-    of = planned()
-    answers = people(of, 400, 1, 0)[1].answers(1.0)
+    study_plan = planned()
+    answers = people(study_plan, 400, 1, 0)[1].answers(1.0)
     assert set(np.unique(answers)) <= set(range(1, 8))
-    different = answers[:, :, [item.id for item in of.blocks[1].items].index("different")]
+    different = answers[:, :, [item.id for item in study_plan.blocks[1].items].index("different")]
     assert different[:, 0].mean() == pytest.approx(1.9, abs=0.2)
     assert different[:, -1].mean() == pytest.approx(6.1, abs=0.2)
-    none = people(of, 400, 1, 0)[1].answers(0.0).mean(axis=0)
+    none = people(study_plan, 400, 1, 0)[1].answers(0.0).mean(axis=0)
     assert np.ptp(none, axis=0).max() < 0.25
     assert (np.diff(different.mean(axis=0)) > -0.1).all()
 
 
 def test_the_lowest_delay_is_the_step_downs_of_the_report() -> None:
     """Of studies whose trend is shown, as often as the report's own function, by exact p."""
-    of = planned()
-    delays = of.blocks[1]
+    study_plan = planned()
+    delays = study_plan.blocks[1]
     assert delays.delays_ms is not None
-    counts = count(of, (9,), 1, 0, BATCH)
+    counts = count(study_plan, (9,), 1, 0, BATCH)
     place = [item.id for item in delays.items].index("harder")
     lowest = []
     for study in range(BATCH):
-        found = step_down(people(of, 9, 1, study)[1].answers(1.0)[:, :, place], delays.delays_ms).lowest_ms
+        found = step_down(people(study_plan, 9, 1, study)[1].answers(1.0)[:, :, place], delays.delays_ms).lowest_ms
         lowest.append(np.inf if found is None else found)
     expected = [sum(one <= delay for one in lowest) for delay in delays.delays_ms]
     assert np.abs(counts["delays", "lowest"][0, place, 1:] - expected[1:]).max() <= 2  # p at the edge is drawn
@@ -204,13 +204,13 @@ def test_what_was_ended_early_says_so(counted: tuple[int, Counts]) -> None:
     assert power_csv(found).count(b",30,") >= len(found.curves)
 
 
-def test_a_study_of_two_liquids_without_decisions_can_be_planned_too(tmp_path: Path) -> None:
+def test_a_study_of_two_liquids_without_decisions_can_be_study_plantoo(tmp_path: Path) -> None:
     """Two settings, repeated, with statements that the model does not know."""
     protocol = parse(SMALL.encode(), "small.toml")
-    of = plan(protocol, felt_in(protocol))
-    assert of.unknown == ("smooth", "warm")
-    studies, counts = swept(of)
-    found = powers(of, SIZES, studies, studies, 1, counts)
+    study_plan = plan(protocol, felt_in(protocol))
+    assert study_plan.unknown == ("smooth", "warm")
+    studies, counts = swept(study_plan)
+    found = powers(study_plan, SIZES, studies, studies, 1, counts)
     assert not [one for one in found.curves if one.over == "all statements at once"]
     assert "knows nothing of smooth, warm" in power_markdown(found)
     assert write(found, tmp_path / "power")

@@ -177,7 +177,7 @@ def test_answers_without_an_estimate_are_told(values: np.ndarray, note: str) -> 
 
 
 @pytest.mark.parametrize("columns", [[[0], [1]], [[1], [1], [1]], [[0, 0], [1, 2], [2, 4]], [[0], [1], [np.nan]]])
-def test_columns_that_do_not_tell_settings_apart_are_refused(columns: list[list[float]]) -> None:
+def test_columns_that_do_not_distinguish_settings_are_refused(columns: list[list[float]]) -> None:
     with pytest.raises(AnalysisError, match="do not distinguish 3 settings"):
         ordinal(made_up(12), columns)
 
@@ -201,12 +201,12 @@ def test_sessions_are_a_factor_that_takes_their_difference_from_the_settings() -
     sessions[:, 0, 3], sessions[:, 1, 1:] = 2, 2
     latent = 3 + rng.normal(0, 0.5, (16, 1, 1)) + rng.normal(0, 0.7, sessions.shape) + 1.5 * (sessions - 1)
     values = np.clip(np.rint(latent), 1, 7)
-    pooled, apart = ordinal(values), ordinal(values, sessions=sessions)
+    pooled, separate = ordinal(values), ordinal(values, sessions=sessions)
     assert pooled.p is not None
-    assert apart.p is not None
-    assert pooled.p < 0.01 < apart.p
-    assert len(apart.coefficients) == 1
-    assert "sessions as a factor" in apart.method
-    # Each setting in a session of its own: they cannot be told apart.
+    assert separate.p is not None
+    assert pooled.p < 0.01 < separate.p
+    assert len(separate.coefficients) == 1
+    assert "sessions as a factor" in separate.method
+    # Each setting in a session of its own: their effects cannot be separated.
     own = np.ones(values.shape) + np.arange(2)[:, None]
     assert ordinal(values, sessions=own).p == pytest.approx(pooled.p)

@@ -8,7 +8,7 @@ from typing import Final, TypeAlias
 
 import numpy as np
 
-from study_app.analysis.answered import Asked, of_tables, over_all
+from study_app.analysis.block_tests import Asked, of_tables, over_all
 from study_app.analysis.evaluate import found_in
 from study_app.analysis.failures import Failures
 from study_app.analysis.measures import Array
@@ -48,33 +48,33 @@ class Cell:
         return f"{self.generator}, {self.extent}"
 
 
-def truth(of: Simulated, cell: Cell) -> Truth:
+def truth(simulation: Simulated, cell: Cell) -> Truth:
     """Return what is true in the studies of a cell, which does not depend on their size."""
-    return true_differences(of, cell.generator, cell.extent)
+    return true_differences(simulation, cell.generator, cell.extent)
 
 
-def count(of: Simulated, cell: Cell, truth: Truth, seed: int, batch: int, studies: int) -> tuple[Rate, ...]:
+def count(simulation: Simulated, cell: Cell, truth: Truth, seed: int, batch: int, studies: int) -> tuple[Rate, ...]:
     """Return the rates of so many studies of a cell, those of batch number ``batch``."""
     events: dict[Event, int] = {}
     for study in range(batch * BATCH, batch * BATCH + studies):
-        for event, happened in _study(of, cell, truth, seed, study).items():
+        for event, happened in _study(simulation, cell, truth, seed, study).items():
             events[event] = events.get(event, 0) + happened
     return tuple(
         Rate(cell.name, cell.participants, what, limit, hits, studies) for (what, limit), hits in events.items()
     )
 
 
-def _study(of: Simulated, cell: Cell, truth: Truth, seed: int, study: int) -> dict[Event, bool]:
+def _study(simulation: Simulated, cell: Cell, truth: Truth, seed: int, study: int) -> dict[Event, bool]:
     failures = Failures()
-    given = answers(of, cell.generator, cell.extent, cell.participants, seed, study)
+    given = answers(simulation, cell.generator, cell.extent, cell.participants, seed, study)
     people = tuple(f"P{number:03d}" for number in range(cell.participants))
     found: dict[Event, bool] = {}
     results: list[BlockFound] = []
-    for place, (block, values) in enumerate(zip(of.blocks, given, strict=True)):
+    for place, (block, values) in enumerate(zip(simulation.blocks, given, strict=True)):
         single = {item.id: values[:, :, [column]] for column, item in enumerate(block.items)}
         asked = of_tables(
             block,
-            of.decided if cell.extent != "partial" else replace(of.decided, noticed=None),
+            simulation.decided if cell.extent != "partial" else replace(simulation.decided, noticed=None),
             people,
             single,
             seed=1,
@@ -90,11 +90,11 @@ def _study(of: Simulated, cell: Cell, truth: Truth, seed: int, study: int) -> di
         for (what, at_most), hit in judged(asked, result, cell, truth[place]):
             found[f"{what} ({block.kind})", at_most] = hit
         if cell.extent == "empty":
-            differs = result.overall is not None and (result.overall.p or 1.0) <= of.decided.alpha
+            differs = result.overall is not None and (result.overall.p or 1.0) <= simulation.decided.alpha
             found[f"test over all statements ({block.kind})", "at most 5 %"] = differs
     found[LOST] = bool(failures.found)
     if cell.extent != "partial":
-        whole = Results(of.decided, people, tuple(results), delivered=(), orders={}, performance=None, seed=1)
+        whole = Results(simulation.decided, people, tuple(results), delivered=(), orders={}, performance=None, seed=1)
         limit: Limit = "at most 5 %" if cell.extent == "empty" else "counted"
         found[CLAIMED, limit] = any(one.claims for one in answered(whole))
     return found

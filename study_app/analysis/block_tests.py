@@ -148,19 +148,19 @@ def of_tables(
     )
 
 
-def head(study: Study | None, of: Asked) -> dict[str, Any]:
+def head(study: Study | None, answers: Asked) -> dict[str, Any]:
     """Return what every block's finding says: settings, statements, counts; without a study no measures."""
-    block = of.block
-    measures, no_measures = of.attempt(MEASURES, lambda: _measures(study, block), ())
-    counts, no_counts = of.attempt(COUNTS, lambda: presented(of.single.values()), (0, 0))
-    numbers, no_numbers = of.attempt(NUMBERS, lambda: session_numbers(of.sessions.values()), ())
-    (by_session, absent), failed = of.attempt(SESSIONS, lambda: compared_sessions(of, numbers), ((), ()))
+    block = answers.block
+    measures, no_measures = answers.attempt(MEASURES, lambda: _measures(study, block), ())
+    counts, no_counts = answers.attempt(COUNTS, lambda: presented(answers.single.values()), (0, 0))
+    numbers, no_numbers = answers.attempt(NUMBERS, lambda: session_numbers(answers.sessions.values()), ())
+    (by_session, absent), failed = answers.attempt(SESSIONS, lambda: compared_sessions(answers, numbers), ((), ()))
     return {
         "id": block.id,
         "title": block.title,
         "kind": block.kind,
         "revealed": block.revealed,
-        "n": of.n,
+        "n": answers.n,
         "settings": block.settings,
         "names": tuple(block.name(setting) for setting in block.settings),
         "items": block.items,
@@ -201,7 +201,7 @@ def _replicated(block: Block) -> tuple[float, ...]:
     return tuple(delay for place, delay in enumerate(block.delays_ms) if columns.count(place) > 1)
 
 
-def compared_sessions(of: Asked, numbers: Sequence[int]) -> tuple[tuple[Tested, ...], tuple[Waiting, ...]]:
+def compared_sessions(answers: Asked, numbers: Sequence[int]) -> tuple[tuple[Tested, ...], tuple[Waiting, ...]]:
     """Test in every statement whether sessions are answered alike, by the participants who came to all of them.
 
     A participant's answers in a session are their median over the settings that he or she answered in all sessions.
@@ -209,11 +209,11 @@ def compared_sessions(of: Asked, numbers: Sequence[int]) -> tuple[tuple[Tested, 
     if len(numbers) < 2:
         return (), ()
     outcomes = {}
-    for item in of.block.items:
-        of.each(f"{item.short}, sessions")
+    for item in answers.block.items:
+        answers.each(f"{item.short}, sessions")
         each = np.stack(
             [
-                medians(np.where(of.sessions[item.id] == number, of.single[item.id], np.nan))[:, :, None]
+                medians(np.where(answers.sessions[item.id] == number, answers.single[item.id], np.nan))[:, :, None]
                 for number in numbers
             ],
             axis=2,
@@ -221,77 +221,87 @@ def compared_sessions(of: Asked, numbers: Sequence[int]) -> tuple[tuple[Tested, 
         common = np.asarray(~np.isnan(each).any(axis=2))
         levels = medians(np.where(common[..., None], each, np.nan).transpose(0, 2, 1))
         outcomes[item.id] = (
-            paired(levels[:, 0], levels[:, 1], alpha=of.decided.alpha)
+            paired(levels[:, 0], levels[:, 1], alpha=answers.decided.alpha)
             if len(numbers) == 2
-            else friedman(levels, draws=of.draws, seed=of.seed)
+            else friedman(levels, draws=answers.draws, seed=answers.seed)
         )
-    ps = in_family(outcomes, of.decided.alpha, f"{of.block.id}: sessions", false_discovery, FDR, primary=False)
+    ps = in_family(
+        outcomes, answers.decided.alpha, f"{answers.block.id}: sessions", false_discovery, FDR, primary=False
+    )
     if all(one.outcome.n == 0 for one in ps):
         return (), (Waiting(SESSIONS, f"nobody answered the same setting in all of sessions {numbers}"),)
     return ps, ()
 
 
-def sealed(study: Study, of: Asked) -> BlockFound:
+def sealed(study: Study, answers: Asked) -> BlockFound:
     """Return what may be known before the key is opened: counts, and whether settings differ at all, by code."""
     waiting = ["comparison of two settings", "test over all statements", "test of recognition"]
-    if of.block.kind == "delays":
+    if answers.block.kind == "delays":
         waiting = ["test of a trend (Page)", "lowest delay that shows", "test of equivalence", "detection threshold"]
-    (omnibus, absent), failed = of.attempt(OMNIBUS, lambda: compared(of), ((), ()))
-    told = head(study, of)
+    (omnibus, absent), failed = answers.attempt(OMNIBUS, lambda: compared(answers), ((), ()))
+    told = head(study, answers)
     absent = (*told.pop("absent"), *absent, *failed, *(Waiting(what, SEALED) for what in waiting))
     return BlockFound(**told, omnibus=omnibus, absent=absent)
 
 
-def compared(of: Asked) -> tuple[tuple[Tested, ...], tuple[Waiting, ...]]:
+def compared(answers: Asked) -> tuple[tuple[Tested, ...], tuple[Waiting, ...]]:
     """Test in every statement whether the settings are answered alike."""
-    if of.k < 2:
+    if answers.k < 2:
         return (), (Waiting("test of settings", "the block has one setting: there is nothing to compare it with"),)
-    return judged(_each(of, lambda values: _omnibus(values, of)), of.decided, f"{of.block.id}: settings differ"), ()
+    return judged(
+        _each(answers, lambda values: _omnibus(values, answers)),
+        answers.decided,
+        f"{answers.block.id}: settings differ",
+    ), ()
 
 
-def _omnibus(values: Array, of: Asked) -> Outcome:
-    if of.k == 2:
-        return paired(values[:, 0], values[:, 1], alpha=of.decided.alpha)
-    return friedman(values, draws=of.draws, seed=of.seed)
+def _omnibus(values: Array, answers: Asked) -> Outcome:
+    if answers.k == 2:
+        return paired(values[:, 0], values[:, 1], alpha=answers.decided.alpha)
+    return friedman(values, draws=answers.draws, seed=answers.seed)
 
 
-def over_all(of: Asked, draws: int | None = None) -> Outcome | None:
+def over_all(answers: Asked, draws: int | None = None) -> Outcome | None:
     """Test once over all statements whether the settings are answered alike; ``draws`` of them if not as usual."""
-    if of.k < 2 or (of.verdicts_only and draws is None):
+    if answers.k < 2 or (answers.verdicts_only and draws is None):
         return None
-    of.each("all statements")
-    return global_permutation(np.array(list(of.values.values())), draws=draws or of.draws_over_all, seed=of.seed)
+    answers.each("all statements")
+    return global_permutation(
+        np.array(list(answers.values.values())), draws=draws or answers.draws_over_all, seed=answers.seed
+    )
 
 
 def asked_again(
-    of: Asked, columns: Array | None, what: str
+    answers: Asked, columns: Array | None, what: str
 ) -> tuple[tuple[Tested, ...], tuple[Tested, ...], tuple[Waiting, ...]]:
     """Return the same questions under other assumptions: the mixed model, and with missing answers; and what is not.
 
     ``columns`` (settings, columns) are what the mixed model tests, ``what`` names it.
     """
-    if of.verdicts_only:
+    if answers.verdicts_only:
         return (), (), ()
     absent = []
     mixed: tuple[Tested, ...] = ()
-    reason = _no_model(of)
+    reason = _no_model(answers)
     if reason:
         absent.append(Waiting(f"mixed model of {what}", reason))
     else:
         models = {}
-        for item in of.block.items:
-            of.each(item.short)
-            models[item.id] = ordinal(of.single[item.id], columns, sessions=of.sessions[item.id])
-        mixed = tuple(alone(model, item, of.decided, f"{of.block.id}: mixed model") for item, model in models.items())
-    gaps = {item: values for item, values in of.values.items() if np.isnan(values).any()}
+        for item in answers.block.items:
+            answers.each(item.short)
+            models[item.id] = ordinal(answers.single[item.id], columns, sessions=answers.sessions[item.id])
+        mixed = tuple(
+            alone(model, item, answers.decided, f"{answers.block.id}: mixed model") for item, model in models.items()
+        )
+    gaps = {item: values for item, values in answers.values.items() if np.isnan(values).any()}
     incomplete: tuple[Tested, ...] = ()
-    if gaps and of.k >= 3:
+    if gaps and answers.k >= 3:
         incomplete = tuple(
             alone(
-                skillings_mack(values, draws=of.draws, seed=of.seed),
+                skillings_mack(values, draws=answers.draws, seed=answers.seed),
                 item,
-                of.decided,
-                f"{of.block.id}: with missing answers",
+                answers.decided,
+                f"{answers.block.id}: with missing answers",
             )
             for item, values in gaps.items()
         )
@@ -300,19 +310,19 @@ def asked_again(
     return mixed, incomplete, tuple(absent)
 
 
-def _no_model(of: Asked) -> str:
-    if of.k < 2:
+def _no_model(answers: Asked) -> str:
+    if answers.k < 2:
         return "there is one setting"
-    if of.n < FEW:
-        return f"with {told(of.n)}, below {FEW}, its estimates and errors would not hold"
-    if of.n > MANY:
+    if answers.n < FEW:
+        return f"with {told(answers.n)}, below {FEW}, its estimates and errors would not hold"
+    if answers.n > MANY:
         return f"it is left out above {MANY} participants, where it takes minutes"
     return ""
 
 
-def _each(of: Asked, test: Callable[[Array], Outcome]) -> dict[str, Outcome]:
+def _each(answers: Asked, test: Callable[[Array], Outcome]) -> dict[str, Outcome]:
     found = {}
-    for item in of.block.items:
-        of.each(item.short)
-        found[item.id] = test(of.values[item.id])
+    for item in answers.block.items:
+        answers.each(item.short)
+        found[item.id] = test(answers.values[item.id])
     return found

@@ -16,7 +16,7 @@ def markdown(rates: Sequence[Rate]) -> str:
         low, high = (f"{100 * end:.1f}" for end in rate.interval)
         lines.append(
             f"| {rate.cell} | {rate.participants} | {rate.what} | {100 * rate.share:.1f} % | {low} to {high} % | "
-            f"{rate.of} | {rate.limit} | {rate.holds} |"
+            f"{rate.studies} | {rate.limit} | {rate.holds} |"
         )
     return "\n".join(lines) + "\n"
 
@@ -28,5 +28,5 @@ def table(rates: Sequence[Rate]) -> bytes:
     writer.writerow(["studies", "participants", "what", "limit", "hits", "of", "share", "low", "high", "holds"])
     for one in rates:
         share = (f"{number:.6f}" for number in (one.share, *one.interval))
-        writer.writerow([one.cell, one.participants, one.what, one.limit, one.hits, one.of, *share, one.holds])
+        writer.writerow([one.cell, one.participants, one.what, one.limit, one.hits, one.studies, *share, one.holds])
     return text.getvalue().encode()
