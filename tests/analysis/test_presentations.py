@@ -62,6 +62,8 @@ def test_sessions_are_shown_and_tested() -> None:
     results, found = evaluated(made)
     assert found.sessions == (1, 2)
     assert [one.verdict for one in found.by_session] == ["suggested", "suggested"]
+    assert all("sessions as a factor" in one.outcome.method for one in found.mixed)
+    assert len(found.mixed) == len(ITEMS)
     page = " ".join(block(found, results, ()))
     assert "The answers are of sessions 1 and 2, which are compared with each other" in page
     assert "Do sessions differ?" in page
