@@ -9,6 +9,7 @@ from typing import Final
 from platformdirs import user_config_path
 
 FOLDER_VARIABLE: Final = "LIQUID_STUDY_CONFIG"
+SETTINGS_NAME: Final = "machine.json"
 
 
 def user_folder() -> Path:
@@ -16,3 +17,8 @@ def user_folder() -> Path:
     if own := os.environ.get(FOLDER_VARIABLE):
         return Path(own)
     return user_config_path("liquid-study", appauthor=False, roaming=True)
+
+
+def settings_file() -> Path:
+    """Return where the settings of this machine are, or would be."""
+    return user_folder() / SETTINGS_NAME

@@ -4,7 +4,9 @@ import itertools
 import logging
 import os
 import sys
+import tempfile
 from collections.abc import Iterator
+from pathlib import Path
 
 import hypothesis
 import pytest
@@ -14,6 +16,10 @@ hypothesis.settings.register_profile("unhurried", deadline=None)
 hypothesis.settings.load_profile("unhurried")
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+# No test uses the settings or the workspace of this machine's user: its workspace is its working folder.
+# Set here because fixtures of modules and sessions begin before those of a test.
+os.environ["LIQUID_STUDY_CONFIG"] = str(Path(tempfile.gettempdir(), f"liquid-study-tests-{os.getpid()}", "settings"))
+os.environ["LIQUID_STUDY_WORKSPACE"] = "."
 
 try:
     import PySide6.QtWidgets  # noqa: F401

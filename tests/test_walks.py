@@ -32,7 +32,7 @@ from study_app.gui.preflight.window import FULL as PREFLIGHT
 from study_app.protocol.model import Reach
 from study_app.protocol.words import words
 from study_app.session.pages import QuestionnairePage, TaskPage, TextPage
-from study_app.store.machine import settings_file
+from study_app.user_folder import settings_file
 from tests.compiled import needs_servo
 from tests.gui.small import ManualClock
 from tests.real_windows import needs_display, virtual_display, wait_for

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
 from pathlib import Path
 
 from study_app.app.live_session import hold
+from study_app.errors import StoreError
 from study_app.gui.beginning import check
 from study_app.gui.choices import NewSession, draw_seed, resumed, study_results
 from study_app.protocol.load import load
 from study_app.session.resume import is_rehearsal
 from study_app.store import receipt
 from study_app.store.layout import locate, refuse_never_begun
+from study_app.store.machine import remember_protocol
+from study_app.workspace import workspace
 
 
 def run(
@@ -41,7 +45,7 @@ def run(
     device, language : default: the mouse, the protocol's first language
     firmware : file of a Falcon's program, where it needs one
     windowed, screen : where the participant's window opens; screens count from 1
-    results : the study's folder; default ``results/<study>``, of a pilot ``results/<study>-pilot``
+    results : the study's folder; default ``results/<study>`` of the workspace, of a pilot ``results/<study>-pilot``
     pilot : to try it out: in a window with a frame, apart from the data and marked
     recordings : whether every turn of the servo and every frame of a trial is kept
     tell : is given the lines of the pre-flight, before the first page
@@ -63,13 +67,18 @@ def run(
         windowed=windowed or pilot,
         screen=screen,
         results=(
-            study_results(Path("results"), study.study.name, device, pilot=pilot) if results is None else Path(results)
+            study_results(workspace().results, study.study.name, device, pilot=pilot)
+            if results is None
+            else Path(results)
         ),
         pilot=pilot,
         recordings=recordings,
         firmware=firmware,
     )
     check(chosen, study)
+    if Path(protocol).is_file():
+        with contextlib.suppress(StoreError):  # a session does not depend on it
+            remember_protocol(Path(protocol))
     return hold(chosen, tell)
 
 

@@ -18,6 +18,8 @@ from study_app.gui.settings.place import MachinePlace
 from study_app.gui.theme import DARK, LIGHT, Theme
 from study_app.store import machine
 from study_app.store.machine import DEFAULTS, DisplayOffset, MachineSettings
+from study_app.user_folder import settings_file
+from study_app.workspace import workspace
 
 CALLED: Final = {
     "screen": "participant's screen",
@@ -26,7 +28,7 @@ CALLED: Final = {
     "display_offset": "display offset",
     "device": "device",
     "firmware": "firmware",
-    "results": "results folder",
+    "workspace": "workspace",
     "theme": "theme",
     "sound": "sound",
 }
@@ -38,7 +40,7 @@ def settings_here() -> tuple[MachineSettings, str]:
     try:
         kind_of(settings.device)
     except DeviceError as error:
-        return settings.model_copy(update={"device": DEFAULTS.device}), f"{machine.settings_file()}: {error}"
+        return settings.model_copy(update={"device": DEFAULTS.device}), f"{settings_file()}: {error}"
     return settings, trouble
 
 
@@ -110,6 +112,12 @@ class MachineDesk(QObject):
         if operator and operator != self.settings.operator:
             self._keep(self.settings.model_copy(update={"operator": operator}))
 
+    def remember_protocol(self, protocol: Path) -> None:
+        """Keep a protocol file among the recent ones; that is no change of the machine that could be taken back."""
+        made = self.settings.with_recent(protocol)
+        if made != self.settings:
+            self._keep(made)
+
     def measured(self, mean_ms: float, spread_ms: float, how: str, screen: str) -> None:
         """Set the display offset that was measured today on a screen."""
         offset = {"mean_ms": mean_ms, "spread_ms": spread_ms, "how": how, "screen": screen}
@@ -118,7 +126,8 @@ class MachineDesk(QObject):
     def undo(self) -> None:
         """Take the last change back."""
         if self._before:
-            self._keep(self._before.pop()[1].model_copy(update={"operator": self.settings.operator}))
+            kept = {"operator": self.settings.operator, "recent": self.settings.recent}
+            self._keep(self._before.pop()[1].model_copy(update=kept))
 
     @property
     def undo_called(self) -> str:
@@ -138,9 +147,9 @@ class MachineDesk(QObject):
         if self.place is not None:
             self.place.show_settings(
                 self.settings,
-                results=str(Path(self.settings.results_folder).absolute()),
+                folder=str(workspace().folder.absolute()),
                 undo=self.undo_called,
-                kept_in=str(machine.settings_file()),
+                kept_in=str(settings_file()),
             )
 
 

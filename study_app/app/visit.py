@@ -10,14 +10,17 @@ from PySide6.QtCore import QEventLoop, QObject, QTimer
 from study_app.app.devices import DevicesDesk
 from study_app.app.live_session import BUG, LiveSession
 from study_app.app.machine import MachineDesk, theme_named
+from study_app.errors import StoreError
 from study_app.gui.application import application_here
 from study_app.gui.choices import NewSession
 from study_app.gui.collector import collecting_here
 from study_app.gui.ending import ended_from_outside
 from study_app.gui.home.place import HomePlace
+from study_app.gui.home.workspace import WorkspaceDialog
 from study_app.gui.main_window import MainWindow
 from study_app.gui.screens import place
-from study_app.store.machine import MachineSettings
+from study_app.store.machine import MachineSettings, create_workspace
+from study_app.workspace import Workspace, chosen_workspace, offered_workspace, workspace
 
 LOOK_AFTER_MS = 300  # the window stands by then
 
@@ -31,7 +34,7 @@ if TYPE_CHECKING:
 def home(results: Path | None = None) -> int:
     """Open the home window on the results folder; return the exit code when it is closed.
 
-    By default the folder is the one that is set for this machine, else ``results``.
+    By default the folder is the workspace's.
 
     Raises
     ------
@@ -57,7 +60,8 @@ class Visit(QObject):
         self.devices = DevicesDesk(self.machine)
         self._home_place: HomePlace | None = None
         self._follows_machine = results is None
-        self.results = results if results is not None else self.machine.settings.results_folder
+        self.results = results if results is not None else workspace().results
+        self.question: WorkspaceDialog | None = None
         self.window = MainWindow(
             {
                 "home": self._home,
@@ -87,12 +91,30 @@ class Visit(QObject):
         self.window.show()
         if self.machine.trouble:
             self.window.tell("This machine's settings are the defaults", f"{self.machine.trouble}.")
+        elif self._follows_machine and chosen_workspace() is None:
+            self._ask_for_workspace()
         QTimer.singleShot(LOOK_AFTER_MS, self.devices, self.devices.look)
+
+    def _ask_for_workspace(self) -> None:
+        """Ask once which folder holds protocols and results; until it is answered the offered one is used."""
+        asked = self.question = WorkspaceDialog(self.window, self.window.theme, offered_workspace().folder)
+        asked.accepted.connect(lambda: self._choose_workspace(asked.folder))
+        asked.finished.connect(asked.deleteLater)
+        asked.open()
+
+    def _choose_workspace(self, folder: Path) -> None:
+        try:
+            create_workspace(Workspace(folder.absolute()))
+        except StoreError as error:
+            self.window.tell("This folder cannot be the workspace", f"{error}.")
+            return
+        self.machine.change({"workspace": str(folder.absolute())})
 
     def _home(self) -> HomePlace:
         made = HomePlace(self.results)
         made.session_asked.connect(self._start)
         made.results_asked.connect(self._show_study)
+        made.protocol_opened.connect(self.machine.remember_protocol)
         made.device.display_asked.connect(self._test_display)
         made.show_machine(self.machine.settings, self.devices.preferred)
         self._home_place = made
@@ -106,8 +128,9 @@ class Visit(QObject):
     def _machine_changed(self, settings: MachineSettings) -> None:
         """Follow what is set for this machine, as far as nothing else was asked for by command."""
         self.window.show_theme(theme_named(settings.theme))
-        if self._follows_machine and settings.results_folder != self.results and self._home_place is not None:
-            self.results = settings.results_folder
+        here = workspace()
+        if self._follows_machine and here.results != self.results and self._home_place is not None:
+            self.results = here.results
             self._home_place.show_results(self.results)
             if self.desk is not None:
                 self.desk.show_results(self.results)

@@ -33,6 +33,7 @@ from study_app.store.abandoned import abandoned
 from study_app.store.description import check_study
 from study_app.store.layout import MAX_SESSION, StudyFolder, check_participant, check_unused, suggest_id
 from study_app.store.machine import DEFAULTS, MachineSettings
+from study_app.workspace import workspace
 
 _NOTES = {
     "mouse": " (seen, not felt)",
@@ -77,6 +78,7 @@ class NewSessionDialog(QDialog):
         self._suggested = str(study_results(results, facts.protocol.study.name, _known(machine.device)))
         self.results = _field("Results folder of this study")
         self.results.setText(self._suggested)
+        self.where = label("", "small", "text3")
         self.participant = _field("Participant")
         self.session = Number(1, MAX_SESSION, 1)
         self.seed = _field("Seed")
@@ -182,7 +184,7 @@ class NewSessionDialog(QDialog):
         both.addWidget(self.windowed)
         both.addWidget(self.pilot)
         grid.addLayout(both, 8, 1, 2, 1, Qt.AlignmentFlag.AlignBottom)
-        _put(grid, 10, 0, "Results folder of this study", _beside(self.results, change), across=2)
+        _put(grid, 10, 0, "Results folder of this study", _beside(self.results, change), hint=self.where, across=2)
         self._firmware_row = self._ask_firmware()
         grid.addWidget(self._firmware_row, 12, 0, 1, 2)
         self._firmware_row.setVisible(self._takes_firmware)
@@ -287,6 +289,8 @@ class NewSessionDialog(QDialog):
     def _check(self) -> None:
         """Say at once whether this can begin, and if not, why and what to do."""
         fault = self._fault()
+        inside = Path(self.results.text()).resolve().is_relative_to(workspace().folder.resolve())
+        self.where.setText("in the workspace" if inside else "outside the workspace: Home will not list its sessions")
         self._offer_ways()
         if fault:
             self._say(fault, good=False)
@@ -377,7 +381,7 @@ def _beside(field: QWidget, button: QWidget) -> QWidget:
 
 
 def _put(
-    grid: QGridLayout, row: int, place: int, name: str, field: QWidget, *, hint: str = "", across: int = 1
+    grid: QGridLayout, row: int, place: int, name: str, field: QWidget, *, hint: str | QLabel = "", across: int = 1
 ) -> QLabel:
     """Put a field under its name, with a hint behind the name."""
     named = label(name, "label", "text2")
@@ -386,7 +390,7 @@ def _put(
     head.addWidget(named)
     head.addStretch()
     if hint:
-        head.addWidget(label(hint, "small", "text3"))
+        head.addWidget(label(hint, "small", "text3") if isinstance(hint, str) else hint)
     named.setBuddy(field)
     grid.addLayout(head, row, place, 1, across)
     grid.addWidget(field, row + 1, place, 1, across)

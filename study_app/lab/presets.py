@@ -11,6 +11,7 @@ from study_app.lab.workbench import Setting
 from study_app.protocol.load import load_scene, load_scenes, shipped
 from study_app.protocol.scene_text import for_new_file, scene_text
 from study_app.store.atomic import write_file
+from study_app.workspace import workspace
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,13 +42,13 @@ class Choice:
         return Setting(spoken(self.liquid), scene, scene)
 
 
-def liquids_at_hand(
-    folders: tuple[Path, ...] = (Path("protocols"),), saved: tuple[str, ...] = ()
-) -> tuple[Choice, ...]:
+def liquids_at_hand(folders: tuple[Path, ...] | None = None, saved: tuple[str, ...] = ()) -> tuple[Choice, ...]:
     """Return every liquid of the shipped protocols, of the files in ``folders``, and of those ``saved``.
 
+    ``folders`` is by default the workspace's ``protocols``.
     A broken file has none; a file of a shipped one's name in ``folders`` is that one.
     """
+    folders = (workspace().protocols,) if folders is None else folders
     own = [str(path) for folder in folders for path in sorted(folder.glob("*.toml")) if path.stem not in shipped()]
     found: list[Choice] = []
     for source in dict.fromkeys([*shipped(), *own, *saved]):

@@ -1,4 +1,4 @@
-"""Where protocol files are: a path, or a name from ./protocols and then from those that ship with the program."""
+"""Where protocol files are: a path, or a name from the workspace and then from those that ship with the program."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from pathlib import Path
 
 from study_app.errors import Problem, ProtocolError
 from study_app.protocol.problems import did_you_mean
+from study_app.workspace import workspace
 
 _PACKAGE = Path(__file__).resolve().parent.parent
-_OWN = Path("protocols")
 
 
 def _shipped_folder() -> Path:
@@ -21,6 +21,11 @@ def _shipped_folder() -> Path:
 def shipped() -> tuple[str, ...]:
     """Return the names of the protocols that ship with the program, sorted."""
     return tuple(sorted(path.stem for path in _shipped_folder().glob("*.toml")))
+
+
+def at_hand() -> tuple[str, ...]:
+    """Return the names of the protocols in the workspace, then of those that ship with the program."""
+    return tuple(dict.fromkeys((*(path.stem for path in workspace().own_protocols()), *shipped())))
 
 
 def find(name_or_path: str | Path) -> Path:
@@ -35,11 +40,10 @@ def find(name_or_path: str | Path) -> Path:
     if path.is_file():
         return path
     if path.name == str(name_or_path) and path.suffix != ".toml":
-        for folder in (_OWN, _shipped_folder()):
+        for folder in (workspace().protocols, _shipped_folder()):
             if (found := folder / f"{path.name}.toml").is_file():
                 return found
-        names = {*shipped(), *(own.stem for own in _OWN.glob("*.toml"))}
-        raise _not_found(name_or_path, "no protocol of this name", did_you_mean(path.name, names))
+        raise _not_found(name_or_path, "no protocol of this name", did_you_mean(path.name, at_hand()))
     if path.is_dir():
         raise _not_found(name_or_path, "is a folder, not a protocol file", "name one of the .toml files in it")
     raise _not_found(name_or_path, "no such file", f"or a name: {', '.join(shipped())}")

@@ -15,13 +15,23 @@ from study_app.errors import Problem, ProtocolError
 from study_app.haptics.scene import Liquid, RateHz, Scene
 from study_app.protocol.checks import check
 from study_app.protocol.document import entries
-from study_app.protocol.files import protocol_hash, shipped, source_bytes
+from study_app.protocol.files import at_hand, protocol_hash, shipped, source_bytes
 from study_app.protocol.model import Format, HandForceN, Named, Protocol, SceneDefaults, schema
 from study_app.protocol.places import Places
 from study_app.protocol.problems import Fault, did_you_mean, faults_of
 from study_app.protocol.table import Table
 
-__all__ = ["is_scene_file", "load", "load_scene", "load_scenes", "parse", "protocol_hash", "shipped", "source_bytes"]
+__all__ = [
+    "at_hand",
+    "is_scene_file",
+    "load",
+    "load_scene",
+    "load_scenes",
+    "parse",
+    "protocol_hash",
+    "shipped",
+    "source_bytes",
+]
 
 M = TypeVar("M", bound=BaseModel)
 

@@ -29,6 +29,7 @@ from study_app.session.state import FINAL
 from study_app.store.clock import SessionClock
 from study_app.store.layout import rehearsal_folder
 from study_app.store.simulated import SimulatedSession, SimulatedStudy
+from study_app.workspace import workspace
 
 DEVICE = {"name": "answers-only", "measured": False}
 SAY_EVERY_S = 5.0
@@ -51,7 +52,7 @@ def rehearse_answers(
     protocol : file or name of a protocol
     participants : how many
     seed : all randomness comes from it, the key's too
-    results : study folder; by default a new ``results/<study>-rehearsal-<n>``
+    results : study folder; by default a new ``results/<study>-rehearsal-<n>`` of the workspace
     felt : what each condition feels like; by default rehearsed first
     progress : is told a line now and then
 
@@ -66,7 +67,7 @@ def rehearse_answers(
     """
     source = source_bytes(protocol)
     study = parse(source, str(protocol))
-    folder = rehearsal_folder(Path("results"), study.study.name) if results is None else Path(results)
+    folder = rehearsal_folder(workspace().results, study.study.name) if results is None else Path(results)
     people = tuple(f"P{number:03d}" for number in range(1, participants + 1))
     kept = SimulatedStudy(folder, study, source, people, seed=seed, device=DEVICE, screens=REHEARSED_SCREENS)
     if felt is None:

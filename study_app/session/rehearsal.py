@@ -45,6 +45,7 @@ from study_app.store.open_session import SessionStore
 from study_app.store.progress import progress_of
 from study_app.store.resume import reopen
 from study_app.store.session import begin
+from study_app.workspace import workspace
 
 LOOK_S = 0.05  # the session looks at the device so often
 IDLE_S = 0.5  # and while reading and answering
@@ -70,7 +71,7 @@ def rehearse(
     participants : how many
     seed : all randomness comes from it, the key's too
     device : "scripted" or "falcon-emulated"
-    results : study folder; by default a new ``results/<study>-rehearsal-<n>``
+    results : study folder; by default a new ``results/<study>-rehearsal-<n>`` of the workspace
     recordings : whether every turn of the servo and every frame of a trial is kept
     progress : is told a line after each session
 
@@ -90,7 +91,7 @@ def rehearse(
         raise SessionError(f"device '{device}' waits for a person: rehearse on scripted or falcon-emulated")
     source = source_bytes(protocol)
     study = parse(source, str(protocol))
-    folder = rehearsal_folder(Path("results"), study.study.name) if results is None else Path(results)
+    folder = rehearsal_folder(workspace().results, study.study.name) if results is None else Path(results)
     check_study(StudyFolder(folder), study.study.name)
     people = [f"P{number:03d}" for number in range(1, participants + 1)]
     for person in people:

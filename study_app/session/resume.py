@@ -5,14 +5,14 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 from study_app.errors import ProtocolError, SessionError
-from study_app.protocol.load import parse, protocol_hash, shipped, source_bytes
+from study_app.protocol.load import at_hand, parse, protocol_hash, source_bytes
 from study_app.protocol.model import Protocol
 from study_app.protocol.schedule import PageStep, Schedule, Step, Trial
 from study_app.store.journal import Line
+from study_app.store.machine import recent_protocols
 from study_app.store.progress import Progress, attempts, progress_of
 
 REHEARSED_SCREENS: dict[str, Any] = {"participant": "simulated", "refresh_hz": 60}
@@ -62,15 +62,14 @@ def find_protocol(start: Line, candidates: Iterable[str] | None = None) -> str:
 
     Parameters
     ----------
-    candidates : where to look: files or names; by default those in ``./protocols`` and those that ship
+    candidates : where to look: files or names; by default those in the workspace, those that ship, and recent ones
 
     Raises
     ------
     SessionError
         There is none of that study.
     """
-    own = sorted(path.stem for path in Path("protocols").glob("*.toml"))
-    names = dict.fromkeys((*own, *shipped()) if candidates is None else candidates)
+    names = dict.fromkeys((*at_hand(), *recent_protocols()) if candidates is None else candidates)
     sources: dict[str, bytes] = {}
     for name in names:
         with contextlib.suppress(ProtocolError):  # a file that cannot be read is no study's

@@ -18,9 +18,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from study_app.errors import StoreError
 from study_app.protocol.problems import faults_of
 from study_app.store.atomic import cannot_read, cannot_write, write_file
-from study_app.user_folder import FOLDER_VARIABLE, user_folder
+from study_app.user_folder import FOLDER_VARIABLE, settings_file
+from study_app.workspace import Workspace, setting_of, workspace
 
-NAME: Final = "machine.json"
 ASIDE: Final = "machine.damaged.json"
 LEAST_X_HEIGHT_DEG: Final = 0.4
 STATEMENT_X_HEIGHT_PX: Final = 16 * 1118 / 2048
@@ -28,6 +28,7 @@ STATEMENT_X_HEIGHT_PX: Final = 16 * 1118 / 2048
 
 DISTANCE_MM: Final = (200.0, 3000.0)
 WIDTH_MM: Final = (80.0, 5000.0)
+MOST_RECENT: Final = 8
 OFFSET_MS: Final = (0.0, 500.0)
 SPREAD_MS: Final = (0.0, 200.0)
 Place = Annotated[str, Field(pattern=r"^[^\x00]+$")]
@@ -56,9 +57,9 @@ class MachineSettings(_Strict):
 
     ``screen`` is the participant's by its name, ``screen_number`` tells screens of one name apart and counts from 1;
     ``viewing_distance_mm`` and ``screen_width_mm`` are None until somebody measured them. ``firmware`` is the file of a
-    Falcon's program, ``results`` the folder of the studies' folders; None is ``./results``; ``operator`` are the
-    initials that were given last. Whether ``device`` is known
-    is for those to say who open it.
+    Falcon's program, ``workspace`` the folder of protocols and results (None: not chosen, see `study_app.workspace`);
+    ``recent`` are the protocol files outside it that were opened last, newest first; ``operator`` are the initials that
+    were given last. Whether ``device`` is known is for those to say who open it.
     """
 
     screen: str = ""
@@ -68,7 +69,8 @@ class MachineSettings(_Strict):
     display_offset: DisplayOffset | None = None
     device: Annotated[str, Field(pattern=r"^[a-z][a-z-]*(:.+)?$")] = "mouse"
     firmware: Place | None = None
-    results: Place | None = None
+    workspace: Place | None = None
+    recent: Annotated[tuple[Place, ...], Field(max_length=MOST_RECENT, strict=False)] = ()
     theme: Literal["light", "dark"] = "light"
     sound: bool = False
     operator: Annotated[str, Field(max_length=40)] = ""
@@ -78,10 +80,13 @@ class MachineSettings(_Strict):
         """The file of a Falcon's program, if one was chosen."""
         return None if self.firmware is None else Path(self.firmware)
 
-    @property
-    def results_folder(self) -> Path:
-        """The folder that holds the studies' folders."""
-        return Path("results" if self.results is None else self.results)
+    def with_recent(self, protocol: Path) -> MachineSettings:
+        """Return the settings with this file, if it is outside the workspace, as the one that was opened last."""
+        if protocol.resolve().parent == workspace().protocols.resolve():
+            return self
+        name = str(protocol.absolute())
+        others = (other for other in self.recent if other != name)
+        return self.model_copy(update={"recent": (name, *others)[:MOST_RECENT]})
 
     def screen_among(self, names: Sequence[str]) -> int:
         """Return which of the screens with these names is the participant's, from 1; the last where it is not there."""
@@ -127,11 +132,6 @@ class MachineSettings(_Strict):
 DEFAULTS: Final = MachineSettings()
 
 
-def settings_file() -> Path:
-    """Return where the settings are, or would be."""
-    return user_folder() / NAME
-
-
 def load() -> MachineSettings:
     """Return the settings as they were kept; the defaults where none were.
 
@@ -151,6 +151,8 @@ def load() -> MachineSettings:
         raise _unusable(path, f"it is no JSON ({error})") from error
     if not isinstance(document, dict):
         raise _unusable(path, "it is no table of settings")
+    document["workspace"] = setting_of(document)
+    document.pop("results", None)
     try:
         return MachineSettings.model_validate(document)
     except ValidationError as error:
@@ -183,6 +185,49 @@ def save(settings: MachineSettings) -> None:
         raise cannot_write(path, error) from error
     text = json.dumps(settings.model_dump(mode="json"), indent=2, ensure_ascii=False)
     write_file(path, f"{text}\n".encode())
+
+
+def create_workspace(made: Workspace) -> None:
+    """Create the two folders of a workspace, where they are missing.
+
+    Raises
+    ------
+    StoreError
+        They cannot be created.
+    """
+    for folder in (made.protocols, made.results):
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise cannot_write(folder, error) from error
+
+
+def keep_workspace(made: Workspace) -> None:
+    """Make this the workspace of this machine from now on, and create its two folders.
+
+    Raises
+    ------
+    StoreError
+        The folders or the settings cannot be written.
+    """
+    create_workspace(made)
+    save(load_or_default()[0].model_copy(update={"workspace": str(made.folder.absolute())}))
+
+
+def remember_protocol(protocol: Path) -> None:
+    """Keep a protocol file among the recent ones.
+
+    Raises
+    ------
+    StoreError
+        The settings cannot be written.
+    """
+    save(load_or_default()[0].with_recent(protocol))
+
+
+def recent_protocols() -> tuple[str, ...]:
+    """Return the recent protocol files that are still there, newest first."""
+    return tuple(name for name in load_or_default()[0].recent if Path(name).is_file())
 
 
 def _first(error: ValidationError, document: dict[str, Any]) -> str:

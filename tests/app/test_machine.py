@@ -22,7 +22,8 @@ from study_app.gui.choices import NewSession
 from study_app.gui.dialogs import Notice
 from study_app.gui.theme import DARK, LIGHT
 from study_app.store import machine
-from study_app.store.machine import DEFAULTS, DisplayOffset, MachineSettings, load, save, settings_file
+from study_app.store.machine import DEFAULTS, DisplayOffset, MachineSettings, load, save
+from study_app.user_folder import settings_file
 
 MOUSE = Backend("mouse", "the window", READY, "seen, not felt")
 FALCON = Backend("falcon", "libusb 1.0", NONE, "felt, up to 8 N", "plug its cable in")
@@ -152,7 +153,8 @@ def visit(qtbot, tmp_path, monkeypatch):
     made.end()
 
 
-def test_the_main_window_follows_what_is_set(visit, qtbot, tmp_path):
+def test_the_main_window_follows_what_is_set(visit, qtbot, tmp_path, monkeypatch):
+    monkeypatch.delenv("LIQUID_STUDY_WORKSPACE")
     visit.window.show()
     home = visit.window.place("home")
     assert visit.window.theme is LIGHT
@@ -160,22 +162,24 @@ def test_the_main_window_follows_what_is_set(visit, qtbot, tmp_path):
     assert visit.window.theme is DARK
     visit.window.rail.theme_asked.emit()
     assert load().theme == "light"
-    visit.machine.change({"results": str(tmp_path / "elsewhere")})
-    assert home.results == visit.results == tmp_path / "elsewhere"
+    visit.machine.change({"workspace": str(tmp_path / "elsewhere")})
+    assert home.results == visit.results == tmp_path / "elsewhere" / "results"
+    assert home.folder.accessibleName() == f"Workspace: {tmp_path / 'elsewhere'}"
     visit.machine.change({"device": "scripted"})
     assert home.device.name.text() == "Scripted hand"
 
 
-def test_a_folder_asked_for_by_command_counts_for_this_stay(qtbot, tmp_path):
-    save(MachineSettings(results=str(tmp_path / "set")))
+def test_a_folder_asked_for_by_command_counts_for_this_stay(qtbot, tmp_path, monkeypatch):
+    monkeypatch.delenv("LIQUID_STUDY_WORKSPACE")
+    save(MachineSettings(workspace=str(tmp_path / "set")))
     asked = Visit(tmp_path / "asked")
     qtbot.addWidget(asked.window)
     assert asked.results == tmp_path / "asked"
-    asked.machine.change({"results": str(tmp_path / "other")})
+    asked.machine.change({"workspace": str(tmp_path / "other")})
     assert asked.results == tmp_path / "asked"
     following = Visit()
     qtbot.addWidget(following.window)
-    assert following.results == tmp_path / "other"
+    assert following.results == tmp_path / "other" / "results"
 
 
 def test_the_display_test_is_one_click_from_home(visit, qtbot):

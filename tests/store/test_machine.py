@@ -21,8 +21,8 @@ from study_app.store.machine import (
     load,
     load_or_default,
     save,
-    settings_file,
 )
+from study_app.user_folder import settings_file
 
 OFFSET = DisplayOffset(mean_ms=23.5, spread_ms=1.2, how="photodiode", measured="2026-11-20", screen="DP-1")
 ALL = MachineSettings(
@@ -33,7 +33,8 @@ ALL = MachineSettings(
     display_offset=OFFSET,
     device="falcon",
     firmware="/somewhere/firmware.bin",
-    results="/somewhere/results",
+    workspace="/somewhere",
+    recent=("/somewhere/else.toml",),
     theme="dark",
     sound=True,
 )
@@ -89,7 +90,7 @@ def _full(_descriptor):
         ('{"theme": "drak"}', 'did you mean "dark"?'),
         ('{"device": "Fal con"}', '"Fal con" is not permitted'),
         ('{"sound": 1}', "must be true or false"),
-        ('{"results": ""}', '"" is not permitted'),
+        ('{"workspace": ""}', '"" is not permitted'),
         (r'{"firmware": "a\u0000b"}', "is not permitted"),
     ],
 )

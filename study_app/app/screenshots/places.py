@@ -93,7 +93,7 @@ def _take_machine(camera: Camera, visit: Visit, theme: Theme) -> None:
     visit.window.go("machine")
     camera.take(visit.window, f"machine-{theme.name}", HOME)
     place: Any = visit.window.place("machine")
-    place.show_settings(visit.machine.settings, results="~/results", undo="", kept_in=KEPT_IN)
+    place.show_settings(visit.machine.settings, folder="~/Liquid Study", undo="", kept_in=KEPT_IN)
     place.open_test()
     test = camera.until(lambda: shown(DisplayTest), "the display test")
     test.showNormal()

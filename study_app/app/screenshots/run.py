@@ -20,6 +20,7 @@ from study_app.gui.application import application_here
 from study_app.gui.collector import collecting_here
 from study_app.gui.theme import DARK, LIGHT
 from study_app.user_folder import FOLDER_VARIABLE
+from study_app.workspace import FOLDER_NAME, WORKSPACE_VARIABLE
 
 GROUPS: Final = ("places", "session", "single-blind")
 
@@ -45,7 +46,7 @@ def screenshots(to: Path, *, only: str | None = None, tell: Callable[[str], obje
     camera = Camera(to.resolve(), tell)
     with tempfile.TemporaryDirectory(prefix="liquid-study-") as held, _at_home_in(Path(held)), collecting_here():
         if only in (None, "places"):
-            results = rehearsed(Path())
+            results = rehearsed(Path(FOLDER_NAME))
             for theme in (LIGHT, DARK):
                 take_places(camera, results, theme)
         if only in (None, "session"):
@@ -58,7 +59,8 @@ def screenshots(to: Path, *, only: str | None = None, tell: Callable[[str], obje
 @contextmanager
 def _at_home_in(folder: Path) -> Iterator[None]:
     """Let the program keep its settings in ``folder`` and begin from there, so that no picture names a place."""
-    with _environment(FOLDER_VARIABLE, str(folder / "settings")), chdir(folder):
+    settings = _environment(FOLDER_VARIABLE, str(folder / "settings"))
+    with settings, _environment(WORKSPACE_VARIABLE, FOLDER_NAME), chdir(folder):
         yield
 
 

@@ -10,12 +10,13 @@ from pathlib import Path
 from study_app.errors import ProtocolError, StudyError
 from study_app.gui.sessions.facts import SessionFacts, counted, started_words
 from study_app.protocol.describe import expected_duration_s
-from study_app.protocol.load import load, shipped
+from study_app.protocol.load import at_hand, is_scene_file, load
 from study_app.protocol.model import Protocol
 from study_app.protocol.schedule import PageStep, Schedule, build_schedule
 from study_app.session.resume import find_protocol, is_rehearsal, resume_at
 from study_app.store import journal, receipt
 from study_app.store.layout import locate
+from study_app.store.machine import recent_protocols
 from study_app.store.opening import is_open
 from study_app.store.progress import progress_of
 
@@ -45,9 +46,18 @@ class BrokenFacts:
 
 
 def sources() -> tuple[str, ...]:
-    """Return the names of the protocols at hand: those beside us, then those that ship with the program."""
-    own = {path.stem for path in Path("protocols").glob("*.toml")}
-    return tuple(sorted({*own, *shipped()}, key=lambda name: (name != "rek2024", name == "demo", name)))
+    """Return the studies at hand: recent files, then names in the workspace and of those that ship; no liquid files."""
+    names = sorted(at_hand(), key=lambda name: (name != "rek2024", name == "demo", name))
+    found = dict.fromkeys((*recent_protocols(), *names))
+    return tuple(source for source in found if not holds_liquids_alone(source))
+
+
+def holds_liquids_alone(source: str) -> bool:
+    """Return whether a file holds liquids and no study; a file that cannot be read does not."""
+    try:
+        return is_scene_file(source)
+    except ProtocolError:
+        return False
 
 
 def study_facts(source: str) -> StudyFacts | BrokenFacts:

@@ -24,19 +24,21 @@ from study_app.gui.home.facts import (
     Interrupted,
     StudyFacts,
     held,
+    holds_liquids_alone,
     interrupted,
     sources,
     study_facts,
 )
 from study_app.gui.home.rehearsal import RehearsalDialog
 from study_app.gui.home.table import SessionsCard
-from study_app.gui.labels import label
+from study_app.gui.labels import Elided, label
 from study_app.gui.new_session import NewSessionDialog
 from study_app.gui.place import Place
 from study_app.gui.screens import screens_shown
 from study_app.gui.sessions.facts import sessions
 from study_app.gui.themed import dress
 from study_app.store.machine import DEFAULTS, MachineSettings
+from study_app.workspace import workspace
 
 STACKED_BELOW = 1080
 BESIDE = 326
@@ -45,7 +47,8 @@ BESIDE = 326
 class HomePlace(Place):
     """Protocols, sessions, device, lab.
 
-    ``session_asked`` carries what an operator chose, ``results_asked`` the folder of a study.
+    ``session_asked`` carries what an operator chose, ``results_asked`` the folder of a study, ``protocol_opened`` the
+    file of a study that was opened here.
 
     Parameters
     ----------
@@ -55,13 +58,14 @@ class HomePlace(Place):
 
     session_asked = Signal(object)
     results_asked = Signal(object)
+    protocol_opened = Signal(object)
 
     def __init__(self, results: Path) -> None:
         super().__init__()
         self.results = results
         self.machine = DEFAULTS
         self.dialog: NewSessionDialog | RehearsalDialog | None = None
-        self._sources = list(sources())
+        self._opened: list[str] = []
         self._facts: list[StudyFacts | BrokenFacts] = []
         self.banner = ResumeBanner()
         self.grid = CardGrid()
@@ -69,6 +73,7 @@ class HomePlace(Place):
         self.device = DeviceCard()
         self.lab = LabCard()
         self.open_protocol = ActionButton("file", "Open protocol …")
+        self.folder = Elided("label", "text2")
         self._lay_out()
         self.open_protocol.clicked.connect(self._open_protocol)
         self.banner.resume_asked.connect(self._resume)
@@ -95,10 +100,10 @@ class HomePlace(Place):
         titles.setSpacing(4)
         titles.addWidget(label("Studies", "title"))
         titles.addWidget(label("Choose a protocol to start a session, or go on where one stopped.", "body", "text2"))
+        titles.addWidget(self.folder)
         head = QHBoxLayout()
         head.setContentsMargins(SHADOW, 0, SHADOW, 0)
-        head.addLayout(titles)
-        head.addStretch()
+        head.addLayout(titles, 1)
         head.addWidget(self.open_protocol)
         self._below = QBoxLayout(QBoxLayout.Direction.LeftToRight)
         self._below.setSpacing(18)
@@ -127,13 +132,15 @@ class HomePlace(Place):
         row.addWidget(self._area)
 
     def show_results(self, results: Path) -> None:
-        """Show the sessions of another folder from now on."""
+        """Show the protocols of the workspace and the sessions of another folder from now on."""
         self.results = results
+        self.show_studies()
         self.show_sessions()
 
     def show_studies(self) -> None:
         """Show a card for each protocol at hand."""
-        self._facts = [study_facts(source) for source in self._sources]
+        self.folder.show_text(f"Workspace: {workspace().folder}")
+        self._facts = [study_facts(source) for source in dict.fromkeys((*self._opened, *sources()))]
         cards: list[QWidget] = []
         for facts in self._facts:
             if isinstance(facts, BrokenFacts):
@@ -199,11 +206,17 @@ class HomePlace(Place):
         dialog.open()
 
     def _open_protocol(self) -> None:
-        chosen, _ = QFileDialog.getOpenFileName(self, "Open protocol", "", "Protocols (*.toml)")
-        if chosen and chosen not in self._sources:
-            self._sources.insert(0, chosen)
-            self.show_studies()
-            self.show_sessions()
+        chosen, _ = QFileDialog.getOpenFileName(self, "Open protocol", str(workspace().protocols), "Protocols (*.toml)")
+        if not chosen:
+            return
+        if holds_liquids_alone(chosen):
+            self.told.emit("This is a liquid file", f"{chosen} holds no study: open it in the liquid lab.")
+            return
+        if chosen not in self._opened:
+            self._opened.insert(0, chosen)
+        self.protocol_opened.emit(Path(chosen))
+        self.show_studies()
+        self.show_sessions()
 
     def _arrange(self) -> None:
         stacked = self.width() < STACKED_BELOW

@@ -205,10 +205,9 @@ class SessionsCard(Card):
         self.device.activated.connect(lambda _index: self.changed.emit("device", self.device.currentData()))
         self.devices.clicked.connect(self.devices_asked)
         self.change.clicked.connect(self._choose)
-        self._results = "results"
         for name, field, button in (
             ("Device", self.device, self.devices),
-            ("Results folder", self.folder, self.change),
+            ("Workspace, the folder of protocols and results", self.folder, self.change),
         ):
             self.column.addWidget(_named(name, field))
             row = QHBoxLayout()
@@ -217,16 +216,15 @@ class SessionsCard(Card):
             row.addWidget(button)
             self.column.addLayout(row)
 
-    def show_settings(self, settings: MachineSettings, results: str) -> None:
-        """Show what is set; ``results`` is where the folder is."""
-        self._results = results
+    def show_settings(self, settings: MachineSettings, folder: str) -> None:
+        """Show what is set; ``folder`` is the workspace."""
         self.device.setCurrentIndex(self.device.findData(settings.device.partition(":")[0]))
-        self.folder.show_text(results)
+        self.folder.show_text(folder)
 
     def _choose(self) -> None:
-        chosen = QFileDialog.getExistingDirectory(self, "Results folder", self._results)
+        chosen = QFileDialog.getExistingDirectory(self, "Workspace", self.folder.accessibleName())
         if chosen:
-            self.changed.emit("results", chosen)
+            self.changed.emit("workspace", chosen)
 
 
 class WindowsCard(Card):

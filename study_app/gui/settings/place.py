@@ -120,12 +120,12 @@ class MachinePlace(Place):
         """The participant's screen."""
         return self._screens[self.settings.screen_among([screen.name for screen in self._screens]) - 1]
 
-    def show_settings(self, settings: MachineSettings, *, results: str, undo: str, kept_in: str) -> None:
-        """Show what is set; ``undo`` names what can be taken back ("" where nothing), ``kept_in`` is the file."""
+    def show_settings(self, settings: MachineSettings, *, folder: str, undo: str, kept_in: str) -> None:
+        """Show what is set; ``undo`` names what can be taken back ("" where nothing), ``folder`` is the workspace."""
         self.settings = settings
         self.undo.setEnabled(bool(undo))
         self.undo.show_action("undo", f"Undo {undo}" if undo else "Undo")
-        self.sessions.show_settings(settings, results)
+        self.sessions.show_settings(settings, folder)
         self.windows.show_settings(settings)
         self.kept_in.show_text(f"Kept in {kept_in}")
         self._show()

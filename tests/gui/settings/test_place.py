@@ -30,7 +30,7 @@ def place(qtbot, monkeypatch):
 
 
 def show(place, settings, undo=""):
-    place.show_settings(settings, results="/there/results", undo=undo, kept_in="/there/machine.json")
+    place.show_settings(settings, folder="/there", undo=undo, kept_in="/there/machine.json")
 
 
 def type_into(qtbot, field, text):
@@ -120,7 +120,7 @@ def test_device_folder_theme_and_sound_are_chosen(place, qtbot, monkeypatch, tmp
     monkeypatch.setattr(QFileDialog, "getExistingDirectory", lambda *_: str(tmp_path))
     with qtbot.waitSignal(place.changed) as changed:
         qtbot.mouseClick(place.sessions.change, Qt.MouseButton.LeftButton)
-    assert changed.args == [{"results": str(tmp_path)}]
+    assert changed.args == [{"workspace": str(tmp_path)}]
     with qtbot.waitSignal(place.go_asked) as going:
         qtbot.mouseClick(place.sessions.devices, Qt.MouseButton.LeftButton)
     assert going.args == ["devices"]

@@ -1,0 +1,160 @@
+"""One workspace per machine: the same protocols and sessions, and the same next id, wherever the program is started."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from study_app import workspace as workspaces
+from study_app.app.visit import Visit
+from study_app.errors import StoreError
+from study_app.gui.home.facts import sources, study_facts
+from study_app.protocol.load import load as load_protocol
+from study_app.protocol.load import source_bytes
+from study_app.store.machine import keep_workspace, load, recent_protocols, remember_protocol
+from study_app.store.session import begin
+from study_app.user_folder import settings_file
+from study_app.workspace import Workspace, chosen_workspace, offered_workspace, workspace
+
+
+@pytest.fixture
+def documents(tmp_path, monkeypatch):
+    """Begin as a new user: nothing is set, and the documents are the test's own."""
+    monkeypatch.delenv("LIQUID_STUDY_WORKSPACE")
+    documents = tmp_path / "documents"
+    monkeypatch.setattr(workspaces, "user_documents_path", lambda: documents)
+    return documents
+
+
+def start_folder(path: Path, monkeypatch: pytest.MonkeyPatch, *subfolders: str) -> Path:
+    path.mkdir(exist_ok=True)
+    for name in subfolders:
+        (path / name).mkdir()
+    monkeypatch.chdir(path)
+    return path
+
+
+def test_the_start_folder_is_offered_only_if_it_has_both_folders(documents, tmp_path, monkeypatch):
+    start_folder(tmp_path / "one", monkeypatch, "results")
+    assert offered_workspace().folder == documents / "Liquid Study"
+    clone = start_folder(tmp_path / "both", monkeypatch, "results", "protocols")
+    assert offered_workspace().folder == clone
+    assert chosen_workspace() is None
+    assert not documents.exists()
+
+
+def test_a_chosen_workspace_counts_from_every_start_folder(documents, tmp_path, monkeypatch):
+    clone = start_folder(tmp_path / "clone", monkeypatch, "results", "protocols")
+    keep_workspace(offered_workspace())
+    (clone / "protocols" / "mine.toml").write_bytes(source_bytes("demo"))
+    start_folder(tmp_path / "elsewhere", monkeypatch)
+    assert workspace().folder == clone
+    assert "mine" in sources()
+    assert source_bytes("mine") == source_bytes("demo")
+    monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path / "for-one-run"))
+    assert workspace().folder == tmp_path / "for-one-run"
+    assert not documents.exists()
+
+
+def test_windows_show_the_same_sessions_and_suggest_the_same_id_from_two_start_folders(
+    documents, tmp_path, monkeypatch, qtbot
+):
+    kept = Workspace(tmp_path / "kept")
+    keep_workspace(kept)
+    shown, ids = [], []
+    for name in ("first", "second"):
+        start_folder(tmp_path / name, monkeypatch)
+        if name == "first":
+            for participant in ("P001", "P002"):
+                begin_session(kept.results / "demo", participant)
+        visit = Visit()
+        qtbot.addWidget(visit.window)
+        home = visit.window.place("home")
+        home.show_sessions()
+        shown.append([line.facts.participant for line in home.sessions.lines])
+        home.ask_for_session(study_facts("demo"))
+        ids.append((home.dialog.participant.text(), home.dialog.results.text()))
+        assert home.dialog.where.text() == "in the workspace"
+        home.dialog.results.setText(str(tmp_path / "other"))
+        assert home.dialog.where.text().startswith("outside the workspace")
+        home.dialog.reject()
+        assert home.folder.accessibleName() == f"Workspace: {kept.folder}"
+        visit.end()
+        assert not Path("results").exists()
+    assert shown[0] == shown[1]
+    assert sorted(shown[0]) == ["P001", "P002"]
+    assert ids[0] == ids[1] == ("P003", str(kept.results / "demo"))
+
+
+def begin_session(folder: Path, participant: str) -> None:
+    begin(
+        folder, load_protocol("demo"), source_bytes("demo"), participant, seed=1, operator="AK", language="en",
+        device={"name": "mouse"}, screens={}, simulated=False,
+    ).close()  # fmt: skip
+
+
+def test_the_first_start_asks_once_and_creates_nothing_before_the_answer(documents, tmp_path, monkeypatch, qtbot):
+    start_folder(tmp_path / "start", monkeypatch)
+    visit = Visit()
+    qtbot.addWidget(visit.window)
+    visit.open()
+    assert visit.question.path.text() == str(documents / "Liquid Study")
+    assert not documents.exists()
+    assert not settings_file().exists()
+    visit.question.path.setText(str(tmp_path / "mine"))
+    visit.question.accept()
+    assert (tmp_path / "mine" / "protocols").is_dir()
+    assert (tmp_path / "mine" / "results").is_dir()
+    assert load().workspace == str(tmp_path / "mine")
+    assert visit.results == tmp_path / "mine" / "results"
+    visit.window.close()
+    visit.end()
+    again = Visit()
+    qtbot.addWidget(again.window)
+    again.open()
+    assert again.question is None
+    again.window.close()
+    again.end()
+
+
+def test_a_folder_that_cannot_be_created_is_said_and_not_kept(documents, tmp_path, monkeypatch, qtbot):
+    start_folder(tmp_path / "start", monkeypatch)
+    (tmp_path / "file").write_text("")
+    with pytest.raises(StoreError, match="file"):
+        keep_workspace(Workspace(tmp_path / "file"))
+    assert chosen_workspace() is None
+    assert not settings_file().exists()
+
+
+def test_an_earlier_results_folder_becomes_the_workspace(documents, tmp_path):
+    settings_file().parent.mkdir(parents=True)
+    settings_file().write_text(json.dumps({"results": str(tmp_path / "lab" / "results"), "theme": "dark"}))
+    assert load().workspace == str(tmp_path / "lab")
+    assert workspace().folder == tmp_path / "lab"
+
+
+def test_recent_protocols_are_remembered_newest_first_and_only_while_they_exist(documents, tmp_path, monkeypatch):
+    start_folder(tmp_path / "start", monkeypatch)
+    files = [tmp_path / f"study{number}.toml" for number in range(10)]
+    for file in files:
+        file.write_bytes(source_bytes("demo"))
+        remember_protocol(file)
+    remember_protocol(files[4])
+    assert recent_protocols()[:2] == (str(files[4]), str(files[9]))
+    assert len(recent_protocols()) == 8
+    files[9].unlink()
+    assert str(files[9]) not in recent_protocols()
+    assert sources()[0] == str(files[4])
+    inside = workspace().protocols / "inside.toml"
+    inside.parent.mkdir(parents=True)
+    inside.write_bytes(source_bytes("demo"))
+    remember_protocol(inside)
+    assert str(inside) not in recent_protocols()
+
+
+def test_home_shows_no_card_for_a_liquid_file(tmp_path, monkeypatch):
+    start_folder(tmp_path / "start", monkeypatch, "protocols")
+    Path("protocols/syrup.toml").write_text("format = 1\n[liquids.syrup]\ndensity_kg_m3 = 1300\neffects = ['drag']\n")
+    Path("protocols/broken.toml").write_text("format = 1\n[study]\n")
+    assert "syrup" not in sources()
+    assert "broken" in sources()
