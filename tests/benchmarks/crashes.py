@@ -29,7 +29,8 @@ def main(sessions: int = 1000, minutes: float = 60.0) -> None:
     while done < sessions and time.monotonic() < ends_at:
         with tempfile.TemporaryDirectory() as folder:
             command = [sys.executable, "-X", "faulthandler", __file__, "--one", folder]
-            environment = os.environ | {"LIQUID_STUDY_CONFIG": str(Path(folder, "settings")), "LIQUID_STUDY_WORKSPACE": folder}
+            own = {"LIQUID_STUDY_CONFIG": str(Path(folder, "settings")), "LIQUID_STUDY_WORKSPACE": folder}
+            environment = os.environ | own
             ended = subprocess.run(
                 command, env=environment, capture_output=True, text=True, timeout=PATIENCE_S, check=False
             )
