@@ -38,6 +38,18 @@ class LeaveOut:
 
 
 @dataclass(frozen=True, slots=True)
+class TakeBack:
+    """Take back that a session or a trial is left out (see ``store.exclusions.include``)."""
+
+    folder: Path
+    participant: str
+    session: int
+    trial: int | None
+    by: str
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
 class OpenKey:
     """Open the sealed key (see ``store.blinding.reveal``)."""
 
@@ -63,7 +75,7 @@ class WriteReport:
     to: Path
 
 
-Order: TypeAlias = FindStudies | ReadStudy | LeaveOut | OpenKey | WriteTables | WriteReport
+Order: TypeAlias = FindStudies | ReadStudy | LeaveOut | TakeBack | OpenKey | WriteTables | WriteReport
 
 
 @dataclass(frozen=True, slots=True)

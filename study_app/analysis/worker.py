@@ -22,13 +22,14 @@ from study_app.analysis.orders import (
     StudiesFound,
     StudyAt,
     StudyFound,
+    TakeBack,
     WriteReport,
     WriteTables,
 )
 from study_app.errors import StoreError
 from study_app.store import blinding, receipt
 from study_app.store.atomic import cannot_read
-from study_app.store.exclusions import exclude, exclusions
+from study_app.store.exclusions import exclude, exclusions, include
 from study_app.store.layout import StudyFolder
 from study_app.store.participants import participants
 from study_app.store.unblinding import unblind
@@ -65,6 +66,8 @@ def carry_out(order: Order, tell: Tell, stop: Callable[[], bool]) -> Done:
             _read(order.folder, tell, stop)
         case LeaveOut():
             exclude(order.folder, order.participant, order.session, trial=order.trial, by=order.by, reason=order.reason)
+        case TakeBack():
+            include(order.folder, order.participant, order.session, trial=order.trial, by=order.by, reason=order.reason)
         case OpenKey():
             return Done(warnings=unblind(order.folder, by=order.by, reason=order.reason).left)
         case WriteTables():

@@ -7,12 +7,11 @@ from __future__ import annotations
 
 import importlib.util
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
-from datetime import datetime
 from functools import partial
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeAlias
 
 from PySide6.QtCore import QObject, QTimer, QUrl
 from PySide6.QtGui import QDesktopServices
@@ -32,21 +31,20 @@ from study_app.analysis.orders import (
     SessionsFound,
     StudiesFound,
     StudyFound,
+    TakeBack,
     WriteReport,
     WriteTables,
 )
+from study_app.app.results_rows import left_out, opened
 from study_app.gui.results.place import ResultsPlace
 from study_app.gui.results.view import (
     FigureShown,
     Going,
-    LeftOut,
-    Opened,
     ResultsView,
     StudyChoice,
     Trouble,
 )
 from study_app.gui.sessions.facts import session_facts
-from study_app.store.exclusions import Exclusion
 from study_app.store.layout import StudyFolder
 
 LISTEN_MS: Final = 40
@@ -56,6 +54,13 @@ NO_SAV: Final = "Files for SPSS need the package pyreadstat: pip install pyreads
 MISTAKE: Final = Trouble(
     "The evaluation was ended by a mistake in the program", "The terminal shows where.", "Look again", "again"
 )
+
+Decided: TypeAlias = LeaveOut | TakeBack | OpenKey
+REFUSALS: Final = {
+    LeaveOut: "It was not left out",
+    TakeBack: "It is still left out",
+    OpenKey: "The study is still blinded",
+}
 
 
 def open_here(path: Path) -> None:
@@ -110,6 +115,7 @@ class ResultsDesk(QObject):
         place.study_asked.connect(self._choose)
         place.remedy_asked.connect(self._mend)
         place.leave_out_asked.connect(self._leave_out)
+        place.take_back_asked.connect(self._take_back)
         place.unblind_asked.connect(self._unblind)
         place.tables_asked.connect(self._write_tables)
         place.report_asked.connect(self._write_report)
@@ -188,7 +194,7 @@ class ResultsDesk(QObject):
                 self._end(order, newest=newest)
             case Refused():
                 del self._orders[number]
-                if newest or isinstance(order, (LeaveOut, OpenKey)):
+                if newest or isinstance(order, Decided):
                     self._refused(order, answer)
             case Progress() if newest:
                 self._going = Going(answer.what, answer.share)
@@ -240,10 +246,10 @@ class ResultsDesk(QObject):
         reveal = found.reveal
         self._show(
             sessions=tuple(facts),
-            left_out=tuple(map(_left_out, found.exclusions)),
+            left_out=tuple(map(left_out, found.exclusions)),
             exclusions_file=StudyFolder(found.folder).exclusions,
             sealed=reveal is None,
-            opened=None if reveal is None else Opened(_time(reveal.get("at")), *_by_and_why(reveal)),
+            opened=None if reveal is None else opened(reveal),
         )
 
     def _take_study(self, found: StudyFound) -> None:
@@ -266,7 +272,7 @@ class ResultsDesk(QObject):
 
     def _end(self, order: Order, *, newest: bool) -> None:
         """Show what is there now that an order was carried out."""
-        if isinstance(order, (LeaveOut, OpenKey)):
+        if isinstance(order, Decided):
             self._read(order.folder)
         elif isinstance(order, ReadStudy) and newest:
             kept = tuple(figure for figure in self.view.figures if figure.name in self._redrawn)
@@ -274,9 +280,8 @@ class ResultsDesk(QObject):
 
     def _refused(self, order: Order, refused: Refused) -> None:
         sentence = f"{refused.sentence}."
-        if isinstance(order, (LeaveOut, OpenKey)):
-            title = "It was not left out" if isinstance(order, LeaveOut) else "The study is still blinded"
-            self.place.told.emit(title, sentence)
+        if isinstance(order, Decided):
+            self.place.told.emit(REFUSALS[type(order)], sentence)
             self._read(order.folder)  # it may have changed meanwhile, and what was being read was given up
         elif refused.stopped:
             all_drawn = self._blocks and len(self._redrawn) >= self._blocks
@@ -319,6 +324,10 @@ class ResultsDesk(QObject):
     def _leave_out(self, asked: tuple[str, int, int | None, str, str]) -> None:
         if self.view.chosen is not None:
             self._ask(LeaveOut(self.view.chosen, *asked), "leaving out")
+
+    def _take_back(self, asked: tuple[str, int, int | None, str, str]) -> None:
+        if self.view.chosen is not None:
+            self._ask(TakeBack(self.view.chosen, *asked), "taking the exclusion back")
 
     def _unblind(self, by: str, reason: str) -> None:
         if self.view.chosen is not None:
@@ -374,21 +383,3 @@ class ResultsDesk(QObject):
 def _what_to_open(order: WriteTables | WriteReport, files: tuple[Path, ...]) -> Path:
     """Return the page of a report, or the folder of tables."""
     return files[0] if isinstance(order, WriteReport) else order.to
-
-
-def _left_out(row: Exclusion) -> LeftOut:
-    name = row.participant if row.session == 1 else f"{row.participant}, session {row.session}"
-    what = name if row.trial is None else f"{name}, trial {row.trial}"
-    return LeftOut(what, row.rule_or_person, row.reason, _time(row.excluded_at))
-
-
-def _by_and_why(reveal: Mapping[str, str]) -> tuple[str, str]:
-    return str(reveal.get("by", "somebody")), str(reveal.get("reason", "no reason given"))
-
-
-def _time(told: object) -> datetime | None:
-    """Return a time that a file tells, None where it tells none: people may have changed it."""
-    try:
-        return datetime.fromisoformat(str(told))
-    except ValueError:
-        return None

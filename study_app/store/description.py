@@ -29,6 +29,7 @@ checksums.sha256
 recordings/
 blinding/
 exclusions.csv
+exclusions_reversed.jsonl
 fingerprints.txt
 rebuilt.txt
 """

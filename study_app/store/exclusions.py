@@ -5,13 +5,14 @@ from __future__ import annotations
 import codecs
 import csv
 import io
-from dataclasses import dataclass
+import json
+from dataclasses import asdict, dataclass
 from datetime import datetime
 from pathlib import Path
 
 from study_app.errors import StoreError
 from study_app.store import journal
-from study_app.store.atomic import cannot_read, read_regular, write_file
+from study_app.store.atomic import append_line, cannot_read, read_regular, write_file
 from study_app.store.columns import EXCLUSIONS, MISSING, header
 from study_app.store.formulas import unguarded
 from study_app.store.layout import StudyFolder
@@ -64,9 +65,7 @@ def exclude(
         There is no such session or trial, it is excluded already, ``by`` or ``reason`` is empty, or the list cannot be
         read or written.
     """
-    for name, text in (("by", by), ("reason", reason)):
-        if not text.strip():
-            raise StoreError(f"--{name} is empty: leaving data out is recorded with a rule or name, and a reason")
+    _refuse_empty(by, reason, "leaving data out is recorded with a rule or name, and a reason")
     study = StudyFolder(folder)
     _check_there(study, participant, session, trial)
     at = (now if now is not None else datetime.now().astimezone()).isoformat(timespec="milliseconds")
@@ -81,6 +80,50 @@ def exclude(
     finally:
         opening.release()
     return new
+
+
+def include(
+    folder: Path,
+    participant: str,
+    session: int,
+    *,
+    trial: int | None = None,
+    by: str,
+    reason: str,
+    now: datetime | None = None,
+) -> Exclusion:
+    """Take back that a session, or one of its trials, is left out; return the decision that no longer holds.
+
+    Its row leaves ``exclusions.csv``; ``exclusions_reversed.jsonl`` keeps it, with who took it back, when and why.
+
+    Raises
+    ------
+    StoreError
+        It is not left out, ``by`` or ``reason`` is empty, or a file cannot be read or written.
+    """
+    _refuse_empty(by, reason, "taking an exclusion back is recorded with a name and a reason")
+    study = StudyFolder(folder)
+    opening = open_alone(folder)
+    try:
+        rows = exclusions(folder)
+        taken = next((row for row in rows if row.what == (participant, session, trial)), None)
+        if taken is None:
+            asked = named(Exclusion(participant, session, trial, "", "", ""))
+            listed = "; ".join(named(row) for row in rows) or "nothing"
+            raise StoreError(f"{asked} is not left out; left out: {listed}")
+        at = (now if now is not None else datetime.now().astimezone()).isoformat(timespec="milliseconds")
+        record = {"at": at, "by": by.strip(), "reason": reason.strip(), "exclusion": asdict(taken)}
+        append_line(study.reversed_exclusions, json.dumps(record, ensure_ascii=False).encode() + b"\n")
+        write_file(study.exclusions, exclusion_bytes(tuple(row for row in rows if row is not taken)))
+    finally:
+        opening.release()
+    return taken
+
+
+def _refuse_empty(by: str, reason: str, why: str) -> None:
+    for name, text in (("by", by), ("reason", reason)):
+        if not text.strip():
+            raise StoreError(f"--{name} is empty: {why}")
 
 
 def exclusions(folder: Path) -> tuple[Exclusion, ...]:

@@ -3,7 +3,7 @@
 ::
 
     results/<study>/
-      dataset_description.json  exclusions.csv  fingerprints.txt  .psychds-ignore
+      dataset_description.json  exclusions.csv  exclusions_reversed.jsonl  fingerprints.txt  .psychds-ignore
       blinding/key.sealed  blinding/reveals.jsonl
       data/
         study-<study>_description-participants_data.csv
@@ -102,6 +102,11 @@ class StudyFolder:
     def exclusions(self) -> Path:
         """What is left out of the analysis, by whom and why."""
         return self.path / "exclusions.csv"
+
+    @property
+    def reversed_exclusions(self) -> Path:
+        """The exclusions that were taken back, by whom and why."""
+        return self.path / "exclusions_reversed.jsonl"
 
     @property
     def fingerprints(self) -> Path:

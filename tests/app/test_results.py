@@ -17,6 +17,7 @@ from study_app.analysis.orders import Answer, Order, Refused
 from study_app.analysis.worker import carry_out
 from study_app.app.results import ResultsDesk
 from study_app.errors import StudyError
+from study_app.gui.controls import ActionButton
 from study_app.gui.main_window import MainWindow
 from study_app.gui.place import Place
 from study_app.store.blinding import reveals
@@ -148,6 +149,17 @@ def test_leaving_out_changes_foot_figures_and_list(shown: Opened, results: Path)
     assert "fell asleep" in shown.place.exclusions.lines[0].accessibleName()
     assert shown.place.figures.cards[0].figure != before
     assert "1 session is excluded (fell asleep)" in shown.place.figures.cards[0].figure.caption
+
+
+def test_an_exclusion_is_taken_back_from_its_row(shown: Opened, results: Path) -> None:
+    shown.click(shown.place.sessions.rows.lines[1])
+    shown.decide(shown.place.exclusions.leave_out, "AK", "fell asleep")
+    back = shown.place.exclusions.lines[0].findChild(ActionButton)
+    assert back is not None
+    shown.decide(back, "CD", "wrong participant")
+    assert exclusions(results / "demo") == ()
+    assert shown.place.sessions.head.text() == "3 of 3 sessions in the figures"
+    assert not shown.place.exclusions.lines
 
 
 def test_what_the_store_refuses_is_said(shown: Opened, results: Path) -> None:

@@ -3,6 +3,7 @@ from __future__ import annotations
 import codecs
 import csv
 import io
+import json
 import subprocess
 import sys
 from collections.abc import Callable
@@ -14,7 +15,7 @@ from typing import Any
 import pytest
 
 from study_app.errors import StoreError
-from study_app.store.exclusions import Exclusion, exclude, exclusions
+from study_app.store.exclusions import Exclusion, exclude, exclusions, include
 from study_app.store.opening import is_open
 from study_app.store.session import SessionStore
 from study_app.store.verify import verify
@@ -197,3 +198,41 @@ def test_of_two_people_at_once_no_decision_is_lost(tmp_path: Path, start: Callab
         for one in people:
             one.communicate()
     assert sorted(row.participant for row in exclusions(tmp_path / "study")) == sorted(done)
+
+
+def test_an_exclusion_is_taken_back_and_stays_on_record(folder: Path) -> None:
+    kept = exclude(folder, "P008", 1, by="rule 3", reason="withdrew", now=NOW)
+    trial = exclude(folder, "P007", 1, trial=2, by="AB", reason="the phone rang", now=NOW)
+    assert include(folder, "P007", 1, trial=2, by=" CD ", reason="it did not 🌊", now=NOW) == trial
+    assert exclusions(folder) == (kept,)
+    (line,) = (folder / "exclusions_reversed.jsonl").read_text(encoding="utf-8").splitlines()
+    record = json.loads(line)
+    assert (record["by"], record["reason"], record["at"]) == (
+        "CD",
+        "it did not 🌊",
+        exclusions(folder)[0].excluded_at,
+    )
+    assert record["exclusion"]["reason"] == "the phone rang"
+    again = exclude(folder, "P007", 1, trial=2, by="AB", reason="it did", now=NOW)
+    assert exclusions(folder) == (kept, again)
+    found = verify(folder)
+    assert found.sound
+    assert "exclusions_reversed" not in str(found)
+
+
+def test_what_is_not_left_out_cannot_be_taken_back(folder: Path) -> None:
+    exclude(folder, "P007", 1, trial=2, by="AB", reason="the phone rang", now=NOW)
+    before = (folder / "exclusions.csv").read_bytes()
+    with pytest.raises(StoreError, match=r"participant P007, session 1 is not left out; left out: .*trial 2"):
+        include(folder, "P007", 1, by="CD", reason="wrong")
+    with pytest.raises(StoreError, match="--reason is empty"):
+        include(folder, "P007", 1, trial=2, by="CD", reason=" ")
+    assert (folder / "exclusions.csv").read_bytes() == before
+    assert not (folder / "exclusions_reversed.jsonl").exists()
+
+
+def test_a_full_disk_leaves_the_exclusion_as_it_was(folder: Path, files_up_to: FullDisk) -> None:
+    row = exclude(folder, "P008", 1, by="AB", reason="withdrew", now=NOW)
+    with files_up_to(0), pytest.raises(StoreError):
+        include(folder, "P008", 1, by="CD", reason="wrong")
+    assert exclusions(folder) == (row,)

@@ -84,9 +84,13 @@ class SessionsCard(Card):
 
 
 class ExclusionsCard(Card):
-    """What is left out, each with its reason; ``leave_out_asked`` is to leave out more."""
+    """What is left out, each with its reason.
+
+    ``leave_out_asked`` is to leave out more, ``take_back_asked`` carries the `LeftOut` that is to count again.
+    """
 
     leave_out_asked = Signal()
+    take_back_asked = Signal(object)
     list_asked = Signal()
 
     def __init__(self) -> None:
@@ -94,7 +98,6 @@ class ExclusionsCard(Card):
         super().__init__("Left out", self.leave_out, padding=14, gap=6)
         self.none = label("Nothing is left out of the analysis.", "label", "text2", wraps=True)
         self.none.setFont(font("label", weight=400))
-        self.back = label("To take one back, remove its row from exclusions.csv.", "small", "text2", wraps=True)
         self.open = ActionButton("file", "Open the list", role="plain", height=30)
         self.leave_out.clicked.connect(self.leave_out_asked)
         self.open.clicked.connect(self.list_asked)
@@ -108,12 +111,12 @@ class ExclusionsCard(Card):
         self.area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.area.setWidget(inside)
         self.area.setAccessibleName("Left out")
-        self.area.setMinimumHeight(64)
+        self.area.setMinimumHeight(96)
         self.lines: list[QWidget] = []
         self.column.addWidget(self.none)
         self.column.addWidget(self.area, 1)
         foot = QHBoxLayout()
-        foot.addWidget(self.back, 1)
+        foot.addStretch()
         foot.addWidget(self.open)
         self.column.addLayout(foot)
         self.show_left_out(())
@@ -122,18 +125,25 @@ class ExclusionsCard(Card):
         """Show what is left out, the last decision first."""
         for line in self.lines:
             take_away(line)
-        self.lines = [_line(one) for one in reversed(listed)]
+        self.lines = [self._line(one) for one in reversed(listed)]
         for place, line in enumerate(self.lines):
             dress(line, self.theme)
             self._rows.insertWidget(place, line)
         self.none.setVisible(not listed)
-        for part in (self.area, self.back, self.open):
+        for part in (self.area, self.open):
             part.setVisible(bool(listed))
         grows = QSizePolicy.Policy.Preferred if listed else QSizePolicy.Policy.Maximum
         self.setSizePolicy(QSizePolicy.Policy.Preferred, grows)
 
+    def _line(self, one: LeftOut) -> QWidget:
+        """Return one decision with the way to take it back."""
+        back = ActionButton("undo", "Take back …", role="plain", height=30)
+        back.setAccessibleName(f"Take back: {one.what}")
+        back.clicked.connect(lambda: self.take_back_asked.emit(one))
+        return _line(one, back)
 
-def _line(one: LeftOut) -> QWidget:
+
+def _line(one: LeftOut, back: ActionButton) -> QWidget:
     """Return one decision: what, why, who and when."""
     made = QWidget()
     column = QVBoxLayout(made)
@@ -141,7 +151,10 @@ def _line(one: LeftOut) -> QWidget:
     column.setSpacing(0)
     what = label(one.what, "label", wraps=True)
     what.setFont(font("label", weight=600))
-    column.addWidget(what)
+    head = QHBoxLayout()
+    head.addWidget(what, 1)
+    head.addWidget(back)
+    column.addLayout(head)
     why = label(one.reason, "label", "text2", wraps=True)
     why.setFont(font("label", weight=400))
     column.addWidget(why)

@@ -145,6 +145,22 @@ class LeaveOutDialog(Decision):
             self.trial.addItem(f"Trial {number}: {words}", number)
 
 
+class TakeBackDialog(Decision):
+    """Asks who takes an exclusion back and why."""
+
+    def __init__(self, parent: QWidget, theme: Theme, what: str, reason: str) -> None:
+        super().__init__(
+            parent,
+            theme,
+            f"Take back: {what}",
+            f"It was left out with the reason “{reason}”. It will count again in measures, figures and tests. Your "
+            "name, your reason and the time are kept in exclusions_reversed.jsonl.",
+        )
+        self.reason.setPlaceholderText("For example: wrong participant")
+        self.finish("By", "Reason", ActionButton("undo", "Take back", role="primary"))
+        self.by.setFocus()
+
+
 def _line(placeholder: str) -> QLineEdit:
     made = QLineEdit()
     made.setPlaceholderText(placeholder)

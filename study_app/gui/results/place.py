@@ -14,9 +14,9 @@ from study_app.gui.controls import ActionButton, Choice
 from study_app.gui.labels import label
 from study_app.gui.place import Place
 from study_app.gui.results.cards import ExclusionsCard, SessionsCard
-from study_app.gui.results.dialogs import LeaveOutDialog, UnblindDialog
+from study_app.gui.results.dialogs import LeaveOutDialog, TakeBackDialog, UnblindDialog
 from study_app.gui.results.figures import FiguresPanel
-from study_app.gui.results.view import ResultsView
+from study_app.gui.results.view import LeftOut, ResultsView
 from study_app.gui.results.writing import Extra, WriteDialog
 from study_app.gui.theme import font
 from study_app.gui.themed import take_away
@@ -38,8 +38,9 @@ class ResultsPlace(Place):
     """Draws a `ResultsView` and says what is asked for.
 
     Signals: ``entered`` and ``left``; ``study_asked`` (folder); ``remedy_asked`` (a `Remedy`); ``leave_out_asked``
-    (participant, session, trial or None, by, reason); ``unblind_asked`` (by, reason); ``tables_asked`` and
-    ``report_asked`` (folder, extras); ``stop_asked`` (giving up what is being written); ``open_asked`` (path).
+    and ``take_back_asked`` (participant, session, trial or None, by, reason); ``unblind_asked`` (by, reason);
+    ``tables_asked`` and ``report_asked`` (folder, extras); ``stop_asked`` (giving up what is being written);
+    ``open_asked`` (path).
     """
 
     entered = Signal()
@@ -47,6 +48,7 @@ class ResultsPlace(Place):
     study_asked = Signal(object)
     remedy_asked = Signal(str)
     leave_out_asked = Signal(object)
+    take_back_asked = Signal(object)
     unblind_asked = Signal(str, str)
     tables_asked = Signal(object, object)
     report_asked = Signal(object, object)
@@ -83,6 +85,7 @@ class ResultsPlace(Place):
         self.export.clicked.connect(self._ask_tables)
         self.report.clicked.connect(self._ask_report)
         self.exclusions.leave_out_asked.connect(self._ask_leave_out)
+        self.exclusions.take_back_asked.connect(self._ask_take_back)
         self.exclusions.list_asked.connect(lambda: self.open_asked.emit(self.view.exclusions_file))
         self.figures.asked.connect(self._remedy)
 
@@ -214,6 +217,11 @@ class ResultsPlace(Place):
         dialog.accepted.connect(
             lambda: self.leave_out_asked.emit((*dialog.chosen, dialog.by.text(), dialog.reason.text()))
         )
+        self._open(dialog)
+
+    def _ask_take_back(self, one: LeftOut) -> None:
+        dialog = TakeBackDialog(self, self.theme, one.what, one.reason)
+        dialog.accepted.connect(lambda: self.take_back_asked.emit((*one.which, dialog.by.text(), dialog.reason.text())))
         self._open(dialog)
 
     def _ask_tables(self) -> None:

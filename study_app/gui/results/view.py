@@ -60,12 +60,16 @@ class FigureShown:
 
 @dataclass(frozen=True, slots=True)
 class LeftOut:
-    """What is left out of the analysis, by which rule or person, why and when."""
+    """What is left out of the analysis, by which rule or person, why and when.
+
+    ``which`` is participant, session and trial (None: the whole session).
+    """
 
     what: str
     by: str
     reason: str
     at: datetime | None
+    which: tuple[str, int, int | None]
 
 
 @dataclass(frozen=True, slots=True)

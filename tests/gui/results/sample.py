@@ -60,4 +60,4 @@ def view(**changes: Any) -> ResultsView:
     return ResultsView(**(held | changes))
 
 
-LEFT_OUT = LeftOut("P003, trial 4", "AK", "phone rang", datetime(2026, 11, 19, tzinfo=UTC))
+LEFT_OUT = LeftOut("P003, trial 4", "AK", "phone rang", datetime(2026, 11, 19, tzinfo=UTC), ("P003", 1, 4))

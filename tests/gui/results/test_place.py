@@ -10,6 +10,7 @@ import pytest
 from PySide6.QtCore import QEvent, QObject, QPoint, QSize, Qt
 from PySide6.QtWidgets import QApplication, QLabel, QPushButton, QWidget
 
+from study_app.gui.controls import ActionButton
 from study_app.gui.main_window import LEAST, MainWindow
 from study_app.gui.place import Place
 from study_app.gui.results.place import STACKED_BELOW, ResultsPlace
@@ -165,6 +166,21 @@ def test_what_is_left_out_is_listed_the_last_first_with_its_reason(place, qtbot)
     with qtbot.waitSignal(place.open_asked) as asked:
         click(qtbot, place.exclusions.open)
     assert asked.args[0] == STUDY / "exclusions.csv"
+
+
+def test_what_is_left_out_is_taken_back_with_a_name_and_a_reason(place, qtbot):
+    place.show_view(replace(view(), left_out=(LEFT_OUT,)))
+    back = place.exclusions.lines[0].findChild(ActionButton)
+    assert back.accessibleName() == "Take back: P003, trial 4"
+    click(qtbot, back)
+    dialog = place.dialog
+    click(qtbot, dialog.go_on)
+    assert "name" in dialog.missing.text()
+    dialog.by.setText("CD")
+    dialog.reason.setText("wrong trial")
+    with qtbot.waitSignal(place.take_back_asked) as asked:
+        click(qtbot, dialog.go_on)
+    assert asked.args[0] == ("P003", 1, 4, "CD", "wrong trial")
 
 
 def test_choosing_a_study_asks_for_it_and_showing_one_does_not(place, qtbot):

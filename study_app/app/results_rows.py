@@ -1,0 +1,30 @@
+"""What a study's folder tells, as the results window shows it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from datetime import datetime
+
+from study_app.gui.results.view import LeftOut, Opened
+from study_app.store.exclusions import Exclusion
+
+
+def left_out(row: Exclusion) -> LeftOut:
+    """Return a row of ``exclusions.csv``."""
+    name = row.participant if row.session == 1 else f"{row.participant}, session {row.session}"
+    what = name if row.trial is None else f"{name}, trial {row.trial}"
+    return LeftOut(what, row.rule_or_person, row.reason, _time(row.excluded_at), row.what)
+
+
+def opened(reveal: Mapping[str, str]) -> Opened:
+    """Return how the key was opened."""
+    by, reason = str(reveal.get("by", "somebody")), str(reveal.get("reason", "no reason given"))
+    return Opened(_time(reveal.get("at")), by, reason)
+
+
+def _time(told: object) -> datetime | None:
+    """Return a time that a file tells, None where it tells none: people may have changed it."""
+    try:
+        return datetime.fromisoformat(str(told))
+    except ValueError:
+        return None
