@@ -11,7 +11,7 @@ from tests.compiled import needs_servo
 
 FAR = "t_s,x_m,y_m,z_m\n0,0,0,0\n0.001,1e308,0,0\n0.002,-1e308,0,0\n"
 FAST = "t_s,x_m,y_m,z_m,vx_mps,vy_mps,vz_mps\n0,0,0,0,0,0,0\n0.001,0,0,0,1e308,1e308,0\n"
-SIMULATE = ("simulate", "--scene", "rek2024", "--liquid", "water")
+SIMULATE = ("simulate", "rek2024", "--liquid", "water")
 CURRENT = 'current={kind="uniform", velocity_mps=[1e308, 0, 0]}'
 SAMPLE = str(Path(__file__).parents[1] / "results" / "sample-rek2024")
 
@@ -19,15 +19,15 @@ SAMPLE = str(Path(__file__).parents[1] / "results" / "sample-rek2024")
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ((*SIMULATE, "--path", "circle", "--out", ""), "--out': is empty"),
-        ((*SIMULATE, "--path", "circle", "--out", "o.csv", "--set", CURRENT), "velocity_mps: must be less than"),
-        ((*SIMULATE, "--path", "circle", "--out", "o.csv", "--set", f"alpha={'9' * 6000}"), "alpha"),
+        ((*SIMULATE, "--path", "circle", "--to", ""), "--to': is empty"),
+        ((*SIMULATE, "--path", "circle", "--to", "o.csv", "--set", CURRENT), "velocity_mps: must be less than"),
+        ((*SIMULATE, "--path", "circle", "--to", "o.csv", "--set", f"alpha={'9' * 6000}"), "alpha"),
         (("export", SAMPLE, "--to", ""), "--to': is empty"),
         (("rehearse", "demo", "--results", ""), "--results': is empty"),
         (("run", "demo", "--participant", "P001", "--results", ""), "--results': is empty"),
         (("validate-report", "--to", ""), "--to': is empty"),
-        pytest.param((*SIMULATE, "--path", "far.csv", "--out", "o.csv"), "must be finite", marks=needs_servo),
-        pytest.param((*SIMULATE, "--path", "fast.csv", "--out", "o.csv"), "must be finite", marks=needs_servo),
+        pytest.param((*SIMULATE, "--path", "far.csv", "--to", "o.csv"), "must be finite", marks=needs_servo),
+        pytest.param((*SIMULATE, "--path", "fast.csv", "--to", "o.csv"), "must be finite", marks=needs_servo),
     ],
 )
 def test_bad_input_is_one_short_line_and_nothing_is_written(

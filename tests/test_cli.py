@@ -111,7 +111,7 @@ def test_run_refuses_what_it_cannot_use(tmp_path: Path, words: tuple[str, ...], 
 
 def test_simulate_names_the_bad_row_and_writes_nothing(tmp_path: Path) -> None:
     (tmp_path / "path.csv").write_text("t_s,x_m,y_m,z_m\n0,0,0,0\n0.001,0,zero,0\n", encoding="utf-8")
-    words = ("--scene", "rek2024", "--liquid", "water", "--path", "path.csv", "--out", "out.csv")
+    words = ("rek2024", "--liquid", "water", "--path", "path.csv", "--to", "out.csv")
     finished = liquid_study("simulate", *words, cwd=tmp_path)
     assert finished.returncode == 2
     assert "row 2" in finished.stderr or "line 3" in finished.stderr
@@ -120,7 +120,7 @@ def test_simulate_names_the_bad_row_and_writes_nothing(tmp_path: Path) -> None:
 
 
 def test_simulate_names_the_unknown_parameter(tmp_path: Path) -> None:
-    words = ("--scene", "rek2024", "--liquid", "water", "--path", "circle", "--out", "out.csv")
+    words = ("rek2024", "--liquid", "water", "--path", "circle", "--to", "out.csv")
     assert_one_line(
         liquid_study("simulate", *words, "--set", "densitee_kg_m3=1", cwd=tmp_path), "densitee_kg_m3", "density_kg_m3"
     )

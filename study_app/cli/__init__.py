@@ -16,6 +16,7 @@ from study_app.cli import (
     accuracy,
     falcon,
     identify,
+    listing,
     model,
     power,
     report,
@@ -29,18 +30,19 @@ from study_app.cli import (
     validate,
 )
 from study_app.cli.devices import devices
-from study_app.cli.words import EXIT_USER_ERROR
+from study_app.cli.words import EXIT_USER_ERROR, GroupedCommands
 from study_app.errors import StudyError
 
 
-@click.group(invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(cls=GroupedCommands, invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="liquid-study")
 @click.pass_context
 def commands(context: click.Context) -> None:
     """Run, record and analyse studies of how liquids feel.
 
-    Without a command the home window opens. FILE is a protocol or scene file, or the name of a shipped one (rek2024,
-    physical_liquids, demo); RESULTS is a study folder such as results/rek2024, SESSION one of its ses-NN folders.
+    Without a command the home window opens. FILE is a protocol or scene file, or the name of one in the workspace or
+    shipped (rek2024, physical_liquids, demo); RESULTS is a study folder, or its name in the workspace; SESSION is a
+    ses-NN folder, or a name that the command sessions lists.
     """
     if context.invoked_subcommand is None:
         from study_app import app
@@ -50,6 +52,7 @@ def commands(context: click.Context) -> None:
 
 MODULES = (
     running,
+    listing,
     results,
     report,
     validate,

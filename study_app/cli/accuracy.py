@@ -17,7 +17,7 @@ DEFAULT_PATH = "stir"
 
 
 @click.command()
-@click.option("--scene", metavar="FILE", help="Protocol or scene file; default: rek2024 and physical_liquids.")
+@click.argument("scene", metavar="[FILE]", required=False)
 @click.option("--liquid", metavar="NAME", help="Which liquid; default: the thesis' water, and honey by its viscosity.")
 @click.option(
     "--path",
@@ -30,6 +30,7 @@ DEFAULT_PATH = "stir"
 def accuracy(scene: str | None, liquid: str | None, path: str, to: Path | None) -> None:
     """Show what accuracy costs in time: how wrong each model of a liquid is, and how long it takes.
 
+    FILE is a protocol or scene file; default: rek2024 and physical_liquids.
     Wakes are measured against their definition, models of a real liquid against experiments and exact solutions.
     """
     from study_app.evaluation.accuracy.files import markdown

@@ -7,12 +7,12 @@ from pathlib import Path
 import click
 
 from study_app.cli.model import assignment
-from study_app.cli.words import Target
+from study_app.cli.words import SCENE_FILE, Target
 
 
 @click.command()
+@SCENE_FILE
 @click.option("--measured", required=True, type=click.Path(path_type=Path), metavar="CSV", help="Motion and force.")
-@click.option("--scene", required=True, metavar="FILE", help="Protocol or scene file, or the name of a shipped one.")
 @click.option("--liquid", required=True, metavar="NAME", help="Id of the liquid in that file.")
 @click.option("--fit", "names", required=True, metavar="NAMES", help="Parameters, such as drag_coefficient,length.")
 @click.option("--set", "changes", multiple=True, metavar="NAME=VALUE", help="Begin elsewhere, or fix a parameter.")

@@ -6,16 +6,16 @@ from pathlib import Path
 
 import click
 
-from study_app.cli.words import Target
+from study_app.cli.words import SCENE_FILE, Target
 
 
 @click.command()
-@click.option("--scene", required=True, metavar="FILE", help="Protocol or scene file, or the name of a shipped one.")
+@SCENE_FILE
 @click.option("--liquid", required=True, metavar="NAME", help="Id of the liquid in that file.")
 @click.option("--path", required=True, metavar="PATH", help="Motion CSV, or a programmed path: circle, line, stop …")
-@click.option("--out", required=True, type=Target(), metavar="OUT", help="CSV to write.")
+@click.option("--to", required=True, type=Target(), metavar="CSV", help="File to write.")
 @click.option("--set", "changes", multiple=True, metavar="NAME=VALUE", help="Override a parameter; may come again.")
-def simulate(scene: str, liquid: str, path: str, out: Path, changes: tuple[str, ...]) -> None:
+def simulate(scene: str, liquid: str, path: str, to: Path, changes: tuple[str, ...]) -> None:
     """Compute the force along a motion, with the servo's own tick, without a device or a clock.
 
     Every row of the motion is one tick: give rows at the scene's rate (1 kHz unless its rate_hz says otherwise).
@@ -28,8 +28,8 @@ def simulate(scene: str, liquid: str, path: str, out: Path, changes: tuple[str, 
     programmed = path in paths.NAMES or not (Path(path).suffix or Path(path).exists())
     moved = paths.path(path, rate_hz=chosen.rate_hz) if programmed else motion.read(Path(path))
     table = offline.simulate(chosen, moved)
-    motion.write(out, table)
-    click.echo(f"{out}: {len(table)} rows")
+    motion.write(to, table)
+    click.echo(f"{to}: {len(table)} rows")
 
 
 def assignment(change: str) -> tuple[str, str]:
@@ -41,7 +41,7 @@ def assignment(change: str) -> tuple[str, str]:
 
 
 @click.command()
-@click.argument("scene", metavar="FILE")
+@SCENE_FILE
 @click.option("--liquid", metavar="NAME", help="Only this one; default: every liquid of the file.")
 def scene(scene: str, liquid: str | None) -> None:
     """Print which effects a scene calls for, why, the measured cost of each, and how wrong the force is to expect."""

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import click
 
-from study_app.cli.words import EXIT_FOUND, Target
+from study_app.cli.words import EXIT_FOUND, Target, takes_study
 
 
 @click.command()
-@click.argument("results", type=click.Path(path_type=Path))
+@takes_study
 @click.option("--to", type=Target(), required=True, metavar="DIR", help="Where the report goes.")
 def report(results: Path, to: Path) -> None:
     """Write the report of a study: tests, figures, tables, what can be said and what cannot, and how to repeat it.

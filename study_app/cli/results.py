@@ -7,11 +7,11 @@ from pathlib import Path
 
 import click
 
-from study_app.cli.words import EXIT_FOUND, SESSION, Target
+from study_app.cli.words import BY, EXIT_FOUND, Target, takes_session, takes_study
 
 
 @click.command()
-@click.argument("results", type=click.Path(path_type=Path))
+@takes_study
 @click.option("--to", required=True, type=Target(), metavar="DIR", help="Folder to write into.")
 @click.option(
     "--wide", is_flag=True, help="Also the answers with a row a participant, a column a statement and setting."
@@ -35,7 +35,7 @@ def export(results: Path, to: Path, *, wide: bool, parquet: bool, sav: bool, psy
 
 
 @click.command()
-@click.argument("results", type=click.Path(path_type=Path))
+@takes_study
 @click.option("--to", required=True, type=Target(), metavar="DIR", help="Folder to write into.")
 def plot(results: Path, to: Path) -> None:
     """Draw the responses: by code until unblinded, by name after."""
@@ -46,8 +46,8 @@ def plot(results: Path, to: Path) -> None:
 
 
 @click.command()
-@click.argument("results", type=click.Path(path_type=Path))
-@click.option("--by", required=True, metavar="NAME", help="Who opens the key.")
+@takes_study
+@BY
 @click.option("--reason", required=True, metavar="TEXT", help="Why; recorded with the time.")
 def unblind(results: Path, by: str, reason: str) -> None:
     """Open the sealed key of a study, and write the sealed columns; who, when and why are recorded."""
@@ -62,11 +62,11 @@ def unblind(results: Path, by: str, reason: str) -> None:
 
 
 @click.command()
-@click.argument("results", type=click.Path(path_type=Path))
+@takes_study
 @click.option("--participant", required=True, metavar="ID")
 @click.option("--session", type=click.IntRange(1, 99), default=1, show_default=True)
 @click.option("--trial", type=click.IntRange(1), help="Only this trial; default: the whole session.")
-@click.option("--by", required=True, metavar="NAME", help="Who decides, or the rule's name.")
+@BY
 @click.option("--reason", required=True, metavar="TEXT")
 def exclude(results: Path, participant: str, session: int, trial: int | None, by: str, reason: str) -> None:
     """Leave a session or a trial out of the analysis, with a reason; nothing is deleted."""
@@ -77,7 +77,22 @@ def exclude(results: Path, participant: str, session: int, trial: int | None, by
 
 
 @click.command()
-@SESSION
+@takes_study
+@click.option("--participant", required=True, metavar="ID")
+@click.option("--session", type=click.IntRange(1, 99), default=1, show_default=True)
+@click.option("--trial", type=click.IntRange(1), help="Only this trial, if it was left out alone.")
+@BY
+@click.option("--reason", required=True, metavar="TEXT")
+def include(results: Path, participant: str, session: int, trial: int | None, by: str, reason: str) -> None:
+    """Take an exclusion back: the session or trial counts again; who, when and why are recorded."""
+    from study_app.store.exclusions import include as include_in
+    from study_app.store.exclusions import named
+
+    click.echo(f"counts again: {named(include_in(results, participant, session, trial=trial, by=by, reason=reason))}")
+
+
+@click.command()
+@takes_session
 def rebuild(session: Path) -> None:
     """Make a session's tables again from its journal."""
     from study_app.store.rebuild import rebuild as rebuild_session
@@ -94,7 +109,7 @@ def rebuild(session: Path) -> None:
 
 
 @click.command()
-@SESSION
+@takes_session
 def reproduce(session: Path) -> None:
     """Make a session's orders again from its receipt and compare them with those that were run."""
     from study_app.store.reproduced import reproduced
@@ -108,18 +123,18 @@ def reproduce(session: Path) -> None:
 
 
 @click.command()
-@click.argument("folder", type=click.Path(path_type=Path))
+@takes_study
 @click.option(
     "--fingerprints",
     type=click.Path(path_type=Path),
     metavar="FILE",
     help="Compare with a copy of fingerprints.txt kept elsewhere: no session was changed, added or removed since.",
 )
-def verify(folder: Path, fingerprints: Path | None) -> None:
+def verify(results: Path, fingerprints: Path | None) -> None:
     """Check everything in a study's folder: columns, checksums, receipts, journals, key, recordings, Psych-DS."""
     from study_app.store.verify import verify as verify_study
 
-    found = verify_study(folder, fingerprints)
+    found = verify_study(results, fingerprints)
     for kind, findings in (
         ("error", (*found.errors, *found.psychds.errors)),
         ("warning", (*found.warnings, *found.psychds.warnings)),
@@ -134,7 +149,7 @@ def verify(folder: Path, fingerprints: Path | None) -> None:
 
 
 @click.command()
-@SESSION
+@takes_session
 def replay(session: Path) -> None:
     """Compute every force again from the recording, with the same kernel, and name the seconds that differ.
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 from click.core import ParameterSource
 
-from study_app.cli.words import FILE, RESULTS, SESSION, Target
+from study_app.cli.words import FILE, RESULTS, Target, keep_offered_workspace, takes_session
 
 SEED = click.IntRange(0, 2**31 - 1)
 WINDOWED = click.option("--windowed", is_flag=True, help="Show the participant's window in a frame, not full-screen.")
@@ -18,7 +18,7 @@ FIRMWARE = click.option(
     metavar="PATH",
     help="Program of a Falcon that was switched on since it last ran: its owner has the file.",
 )
-OPERATOR = click.option("--operator", default="", metavar="INITIALS", help="Who runs the session.")
+OPERATOR = click.option("--by", "operator", default="", metavar="INITIALS", help="Who runs the session.")
 
 
 @click.command()
@@ -94,6 +94,8 @@ def run(
     """Run a session with a participant, without dialogs."""
     from study_app import app
 
+    if results is None:
+        keep_offered_workspace()
     code = app.run(
         protocol,
         participant=participant,
@@ -130,7 +132,7 @@ def run(
     "--results",
     type=Target(),
     metavar="DIR",
-    help="Study folder; default a new results/<study>-rehearsal-1.",
+    help="Study folder; default: a new results/<study>-rehearsal-1 of the workspace.",
 )
 @click.pass_context
 def rehearse(
@@ -145,6 +147,8 @@ def rehearse(
     results: Path | None,
 ) -> None:
     """Run whole sessions with simulated participants, faster than real time; every row says simulated."""
+    if results is None:
+        keep_offered_workspace()
     if answers_only:
         if context.get_parameter_source("device") is not ParameterSource.DEFAULT:
             raise click.UsageError("--answers-only needs no device: leave out --device")
@@ -167,7 +171,7 @@ def rehearse(
 
 
 @click.command()
-@SESSION
+@takes_session
 @click.option("--protocol", metavar="FILE", help="Its protocol; default: looked for among those at hand.")
 @click.option("--device", metavar="NAME", help="Default: the one it began with.")
 @FIRMWARE

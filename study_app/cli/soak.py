@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 
 
 @click.command()
+@click.argument("protocol", metavar="[FILE]", default="rek2024")
 @click.option("--hours", type=float, required=True, metavar="H", help="How long; 0.01 is 36 seconds.")
 @click.option("--virtual", is_flag=True, help="In virtual time: a day in minutes.")
-@click.option("--protocol", default="rek2024", show_default=True, metavar="FILE", help="Whose liquids are felt.")
 @click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True)
 @click.option("--load", type=LOAD, default="none", help="Paint both windows of a session meanwhile; keep cores busy.")
 @click.option("--to", type=Target(), metavar="DIR", help="Folder to write the report into, too.")
@@ -30,7 +30,7 @@ def soak(
 ) -> None:
     """Run the servo with a restless hand and every fault there is; say what drifted, leaked or broke.
 
-    Ctrl+C ends it with the report so far.
+    FILE holds the liquids; default: rek2024. Ctrl+C ends it with the report so far.
     """
     from study_app.evaluation.output import make_folder
     from study_app.evaluation.soak.run import soak as soak_servo

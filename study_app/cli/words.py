@@ -1,16 +1,39 @@
-"""The arguments, options and exit codes that commands share."""
+"""The arguments, options, groups and exit codes that commands share."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import wraps
 from pathlib import Path
-from typing import Any
+from typing import Any, Final, TypeVar
 
 import click
 
 EXIT_USER_ERROR = 2
 EXIT_FOUND = 3
 
-FILE = click.argument("protocol", metavar="FILE")
+GROUPS: Final = {
+    "Study": "check design power run resume rehearse studies sessions workspace",
+    "Data": "export plot report unblind exclude include verify rebuild reproduce replay",
+    "Model": "scene simulate identify figures",
+    "Evidence": "accuracy stability timing soak cfd validate-report screenshots",
+    "Devices": "devices emulate-falcon",
+}
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+
+class GroupedCommands(click.Group):
+    """Commands that ``--help`` lists under the headings of `GROUPS`."""
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the commands by group."""
+        width = max(map(len, self.commands))
+        for heading, names in GROUPS.items():
+            listed = [(name, self.commands[name]) for name in names.split()]
+            with formatter.section(heading):
+                room = formatter.width - width - 6
+                formatter.write_dl([(name.ljust(width), command.get_short_help_str(room)) for name, command in listed])
 
 
 class Target(click.Path):
@@ -26,10 +49,82 @@ class Target(click.Path):
         return super().convert(value, param, ctx)
 
 
-SESSION = click.argument("session", type=click.Path(path_type=Path))
+FILE = click.argument("protocol", metavar="FILE")
+SCENE_FILE = click.argument("scene", metavar="FILE")
+BY = click.option("--by", required=True, metavar="NAME", help="Who decides: a name, initials, or a rule.")
 RESULTS = click.option(
-    "--results",
-    type=Target(),
-    metavar="DIR",
-    help="Study folder; default results/<study>.",
+    "--results", type=Target(), metavar="DIR", help="Study folder; default: results/<study> of the workspace."
 )
+
+
+def takes_study(function: Command) -> Command:
+    """Give a command RESULTS, or ``--results DIR`` instead; the function gets the study's folder as ``results``."""
+
+    @click.argument("named", metavar="[RESULTS]", required=False)
+    @RESULTS
+    @wraps(function)
+    def run(*words: Any, named: str | None, results: Path | None, **options: Any) -> Any:
+        return function(*words, results=study_at(named, results), **options)
+
+    return run  # type: ignore[return-value]
+
+
+def takes_session(function: Command) -> Command:
+    """Give a command SESSION; the function gets the session's folder as ``session``."""
+
+    @click.argument("session", metavar="SESSION")
+    @RESULTS
+    @wraps(function)
+    def run(*words: Any, session: str, results: Path | None, **options: Any) -> Any:
+        return function(*words, session=session_at(session, results), **options)
+
+    return run  # type: ignore[return-value]
+
+
+def study_at(named: str | None, results: Path | None) -> Path:
+    """Return a study's folder: a path, or the name of one in the workspace.
+
+    Raises
+    ------
+    click.UsageError
+        None is named, or two are.
+    """
+    from study_app.workspace import workspace
+
+    if (named is None) == (results is None):
+        raise click.UsageError("name one study: RESULTS, or --results DIR (liquid-study studies lists them)")
+    if results is not None:
+        return results
+    path = Path(str(named))
+    inside = workspace().results / path
+    return inside if path.name == named and not path.is_dir() and inside.is_dir() else path
+
+
+def session_at(named: str, results: Path | None) -> Path:
+    """Return a session's folder: a path, or STUDY/PARTICIPANT/NUMBER as ``sessions`` lists it (default: number 1).
+
+    With ``results``, a study's folder, the name is PARTICIPANT/NUMBER.
+    """
+    from study_app.store.layout import StudyFolder
+    from study_app.workspace import workspace
+
+    path = Path(named)
+    if path.is_dir() and results is None:
+        return path
+    study, rest = (Path(path.parts[0]), path.parts[1:]) if results is None else (results.absolute(), path.parts)
+    number = rest[1] if len(rest) == 2 else "1"
+    if len(rest) in (1, 2) and number.isdecimal():
+        place = StudyFolder(workspace().results / study).session(rest[0], int(number)).path
+        return place if place.is_dir() else path
+    return path
+
+
+def keep_offered_workspace() -> None:
+    """Make the offered workspace this machine's, and say so, where none was chosen: data are about to go there."""
+    from study_app.store.machine import keep_workspace
+    from study_app.workspace import chosen_workspace, offered_workspace
+
+    if chosen_workspace() is None:
+        offered = offered_workspace()
+        keep_workspace(offered)
+        click.echo(f"workspace of this machine: {offered.folder} (liquid-study workspace DIR changes it)", err=True)

@@ -342,7 +342,7 @@ def test_the_force_of_a_slow_stroke_is_that_of_creeping_flow():
 def test_what_the_command_cannot_do_is_said_in_a_line():
     for words, said in (
         (["--liquid", "watr"], "there are water"),
-        (["--scene", "rek2024"], "say which --liquid of"),
+        (["rek2024"], "say which --liquid of"),
         (["--liquid", "water", "--path", "circl"], "did you mean 'circle'"),
     ):
         refused = CliRunner().invoke(commands, ["accuracy", *words])
@@ -371,7 +371,7 @@ def test_the_command_prints_the_table_of_one_liquid(tmp_path):
     small.write_text("[liquids.gel]\ndensity_kg_m3 = 1000\n", encoding="utf-8")
     rows = "\n".join(f"{k / 1000},{k / 4000},0,0" for k in range(50))
     (tmp_path / "move.csv").write_text(f"t_s,x_m,y_m,z_m\n{rows}\n", encoding="utf-8")
-    told = CliRunner().invoke(commands, ["accuracy", "--scene", str(small), "--path", str(tmp_path / "move.csv")])
+    told = CliRunner().invoke(commands, ["accuracy", str(small), "--path", str(tmp_path / "move.csv")])
     assert told.exit_code == 0, told.output
     assert "gel gives no viscosity" in told.output
     assert "central differences" in told.output

@@ -106,7 +106,6 @@ def test_from_a_file_to_a_preset(tmp_path):
     told = identify(
         "--measured",
         path,
-        "--scene",
         "rek2024",
         "--liquid",
         "honey",
@@ -153,7 +152,7 @@ def test_a_file_that_cannot_be_used_is_one_line(tmp_path, monkeypatch, capsys, t
     path = tmp_path / "measured.csv"
     if text is not None:
         path.write_bytes(text if isinstance(text, bytes) else text.encode())
-    words = ["--measured", str(path), "--scene", "rek2024", "--liquid", "honey", "--fit", "drag_coefficient"]
+    words = ["--measured", str(path), "rek2024", "--liquid", "honey", "--fit", "drag_coefficient"]
     monkeypatch.setattr("sys.argv", ["liquid-study", "identify", *words])
     with pytest.raises(SystemExit) as ended:
         main()

@@ -304,7 +304,7 @@ def test_bad_words_are_one_line(run_soak, words, part):
 
 
 def test_an_unknown_protocol_is_told_before_anything_runs(run_soak):
-    code, said, complaint = run_soak("--hours", "1", "--protocol", "rek2042")
+    code, said, complaint = run_soak("--hours", "1", "rek2042")
     assert (code, said) == (2, "")
     assert 'did you mean "rek2024"' in complaint
 

@@ -1,0 +1,82 @@
+"""The commands that say what is at hand: the workspace, its studies, their sessions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import click
+
+from study_app.cli.words import RESULTS, Target, study_at
+
+STARTED = 16  # letters of a time down to the minute
+
+
+@click.command()
+@click.argument("folder", metavar="[DIR]", required=False, type=Target())
+def workspace(folder: Path | None) -> None:
+    """Print the workspace, the folder of protocols and results of this machine; with DIR, change it."""
+    from study_app.store.machine import keep_workspace
+    from study_app.workspace import WORKSPACE_VARIABLE, Workspace, chosen_workspace
+    from study_app.workspace import workspace as workspace_here
+
+    if folder is not None:
+        keep_workspace(Workspace(folder.absolute()))
+    here = workspace_here()
+    if folder is not None and here.folder.absolute() != folder.absolute():
+        click.echo(f"{WORKSPACE_VARIABLE} names another workspace for this run", err=True)
+    click.echo(here.folder.absolute() if chosen_workspace() else f"{here.folder} (not chosen yet)")
+
+
+@click.command()
+def studies() -> None:
+    """List the protocols at hand, and the studies in the workspace's results."""
+    from study_app.errors import ProtocolError
+    from study_app.protocol.load import at_hand, is_scene_file, load
+    from study_app.store.layout import StudyFolder
+    from study_app.store.machine import recent_protocols
+    from study_app.workspace import workspace as workspace_here
+
+    here = workspace_here()
+    click.echo(f"Protocols in {here.protocols.absolute()}, shipped, and opened last")
+    for name in (*at_hand(), *recent_protocols()):
+        try:
+            if is_scene_file(name):
+                click.echo(f"  {name}  (liquid file)")
+                continue
+            study = load(name)
+            click.echo(f"  {name}  {study.text(study.study.title, study.study.languages[0])}")
+        except ProtocolError as error:
+            click.echo(f"  {name}  cannot be used: {error.problems[0]}")
+    click.echo(f"Studies in {here.results.absolute()}")
+    for folder in _studies(here.results):
+        count = len(StudyFolder(folder).sessions())
+        click.echo(f"  {folder.name}  {count} session{'' if count == 1 else 's'}")
+
+
+@click.command()
+@click.argument("named", metavar="[RESULTS]", required=False)
+@RESULTS
+def sessions(named: str | None, results: Path | None) -> None:
+    """List the sessions of a study, or of every study in the workspace, as commands take them for SESSION."""
+    from study_app.store.exclusions import exclusions
+    from study_app.store.layout import StudyFolder
+    from study_app.store.participants import participants
+    from study_app.workspace import workspace as workspace_here
+
+    at = workspace_here().results
+    folders = list(_studies(at)) if named is None and results is None else [study_at(named, results)]
+    for folder in folders:
+        left_out = {row.what for row in exclusions(folder)}
+        place = folder.name if folder.parent.resolve() == at.resolve() else str(folder / "data")
+        for row in participants(StudyFolder(folder)):
+            who, number = row["participant"], row["session"]
+            name = f"{place}/{who}/{number}" if place == folder.name else f"{place}/sub-{who}/ses-{number:02d}"
+            started = str(row["session_started_at"] or "")[:STARTED].replace("T", " ")
+            mark = "  left out" if (who, number, None) in left_out else ""
+            click.echo(f"{name}  {started}  {row['status']}{mark}")
+
+
+def _studies(results: Path) -> Iterator[Path]:
+    """Yield the studies' folders, sorted."""
+    yield from sorted(path.parent for path in results.glob("*/data") if path.is_dir())
