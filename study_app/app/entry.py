@@ -125,5 +125,5 @@ def resume(
         screen=screen,
         firmware=firmware,
     )
-    check(chosen, load(chosen.source))
+    check(chosen, chosen.read_protocol())
     return hold(chosen, tell)

@@ -33,7 +33,7 @@ from study_app.gui.machine import Machine, open_machine
 from study_app.gui.opening import OpeningWindow
 from study_app.gui.screens import choose_screens, place
 from study_app.gui.theme import LIGHT, Theme
-from study_app.protocol.load import load, parse, source_bytes
+from study_app.protocol.load import parse
 from study_app.protocol.schedule import build_schedule
 from study_app.session.preflight import Check, checks, refused
 from study_app.session.resume import FIRST, resume_at
@@ -154,7 +154,7 @@ class LiveSession(QObject):
         machine: Machine | None = None
         try:
             load_windows()
-            study = load(self.chosen.source)
+            study = self.chosen.read_protocol()
             machine = open_machine(self.chosen, study, tell=self._said.emit, cancelled=lambda: self._closed)
             made: object = Ready(machine, measured(machine, self.chosen, sleep=self._ending.wait))
         except Exception as error:  # noqa: BLE001 - handed over, not swallowed: a thread has nobody to raise it to
@@ -196,7 +196,7 @@ class LiveSession(QObject):
         from study_app.app.preflight import Preflight  # noqa: PLC0415 - pyqtgraph: only once it is needed
 
         shown_on, _ = self._screens()
-        asked = Preflight(self.chosen, load(self.chosen.source), made, shown_on, self.chosen.who, self.theme)
+        asked = Preflight(self.chosen, self.chosen.read_protocol(), made, shown_on, self.chosen.who, self.theme)
         asked.started.connect(lambda ready: self._go_on(lambda: self._open_windows(ready)))
         asked.failed.connect(lambda error: self._go_on(lambda: self._open_windows(error)))
         asked.cancelled.connect(self._cancel)
@@ -211,7 +211,7 @@ class LiveSession(QObject):
         from study_app.gui.session_windows import open_windows  # noqa: PLC0415 - pyqtgraph: only once it is needed
 
         chosen, machine = self.chosen, made.machine
-        source = source_bytes(chosen.source)
+        source = chosen.read_source()
         protocol = parse(source, chosen.source)
         schedule = build_schedule(protocol, chosen.participant, chosen.seed)
         shown_on, operated_on = self._screens()

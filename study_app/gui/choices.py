@@ -5,12 +5,14 @@ from __future__ import annotations
 import secrets
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from study_app.devices import is_simulated, kind_of
 from study_app.errors import StoreError
 from study_app.protocol.load import parse, source_bytes
-from study_app.session.resume import find_protocol
+from study_app.protocol.model import Protocol
+from study_app.session.resume import find_protocol, source_to_resume
 from study_app.store.layout import locate, refuse_never_begun, study_folder
 from study_app.store.progress import progress
 from study_app.store.resume import check_can_go_on
@@ -40,6 +42,14 @@ class NewSession:
     recordings: bool = True
     resumes: Path | None = None
     firmware: Path | None = None
+
+    def read_source(self) -> bytes:
+        """Return the protocol's source; of a session that goes on, with its liquid files as they were sealed."""
+        return source_bytes(self.source) if self.resumes is None else source_to_resume(self.resumes, self.source)
+
+    def read_protocol(self) -> Protocol:
+        """Return the protocol of `read_source`."""
+        return parse(self.read_source(), self.source)
 
     @property
     def who(self) -> str:
@@ -78,8 +88,9 @@ def resumed(
             f"{folder.path} is finished ({done.ended}): it cannot go on; use a new session number for another visit"
         )
     start = done.start
-    chosen = protocol if protocol is not None else find_protocol(start, candidates)
-    source = source_bytes(chosen)
+    read = partial(source_to_resume, session_folder)
+    chosen = protocol if protocol is not None else find_protocol(start, candidates, read)
+    source = read(chosen)
     check_can_go_on(session_folder, parse(source, chosen), source)
     return NewSession(
         source=chosen,

@@ -11,11 +11,22 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict
 
-from study_app.haptics.scene import MAX_LIQUIDS, Liquid, Scene
+from study_app.haptics.scene import MAX_LIQUIDS, Scene
 from study_app.protocol.analysis import decisions
 from study_app.protocol.document import Path, names
 from study_app.protocol.felt import LEAST_N, force_n, numbers, within_tank
-from study_app.protocol.model import Block, Condition, DeviceNeeds, Named, PageText, Reach, SceneDefaults, compared
+from study_app.protocol.model import (
+    Block,
+    Condition,
+    DeviceNeeds,
+    Named,
+    PageText,
+    Reach,
+    SceneDefaults,
+    StudyLiquid,
+    compared,
+    scene_with,
+)
 from study_app.protocol.problems import Fault
 from study_app.protocol.references import alike, items, languages, references, repeats, sequence
 from study_app.protocol.tasks import Task, fastest_stroke
@@ -30,7 +41,7 @@ class Draft(BaseModel):
 
     device: DeviceNeeds | None = None
     scene: SceneDefaults | None = None
-    liquids: Named[Liquid] = {}
+    liquids: Named[StudyLiquid] = {}
     conditions: dict[str, Condition] = {}
     tasks: dict[str, Task] = {}
     pages: dict[str, PageText] = {}
@@ -47,12 +58,7 @@ class Draft(BaseModel):
             or not 0 < len(liquids) == len(set(condition.liquid_ids)) <= MAX_LIQUIDS
         ):
             return None
-        return Scene(
-            **dict(self.scene),
-            rate_hz=self.device.rate_hz,
-            liquids=tuple(liquids),
-            force_limit_n=self.device.force_limit_n,
-        )
+        return scene_with(self.scene, self.device, liquids)
 
 
 def draft(document: Mapping[str, Any], broken: Iterable[Path]) -> Draft:
@@ -74,10 +80,21 @@ def check(document: Mapping[str, Any], broken: Iterable[Path]) -> Iterator[Fault
     for of_names in (references, sequence, repeats, items, alike, languages, decisions):
         yield from of_names(document)
     parts = draft(document, broken)
-    for of_tables in (targets, crowded, outside, unfelt, equal_liquids, equal_conditions):
+    for of_tables in (balls, targets, crowded, outside, unfelt, equal_liquids, equal_conditions):
         yield from of_tables(parts)
     for of_tables in (codes, compares, breaks, counted_parts):
         yield from of_tables(parts)
+
+
+def balls(parts: Draft) -> Iterator[Fault]:
+    """Check that the liquids of a condition have one ball: it is one body that moves through all of them."""
+    if parts.scene is None:
+        return
+    for name, condition in parts.conditions.items():
+        liquids = [parts.liquids[liquid] for liquid in condition.liquid_ids if liquid in parts.liquids]
+        if len({liquid.body_in(parts.scene) for liquid in liquids}) > 1:
+            message = "its liquids have different balls, and one ball moves through all of them"
+            yield Fault(("conditions", name, "liquids"), message, "give them the same body")
 
 
 def targets(parts: Draft) -> Iterator[Fault]:

@@ -6,6 +6,7 @@ import hashlib
 from pathlib import Path
 
 from study_app.errors import Problem, ProtocolError
+from study_app.protocol.liquid_files import with_liquid_files
 from study_app.protocol.problems import did_you_mean
 from study_app.workspace import workspace
 
@@ -54,7 +55,7 @@ def _not_found(name_or_path: str | Path, message: str, hint: str) -> ProtocolErr
 
 
 def source_bytes(name_or_path: str | Path) -> bytes:
-    """Return a protocol's file as it is on disk.
+    """Return a protocol's file as it is on disk, followed by the liquid files it names (see ``liquid_files``).
 
     Raises
     ------
@@ -63,11 +64,11 @@ def source_bytes(name_or_path: str | Path) -> bytes:
     """
     path = find(name_or_path)
     try:
-        return path.read_bytes()
+        return with_liquid_files(path.read_bytes(), path.parent)
     except OSError as error:
         raise _not_found(name_or_path, f"cannot be read: {error.strerror}", "check its permissions") from error
 
 
 def protocol_hash(source: bytes) -> str:
-    """Return the SHA-256 of a protocol's file, in hexadecimal."""
+    """Return the SHA-256 of a protocol's source, in hexadecimal: of its file and the liquid files it names."""
     return hashlib.sha256(source).hexdigest()

@@ -16,6 +16,7 @@ from study_app.haptics.scene import Liquid, RateHz, Scene
 from study_app.protocol.checks import check
 from study_app.protocol.document import entries
 from study_app.protocol.files import at_hand, protocol_hash, shipped, source_bytes
+from study_app.protocol.liquid_files import TABLE
 from study_app.protocol.model import Format, HandForceN, Named, Protocol, SceneDefaults, schema
 from study_app.protocol.places import Places
 from study_app.protocol.problems import Fault, did_you_mean, faults_of
@@ -74,7 +75,9 @@ def parse(source: bytes, name: str) -> Protocol:
         Every problem of the text, with line and hint.
     """
     document, places = _document(source, name)
-    faults = _faults(Protocol, document)
+    document, faults = _with_liquids_of_files(document)
+    broken = [fault.path[:2] for fault in faults]
+    faults += [fault for fault in _faults(Protocol, document) if fault.path[:2] not in broken]
     if not _future_format(document):
         faults += check(document, [fault.path for fault in faults])
     _raise(name, faults, places)
@@ -126,6 +129,58 @@ def is_scene_file(name_or_path: str | Path) -> bool:
     """
     document, _ = _document(source_bytes(name_or_path), str(name_or_path))
     return "liquids" in document and not _holds_study(document)
+
+
+def _with_liquids_of_files(document: dict[str, Any]) -> tuple[dict[str, Any], list[Fault]]:
+    """Return a study's document with the liquids of its liquid files in their places, and what is wrong with these."""
+    liquids = document.get("liquids")
+    named = {name for name, table in liquids.items() if _is_file(table)} if isinstance(liquids, Mapping) else set()
+    if not named or not isinstance(liquids, Mapping):
+        return document, []
+    texts = document.get(TABLE, {})
+    resolved: dict[str, Any] = dict(liquids)
+    faults: list[Fault] = []
+    for name in named:
+        table = liquids[name]
+        faults += [
+            Fault(("liquids", name, key), "belongs into the liquid file", "give file alone")
+            for key in table
+            if key != "file"
+        ]
+        try:
+            resolved[name] = _liquid_of_file(table["file"], texts)
+        except _LiquidFileFault as fault:
+            faults.append(Fault(("liquids", name, "file"), *fault.args))
+            resolved[name] = {"density_kg_m3": 1000.0}  # stands in, so that nothing but the file is reported
+    return {key: value for key, value in document.items() if key != TABLE} | {"liquids": resolved}, faults
+
+
+def _is_file(liquid: Any) -> bool:
+    return isinstance(liquid, Mapping) and "file" in liquid
+
+
+class _LiquidFileFault(Exception):
+    """What is wrong with a liquid file, and a hint."""
+
+
+def _liquid_of_file(file: Any, texts: Mapping[str, str]) -> dict[str, Any]:
+    """Return the one liquid of a liquid file as a study's table, with the file's ball as its own."""
+    if not isinstance(file, str):
+        raise _LiquidFileFault("must be a string", "the path of a liquid file, relative to this file")
+    if file not in texts:
+        raise _LiquidFileFault(
+            f'there is no UTF-8 text file "{file}" beside this file', "give the path of the liquid file"
+        )
+    try:
+        document, places = _document(texts[file].encode(), file)
+        _raise(file, _faults(SceneFile, document), places)
+    except ProtocolError as error:
+        raise _LiquidFileFault(f"{file}: {error.problems[0]}", f"liquid-study check {file}") from error
+    (first, *others) = document["liquids"].values()
+    if others:
+        raise _LiquidFileFault(f"{file} holds {len(others) + 1} liquids", "use one file for each liquid")
+    body = document.get("scene", {}).get("body")
+    return {**first, "body": body} if body else dict(first)
 
 
 def _holds_study(document: Mapping[str, Any]) -> bool:

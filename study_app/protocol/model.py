@@ -10,10 +10,18 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Annotated, Any, Literal, Self, TypeAlias, TypeVar
 
-from pydantic import BaseModel, BeforeValidator, Field, model_validator
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    SerializerFunctionWrapHandler,
+    model_serializer,
+    model_validator,
+)
 from pydantic_core import PydanticCustomError
 
-from study_app.haptics.ranges import Metres, within
+from study_app.haptics.ranges import DensityKgM3, DiameterM, DragCoefficient, Metres, within
 from study_app.haptics.scene import Accuracy, Body, Estimator, Ewma, Knee, Liquid, MotionBox, Scene, SceneScale
 from study_app.protocol.analysis import Analysis
 from study_app.protocol.blocks import Block, Compared
@@ -42,6 +50,7 @@ __all__ = [
 ]
 
 MAX_FORCE_N = 8.0
+LIQUID_FILE = "A liquid file with one liquid, in place of the keys of this table: its path, relative to this file."
 HandForceN: TypeAlias = Annotated[
     float, within(0.1, MAX_FORCE_N, "below 0.1 N a hand feels little; 8 N is the most that is safe")
 ]
@@ -186,6 +195,48 @@ class Limits(Table):
     )
 
 
+class OwnBody(Table):
+    """The ball in one liquid: what is left out is as in the scene's body."""
+
+    diameter_m: DiameterM | None = None
+    drag_coefficient: DragCoefficient | None = None
+    density_kg_m3: DensityKgM3 | None = None
+
+
+class StudyLiquid(Liquid):
+    """A liquid of a study: that of the force model, and where it needs one a ball of its own."""
+
+    model_config = ConfigDict(title="Liquid")
+
+    body: OwnBody | None = Field(default=None, description="The ball in this liquid, where it is not the scene's.")
+
+    @model_serializer(mode="wrap")
+    def _without_no_body(self, serialized: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave out what earlier versions did not know: sealed keys keep their bytes."""
+        return {name: value for name, value in serialized(self).items() if name != "body" or value is not None}
+
+    @property
+    def alone(self) -> Liquid:
+        """The liquid without its ball."""
+        return Liquid.model_validate(self.model_dump(exclude={"body"}))
+
+    def body_in(self, scene: SceneDefaults) -> Body:
+        """Return the ball in this liquid."""
+        return (
+            scene.body if self.body is None else scene.body.model_copy(update=self.body.model_dump(exclude_none=True))
+        )
+
+
+def scene_with(scene: SceneDefaults, device: DeviceNeeds, liquids: Sequence[StudyLiquid]) -> Scene:
+    """Return a scene of some liquids; they have one ball (`checks.balls`)."""
+    return Scene(
+        **dict(scene) | {"body": liquids[0].body_in(scene)},
+        rate_hz=device.rate_hz,
+        liquids=tuple(liquid.alone for liquid in liquids),
+        force_limit_n=device.force_limit_n,
+    )
+
+
 T = TypeVar("T")
 
 
@@ -206,7 +257,7 @@ class Protocol(Table):
     study: StudyHead
     device: DeviceNeeds
     scene: SceneDefaults = Field(default_factory=SceneDefaults)
-    liquids: Named[Liquid] = Field(min_length=1)
+    liquids: Named[StudyLiquid] = Field(min_length=1)
     conditions: dict[Id, Condition] = Field(min_length=1)
     tasks: dict[Id, Task] = Field(min_length=1)
     scales: dict[Id, Scale] = Field(default_factory=dict)
@@ -262,12 +313,7 @@ class Protocol(Table):
 
     def scene_of(self, *liquid_ids: str) -> Scene:
         """Return a scene of some of the liquids, those of no condition too."""
-        return Scene(
-            **dict(self.scene),
-            rate_hz=self.device.rate_hz,
-            liquids=tuple(self.liquids[name] for name in liquid_ids),
-            force_limit_n=self.device.force_limit_n,
-        )
+        return scene_with(self.scene, self.device, [self.liquids[name] for name in liquid_ids])
 
     def delay_s(self, condition_id: str) -> float:
         """Return by how much everything drawn in the tank is late [s]."""
@@ -294,4 +340,7 @@ def schema(of: type[BaseModel] = Protocol) -> dict[str, Any]:
             if part.get("title") == table:
                 part["properties"].pop("id")
                 part["required"].remove("id")
+                if "body" in part["properties"]:  # a liquid of a study may be that of a file instead
+                    part["properties"]["file"] = {"type": "string", "description": LIQUID_FILE}
+                    part["anyOf"] = [{"required": part.pop("required")}, {"required": ["file"]}]
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **described}

@@ -71,7 +71,7 @@ def _task_page(state: SessionState, trial: Trial) -> TaskPage:
         instruction=_text(state, task.instruction),
         task=task,
         workspace_m=protocol.device.workspace_m,
-        body_radius_m=protocol.scene.body.diameter_m / 2 / protocol.scene.scale,
+        body_radius_m=protocol.scene_for(state.plan.condition(trial)).body.diameter_m / 2 / protocol.scene.scale,
         progress=_progress(state, trial),
     )
 

@@ -13,6 +13,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from datetime import datetime
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -32,7 +33,7 @@ from study_app.protocol.schedule import Schedule, build_schedule, stream
 from study_app.session.events import Begin, Chosen, Continue, Event, ItemShown, ResumeAsked, Submitted
 from study_app.session.pages import Page, PausePage, QuestionnairePage, TaskPage, TextPage
 from study_app.session.ports import KeptSession, Ports
-from study_app.session.resume import FIRST, REHEARSED_SCREENS, Start, find_protocol, resume_at
+from study_app.session.resume import FIRST, REHEARSED_SCREENS, Start, find_protocol, resume_at, source_to_resume
 from study_app.session.runner import Runner
 from study_app.session.simulated import Draw, Explorer, Reacher, Senses, filled_in, reading_s
 from study_app.session.trial import TankView
@@ -138,8 +139,9 @@ def resume(session_folder: Path, *, protocol: str | Path | None = None) -> None:
     """
     lines = journal.read(locate(session_folder)[1].journal)
     begun = progress_of(lines).start
-    name = find_protocol(begun) if protocol is None else str(protocol)
-    source = source_bytes(name)
+    read = partial(source_to_resume, session_folder)
+    name = find_protocol(begun, read=read) if protocol is None else str(protocol)
+    source = read(name)
     study = parse(source, name)
     person, seed = begun["participant"], begun["seed"]
     with Machine(study, person, seed, begun["device"]) as machine:

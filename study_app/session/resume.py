@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from study_app.errors import ProtocolError, SessionError
@@ -14,6 +15,7 @@ from study_app.protocol.schedule import PageStep, Schedule, Step, Trial
 from study_app.store.journal import Line
 from study_app.store.machine import recent_protocols
 from study_app.store.progress import Progress, attempts, progress_of
+from study_app.store.resume import sealed_source
 
 REHEARSED_SCREENS: dict[str, Any] = {"participant": "simulated", "refresh_hz": 60}
 
@@ -57,11 +59,27 @@ def is_rehearsal(session_receipt: Mapping[str, Any]) -> bool:
     return bool(session_receipt.get("screens") == REHEARSED_SCREENS)
 
 
-def find_protocol(start: Line, candidates: Iterable[str] | None = None) -> str:
+def source_to_resume(session_folder: Path, name: str) -> bytes:
+    """Return the source of a protocol to go on with a session: with the liquid files as they were sealed.
+
+    Raises
+    ------
+    ProtocolError
+        There is no such file.
+    StoreError
+        It is no session's folder.
+    """
+    return sealed_source(session_folder, source_bytes(name))
+
+
+def find_protocol(
+    start: Line, candidates: Iterable[str] | None = None, read: Callable[[str], bytes] = source_bytes
+) -> str:
     """Return the file or name of the protocol that a session began with, from its journal's first line.
 
     Parameters
     ----------
+    read : what reads a candidate: `source_to_resume` of a session
     candidates : where to look: files or names; by default those in the workspace, those that ship, and recent ones
 
     Raises
@@ -73,7 +91,7 @@ def find_protocol(start: Line, candidates: Iterable[str] | None = None) -> str:
     sources: dict[str, bytes] = {}
     for name in names:
         with contextlib.suppress(ProtocolError):  # a file that cannot be read is no study's
-            sources[name] = source_bytes(name)
+            sources[name] = read(name)
     for name, source in sources.items():
         if protocol_hash(source) == start["protocol_hash"]:
             return name

@@ -14,11 +14,12 @@ import contextlib
 import hashlib
 import json
 import secrets
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
-from typing import Any, Literal, TypeAlias
+from types import MappingProxyType
+from typing import Any, Final, Literal, TypeAlias
 
 from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
@@ -31,6 +32,7 @@ from study_app.store.parsing import parse_json
 
 Codes: TypeAlias = dict[str, dict[str, str]]
 
+NO_FILES: Final[Mapping[str, str]] = MappingProxyType({})
 _FORMAT = 1
 _NONCE_BYTES = 32
 
@@ -39,7 +41,8 @@ _NONCE_BYTES = 32
 class Key:
     """The opened key. Never print, log or show what it holds before it was revealed.
 
-    ``codes`` is block → code → condition id; ``tables`` holds the protocol's tables ``conditions`` and ``liquids``;
+    ``codes`` is block → code → condition id; ``tables`` holds the protocol's tables ``conditions`` and ``liquids``,
+    ``files`` the texts of its liquid files by their names;
     ``drawn`` says where its randomness came from; ``hash`` is the SHA-256 of the sealed file; ``nonce`` is as secret as
     the codes.
     """
@@ -50,6 +53,7 @@ class Key:
     tables: dict[str, Any] = field(repr=False)
     tables_hash: str = field(repr=False)
     nonce: bytes = field(repr=False)
+    files: dict[str, str] = field(repr=False, default_factory=dict)
 
     def condition(self, block: str, code: str) -> str:
         """Return the id of the condition that ``code`` of ``block`` stands for."""
@@ -78,7 +82,12 @@ def sealed_hash(folder: Path) -> str | None:
         return None
 
 
-def open_or_draw_key(folder: Path, protocol: Protocol, random: Callable[[], float] | None = None) -> Key:
+def open_or_draw_key(
+    folder: Path,
+    protocol: Protocol,
+    random: Callable[[], float] | None = None,
+    files: Mapping[str, str] = NO_FILES,
+) -> Key:
     """Return the study's key; draw and seal it where there is none.
 
     Of two programs that start at once one draws, and the other reads what the first drew.
@@ -89,6 +98,8 @@ def open_or_draw_key(folder: Path, protocol: Protocol, random: Callable[[], floa
         The study folder.
     random : callable, optional
         Uniform numbers in [0, 1): a seeded stream's for a rehearsal. By default the operating system's randomness.
+    files : mapping of str to str
+        The texts of the protocol's liquid files by their names.
 
     Raises
     ------
@@ -100,7 +111,7 @@ def open_or_draw_key(folder: Path, protocol: Protocol, random: Callable[[], floa
     drawn: Literal["system", "seed"] = "system" if random is None else "seed"
     if not is_there(study.key):
         _refuse_if_lost(study)
-        content = _seal(protocol, drawn, random or secrets.SystemRandom().random)
+        content = _seal(protocol, drawn, random or secrets.SystemRandom().random, files)
         create_folder(study.blinding, {study.key.name: content}, mode=0o600)
     key = _verified_key(study)
     if key.drawn != drawn:
@@ -209,8 +220,8 @@ def _is_reveal(record: object) -> bool:
     )
 
 
-def _seal(protocol: Protocol, drawn: str, random: Callable[[], float]) -> bytes:
-    content = {
+def _seal(protocol: Protocol, drawn: str, random: Callable[[], float], files: Mapping[str, str]) -> bytes:
+    content: dict[str, Any] = {
         "format": _FORMAT,
         "drawn": drawn,
         "nonce": bytes(int(random() * 256) for _ in range(_NONCE_BYTES)).hex(),
@@ -218,6 +229,8 @@ def _seal(protocol: Protocol, drawn: str, random: Callable[[], float]) -> bytes:
         "tables": protocol.model_dump(mode="json", include={"conditions", "liquids"}),
         "tables_hash": _tables_hash(protocol),
     }
+    if files:
+        content["files"] = dict(files)
     return base64.encodebytes(json.dumps(content, ensure_ascii=False).encode())
 
 
@@ -280,6 +293,7 @@ def read_key(folder: Path) -> Key:
             tables=content["tables"],
             tables_hash=content["tables_hash"],
             nonce=bytes.fromhex(content["nonce"]),
+            files=content.get("files", {}),
         )
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise StoreError(f"{path} is no sealed key any more: restore it from a copy") from error
@@ -292,6 +306,7 @@ def _check_content(content: dict[str, Any]) -> None:
         content["drawn"] not in ("system", "seed")
         or not all(map(_is_texts, content["codes"].values()))
         or not isinstance(content["tables"]["liquids"], dict)
+        or not _is_texts(content.get("files", {}))
         or not all(isinstance(condition["delay_ms"], int | float) for condition in conditions)
     ):
         raise ValueError("its codes or conditions are none")

@@ -14,12 +14,13 @@ from typing import Any
 import study_app
 from study_app.errors import StoreError
 from study_app.protocol.diff import CONDITIONS_DIFFER, differences
+from study_app.protocol.liquid_files import bundled, unbundled
 from study_app.protocol.load import protocol_hash
 from study_app.protocol.model import Protocol
 from study_app.protocol.schedule import stream
 from study_app.store import journal, receipt
 from study_app.store.atomic import is_there, sweep
-from study_app.store.blinding import Key, open_or_draw_key, same_conditions
+from study_app.store.blinding import Key, open_or_draw_key, read_key, same_conditions
 from study_app.store.checksums import sha256
 from study_app.store.clock import SessionClock
 from study_app.store.cut_journal import refuse_if_cut
@@ -118,6 +119,22 @@ def check_can_go_on(session_folder: Path, protocol: Protocol, source: bytes) -> 
     refuse_never_begun(folder)
     refuse_if_open(folder.path)
     _left(study_folder, folder, protocol, source)
+
+
+def sealed_source(session_folder: Path, source: bytes) -> bytes:
+    """Return a protocol's source with the liquid files as they were sealed with the key of a session's study.
+
+    Raises
+    ------
+    StoreError
+        It is no session's folder.
+    """
+    study_folder, _ = locate(session_folder)
+    try:
+        files = read_key(study_folder.path).files
+    except StoreError:  # `reopen` says so
+        return source
+    return bundled(unbundled(source)[0], files.get) if files else source
 
 
 @dataclass(frozen=True, slots=True)

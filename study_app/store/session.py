@@ -10,6 +10,7 @@ from typing import Any
 
 import study_app
 from study_app.errors import StoreError
+from study_app.protocol.liquid_files import unbundled
 from study_app.protocol.load import protocol_hash
 from study_app.protocol.model import Protocol
 from study_app.protocol.schedule import stream
@@ -75,7 +76,9 @@ def begin(
     check_unused(study_folder, participant, session)
     clock = clock if clock is not None else SessionClock()
     make_folder(study_folder.path)
-    key = open_or_draw_key(study_folder.path, protocol, stream(seed, "blinding").random if simulated else None)
+    key = open_or_draw_key(
+        study_folder.path, protocol, stream(seed, "blinding").random if simulated else None, unbundled(source)[1]
+    )
     place = Place(study_folder, study_folder.session(participant, session), protocol.study.name)
     started, first_receipt = first_words(
         protocol,

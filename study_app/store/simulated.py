@@ -14,6 +14,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+from study_app.protocol.liquid_files import unbundled
 from study_app.protocol.model import Protocol
 from study_app.protocol.schedule import stream
 from study_app.store import tables
@@ -70,7 +71,7 @@ class SimulatedStudy:
             if self.folder.data.exists():
                 check_unused(self.folder, person, 1)
         make_folder(self.folder.path)
-        self.key = open_or_draw_key(self.folder.path, protocol, stream(seed, "blinding").random)
+        self.key = open_or_draw_key(self.folder.path, protocol, stream(seed, "blinding").random, unbundled(source)[1])
         self.protocol = protocol
         self._rows: dict[Path, tables.Row] = {}
         self._opening: Opening | None = None

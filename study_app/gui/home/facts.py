@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import datetime
+from functools import partial
 from pathlib import Path
 
 from study_app.errors import ProtocolError, StudyError
@@ -13,7 +14,7 @@ from study_app.protocol.describe import expected_duration_s
 from study_app.protocol.load import at_hand, is_scene_file, load
 from study_app.protocol.model import Protocol
 from study_app.protocol.schedule import PageStep, Schedule, build_schedule
-from study_app.session.resume import find_protocol, is_rehearsal, resume_at
+from study_app.session.resume import find_protocol, is_rehearsal, resume_at, source_to_resume
 from study_app.store import journal, receipt
 from study_app.store.layout import locate
 from study_app.store.machine import recent_protocols
@@ -114,7 +115,9 @@ def interrupted(found: Iterable[SessionFacts], studies: Iterable[StudyFacts], no
             lines = journal.read(folder.journal)
             begun = progress_of(lines)
             schedule = build_schedule(study.protocol, session.participant, begun.start["seed"])
-            source = find_protocol(begun.start, [facts.source for facts in studies])
+            source = find_protocol(
+                begun.start, [facts.source for facts in studies], partial(source_to_resume, session.folder)
+            )
             step = resume_at(study.protocol, schedule, lines).step
         except StudyError:
             continue  # what is wrong with it is said when it is asked for by its folder

@@ -1,0 +1,182 @@
+"""Liquid files: a study's hash covers them, their values are sealed, and resume and replay use the sealed ones."""
+
+from __future__ import annotations
+
+import hashlib
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from study_app.errors import ProtocolError, StoreError
+from study_app.evaluation.replay import replay
+from study_app.gui.choices import resumed
+from study_app.protocol.describe import describe
+from study_app.protocol.liquid_files import unbundled
+from study_app.protocol.load import load, load_scenes, parse, protocol_hash, source_bytes
+from study_app.protocol.model import schema
+from study_app.protocol.schedule import stream
+from study_app.session import rehearsal
+from study_app.store.blinding import open_or_draw_key, read_key
+from study_app.store.layout import StudyFolder
+from study_app.store.open_session import SessionStore
+from study_app.store.session import begin
+from study_app.store.verify import verify
+from tests.compiled import needs_servo
+
+EARLIER = Path(__file__).parents[1] / "store" / "earlier_format"
+THICK = '[liquids.thick]\ndensity_kg_m3 = 1400\neffects = ["drag"]\n'
+SYRUP = """format = 1
+
+[scene]
+scale = 3
+
+[scene.body]
+diameter_m = 0.068
+drag_coefficient = 1.25
+
+[liquids.from_the_lab]
+density_kg_m3 = 1387.25
+effects = ["drag"]
+"""
+
+
+@pytest.fixture
+def study(tmp_path: Path) -> Path:
+    """Return demo as a study of its own whose thick liquid is a file's."""
+    text = source_bytes("demo").decode()
+    assert THICK in text
+    path = tmp_path / "mine.toml"
+    path.write_text(text.replace(THICK, '[liquids.thick]\nfile = "liquids/syrup.toml"\n'), encoding="utf-8")
+    (tmp_path / "liquids").mkdir()
+    (tmp_path / "liquids" / "syrup.toml").write_text(SYRUP, encoding="utf-8")
+    return path
+
+
+def test_a_liquid_of_a_file_is_felt_with_its_own_ball_and_the_studys_scale(study: Path) -> None:
+    protocol = load(study)
+    scene = protocol.scene_for("thick")
+    assert (scene.liquids[0].id, scene.liquids[0].density_kg_m3) == ("thick", 1387.25)
+    assert (scene.body.drag_coefficient, scene.scale) == (1.25, 10)
+    assert protocol.scene_for("thin") == load("demo").scene_for("thin")
+    assert load_scenes(study)["thick"] == scene
+    assert "thick" in describe(protocol)
+
+
+def test_the_hash_covers_the_liquid_files_and_nothing_else_changes_it(study: Path) -> None:
+    source = source_bytes(study)
+    assert unbundled(source) == (study.read_bytes(), {"liquids/syrup.toml": SYRUP})
+    syrup = study.parent / "liquids" / "syrup.toml"
+    syrup.write_bytes(SYRUP.encode() + b"# \x7f \xf0\x9f\x8c\x8a \\ \" '''\r\n")
+    assert protocol_hash(source_bytes(study)) != protocol_hash(source)
+    assert unbundled(source_bytes(study))[1]["liquids/syrup.toml"].encode() == syrup.read_bytes()
+    syrup.write_text(SYRUP)
+    assert source_bytes(study) == source
+
+
+@pytest.mark.parametrize("name", ["demo", "rek2024", "physical_liquids", str(EARLIER / "rek2024.toml")])
+def test_a_file_without_liquid_files_is_its_own_source(name: str) -> None:
+    source = source_bytes(name)
+    assert unbundled(source) == (source, {})
+    assert b"liquid_files" not in source
+    assert protocol_hash(source) == hashlib.sha256(source).hexdigest()
+
+
+def test_the_key_of_an_earlier_study_is_drawn_and_sealed_to_the_byte(tmp_path: Path) -> None:
+    protocol = load(EARLIER / "rek2024.toml")
+    open_or_draw_key(tmp_path, protocol, stream(1, "blinding").random)
+    assert StudyFolder(tmp_path).key.read_bytes() == StudyFolder(EARLIER / "results").key.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("table", "file", "said"),
+    [
+        ('file = "gone.toml"', SYRUP, 'no UTF-8 text file "gone.toml"'),
+        ("file = 3", SYRUP, "must be a string"),
+        ('file = "liquids/syrup.toml"\ndensity_kg_m3 = 1', SYRUP, "liquids.thick.density_kg_m3"),
+        ('file = "liquids/syrup.toml"', SYRUP.replace("1387.25", "0"), "density_kg_m3: is 0, must be"),
+        ('file = "liquids/syrup.toml"', SYRUP + "\n[liquids.more]\ndensity_kg_m3 = 1000\n", "holds 2 liquids"),
+        ('file = "liquids/syrup.toml"', "format = 1\n[liquids", "not TOML"),
+        ('file = "liquids/syrup.toml"', SYRUP.replace("[liquids.from", "[study]\n[liquids.from"), "study"),
+    ],
+)
+def test_what_is_wrong_with_a_liquid_file_is_one_problem_at_its_line(
+    study: Path, table: str, file: str, said: str
+) -> None:
+    study.write_text(study.read_text().replace('file = "liquids/syrup.toml"', table), encoding="utf-8")
+    (study.parent / "liquids" / "syrup.toml").write_text(file, encoding="utf-8")
+    with pytest.raises(ProtocolError) as refused:
+        load(study)
+    (problem,) = refused.value.problems
+    assert said in str(problem)
+    lines = study.read_text().splitlines()
+    assert problem.line is not None
+    assert lines[problem.line - 1].split(" = ")[0] in ("file", "density_kg_m3")
+
+
+def test_liquids_of_one_condition_have_one_ball(study: Path) -> None:
+    both = '[conditions.thick]\nliquids = ["thin", "thick"]'
+    study.write_text(study.read_text().replace('[conditions.thick]\nliquid = "thick"', both), encoding="utf-8")
+    with pytest.raises(ProtocolError, match="different balls"):
+        load(study)
+
+
+def test_a_drag_coefficient_may_be_a_liquids_own_and_the_rest_the_scenes() -> None:
+    text = source_bytes("demo").decode().replace(THICK, THICK + "[liquids.thick.body]\ndrag_coefficient = 0.9\n")
+    protocol = parse(text.encode(), "it")
+    body, scenes = protocol.scene_for("thick").body, protocol.scene.body
+    assert (body.drag_coefficient, body.diameter_m) == (0.9, scenes.diameter_m)
+    assert protocol.scene_for("thin").body == scenes
+
+
+def test_editors_are_told_of_file() -> None:
+    liquid = schema()["$defs"]["StudyLiquid"]
+    assert "file" in liquid["properties"]
+    assert {"required": ["file"]} in liquid["anyOf"]
+
+
+@needs_servo
+def test_values_are_sealed_and_a_replay_needs_no_file(study: Path, tmp_path: Path) -> None:
+    folder = rehearsal.rehearse(str(study), participants=1, seed=3, results=tmp_path / "results")
+    key = read_key(folder)
+    assert key.tables["liquids"]["thick"]["density_kg_m3"] == 1387.25
+    assert key.files == {"liquids/syrup.toml": SYRUP}
+    for path in folder.rglob("*"):
+        if path.is_file() and path.suffix != ".parquet":
+            assert b"1387.25" not in path.read_bytes(), path
+    (tmp_path / "liquids" / "syrup.toml").unlink()
+    assert replay(StudyFolder(folder).session("P001", 1).path).proved
+    assert verify(folder).sound
+
+
+@needs_servo
+@pytest.mark.parametrize("becomes", [None, SYRUP.replace("1387.25", "1100")])
+def test_an_interrupted_session_goes_on_with_the_sealed_liquid(
+    study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, becomes: str | None
+) -> None:
+    kept, answered = SessionStore.append, count(1)
+
+    def interrupted(self: SessionStore, event: str, **fields: Any) -> None:
+        if event == "responses" and next(answered) == 2:
+            raise KeyboardInterrupt
+        kept(self, event, **fields)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(SessionStore, "append", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            rehearsal.rehearse(str(study), participants=1, seed=3, results=tmp_path / "results")
+    session = StudyFolder(tmp_path / "results").session("P001", 1).path
+    syrup = tmp_path / "liquids" / "syrup.toml"
+    syrup.unlink() if becomes is None else syrup.write_text(becomes)
+    chosen = resumed(session, protocol=str(study))
+    assert chosen.read_protocol().liquids["thick"].density_kg_m3 == 1387.25
+    assert resumed(session, candidates=["demo", str(study)]).source == str(study)
+    rehearsal.resume(session, protocol=str(study))
+    assert replay(session).proved
+    if becomes is not None:
+        with pytest.raises(StoreError, match="other conditions"):
+            begin(
+                tmp_path / "results", load(study), source_bytes(study), "P002", seed=3, operator="", language="en",
+                device={}, screens={}, simulated=True,
+            )  # fmt: skip
