@@ -12,13 +12,13 @@ import random
 import sys
 import traceback
 from collections.abc import Callable
-from functools import wraps
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Concatenate, Final, ParamSpec
+from typing import TYPE_CHECKING, Any, Final
 
 from PySide6.QtCore import QObject, Qt, QTimer
 
+from study_app.app.guarded import guarded
 from study_app.app.lab_opening import LabOpening
 from study_app.app.lab_prices import AsksPrice, Prices
 from study_app.app.lab_rows import cost_rows, device_choices, error_rows, title_of
@@ -27,7 +27,7 @@ from study_app.errors import StudyError
 from study_app.evaluation.appraiser import Appraiser
 from study_app.gui.lab.place import LabPlace
 from study_app.gui.lab.view import DeviceShown, LabView, Now
-from study_app.lab.presets import Choice, liquids_at_hand, spoken
+from study_app.lab.presets import Choice, spoken
 from study_app.lab.programmes import TITLES
 from study_app.lab.workbench import Chance, Setting, Side, Workbench
 
@@ -39,7 +39,6 @@ APPRAISE_AFTER_MS: Final = 300
 FIRST_A: Final = Choice("rek2024", "water", "Water")
 FIRST_B: Final = Choice("rek2024", "light_oil", "Light oil")
 log = logging.getLogger(__name__)
-P = ParamSpec("P")
 
 
 def compose_lab(place: LabPlace, *, device: str = "mouse", firmware: Path | None = None) -> LabVisit:
@@ -48,19 +47,6 @@ def compose_lab(place: LabPlace, *, device: str = "mouse", firmware: Path | None
     ``device`` is the one it begins with, ``firmware`` the file of a Falcon's program.
     """
     return LabVisit(place, device=device, firmware=firmware)
-
-
-def _guarded(slot: Callable[Concatenate[LabVisit, P], None]) -> Callable[Concatenate[LabVisit, P], None]:
-    """Let no exception leave a slot: whatever it is ends in zero force."""
-
-    @wraps(slot)
-    def run(self: LabVisit, /, *arguments: P.args, **named: P.kwargs) -> None:
-        try:
-            slot(self, *arguments, **named)
-        except Exception as error:  # noqa: BLE001 - whatever it is, the hand comes first
-            self.fail(error)
-
-    return run
 
 
 class LabVisit(QObject):
@@ -89,7 +75,6 @@ class LabVisit(QObject):
         self.live: Live | None = None
         self.device = device
         self.bench = Workbench(FIRST_A.setting(), FIRST_B.setting())
-        self.liquids = liquids_at_hand()
         self.trouble = ""
         self._refused: tuple[str, str] | None = None
         self._entered = False
@@ -132,13 +117,19 @@ class LabVisit(QObject):
             (place.hand_moved, self._point),
             (place.hand_pressed, self._press),
             (place.save_asked, self._save),
+            (place.preset_opened, self._open_preset),
+            (place.use_asked, self._use),
             (opening.opened, self._begin),
             (opening.failed, self._could_not_open),
             (opening.said, self._say),
-            (saving.saved, self._offer),
             (saving.failed, self._could_not_save),
         ):
             signal.connect(slot)
+
+    @property
+    def liquids(self) -> tuple[Choice, ...]:
+        """The liquids that a side can be set to."""
+        return self._saving.liquids
 
     def leave(self) -> None:
         """Let go of the hand: zero force, the servo's end, the device; then of everything else."""
@@ -214,10 +205,11 @@ class LabVisit(QObject):
             busy="" if busy is None else self._said or f"Opening {title_of(busy)}",
             trouble=self.trouble or fault,
             refused=self._refused,
+            said=self._saving.said,
             **shown,
         )
 
-    @_guarded
+    @guarded
     def _enter(self) -> None:
         if self._entered:
             return
@@ -226,7 +218,7 @@ class LabVisit(QObject):
         self._frames.start()
         self._open(self.device)
 
-    @_guarded
+    @guarded
     def _frame(self) -> None:
         """Look at the servo, load what waited, and show it all."""
         if self.live is not None:
@@ -237,14 +229,14 @@ class LabVisit(QObject):
     def _show(self) -> None:
         self.place.show_view(self.view())
 
-    @_guarded
+    @guarded
     def _open(self, name: str) -> None:
         """Open a device in place of the one that is open."""
         self._let_go()
         self.device, self.trouble, self._said = name, "", ""
         self._opening.want(name)
 
-    @_guarded
+    @guarded
     def _begin(self, live: Live) -> None:
         """Feel with a device that was opened."""
         if not self._entered:
@@ -254,28 +246,28 @@ class LabVisit(QObject):
         live.feel(self.bench)
         self._price_due.start()
 
-    @_guarded
+    @guarded
     def _could_not_open(self, error: Exception) -> None:
         raise error
 
-    @_guarded
+    @guarded
     def _cancel(self) -> None:
         self._opening.cancel()
         self.trouble = "No device is open"
 
-    @_guarded
+    @guarded
     def _say(self, line: str) -> None:
         self._said = line
 
-    @_guarded
+    @guarded
     def _change(self, name: str, value: object, held: bool) -> None:
         self._try(lambda: self.bench.change(name, value, held=held), name)  # type: ignore[arg-type]
 
-    @_guarded
+    @guarded
     def _choose(self, side: Side, choice: Choice) -> None:
         self._try(lambda: self.bench.choose(side, spoken(choice.liquid), choice.scene), "")
 
-    @_guarded
+    @guarded
     def _copy(self) -> None:
         self._try(self.bench.copy_felt_to_other, "")
 
@@ -291,24 +283,24 @@ class LabVisit(QObject):
             return
         self._feel(bench)
 
-    @_guarded
+    @guarded
     def _switch(self) -> None:
         """Feel the other setting; a knob that is held is let go of at once, for it was the other one's."""
         self._feel(self.bench.switch())
         self._show()
 
-    @_guarded
+    @guarded
     def _blind(self, asked: bool) -> None:
         if asked:
             self._feel(self.bench.blinded(self._chance), anew=True)
         else:
             self._feel(self.bench.revealed())
 
-    @_guarded
+    @guarded
     def _undo(self) -> None:
         self._feel(self.bench.undo())
 
-    @_guarded
+    @guarded
     def _redo(self) -> None:
         self._feel(self.bench.redo())
 
@@ -326,16 +318,16 @@ class LabVisit(QObject):
             if waits_s is not None and not self._due.isActive():
                 self._due.start(math.ceil(1e3 * waits_s))
 
-    @_guarded
+    @guarded
     def _ask_price(self) -> None:
         self._prices.ask(self.bench.in_hand.scene)
 
-    @_guarded
+    @guarded
     def _play(self, name: str | None) -> None:
         if self.live is not None:
             self.live.play(name)
 
-    @_guarded
+    @guarded
     def _stop_force(self) -> None:
         """Send zero force; a device that is being opened, which would bring its own, is given up."""
         if self.live is not None:
@@ -343,7 +335,7 @@ class LabVisit(QObject):
         elif self._opening.busy_with is not None:
             self._cancel()
 
-    @_guarded
+    @guarded
     def _fade_in(self) -> None:
         """Let the force return; where the servo stopped itself, by opening its device again."""
         if self.live is None or self.live.servo.fault is not None:
@@ -351,29 +343,40 @@ class LabVisit(QObject):
         else:
             self.live.fade_in()
 
-    @_guarded
+    @guarded
     def _point(self, x_m: float, y_m: float, z_m: float) -> None:
         if self.live is not None:
             self.live.point_to(x_m, y_m, z_m)
 
-    @_guarded
+    @guarded
     def _press(self, buttons: int) -> None:
         if self.live is not None:
             self.live.press(buttons)
 
-    @_guarded
+    @guarded
     def _save(self, path: Path, setting: Setting) -> None:
         """Write a setting as a preset."""
         if self.bench.blind:
             self.trouble = "while the comparison is blind no preset can be saved: end the blinding first"
             return
-        self._saving.save(path, setting, tuple(it.source for it in self.liquids))
+        self._saving.save(path, setting)
 
-    @_guarded
-    def _offer(self, liquids: tuple[Choice, ...]) -> None:
-        self.liquids = liquids
+    @guarded
+    def _use(self, study: Path, setting: Setting) -> None:
+        """Name a setting's liquid file in a study."""
+        self._saving.use(study, setting)
 
-    @_guarded
+    @guarded
+    def _open_preset(self, path: Path) -> None:
+        """Feel the first liquid of a file; its others are at hand from then on."""
+        try:
+            first = self._saving.open(path)
+        except StudyError as error:
+            self.trouble = str(error)
+            return
+        self._choose(self.bench.felt, first)
+
+    @guarded
     def _could_not_save(self, error: Exception) -> None:
         """Say why a preset could not be written; the force goes on, unless it is a mistake in here."""
         if not isinstance(error, StudyError):

@@ -3,36 +3,61 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import QCoreApplication, QObject, Qt, Signal
 
-from study_app.lab.presets import liquids_at_hand, preset_text, save
+from study_app.haptics.scene import Scene
+from study_app.lab.presets import Choice, liquids_at_hand, liquids_of, preset_text, save, spoken
+from study_app.lab.studies import use_in_study
 from study_app.lab.workbench import Setting
 
 PATIENCE_S = 20.0
 
 
 class LabSaving(QObject):
-    """Writes presets, one at a time, and looks which liquids there are then.
+    """The liquids at hand; writes presets, one at a time, and looks which liquids there are then.
 
-    ``saved`` carries the liquids at hand (a tuple of `Choice`), ``failed`` what was met instead.
+    ``said`` tells what was written or opened last. ``saved`` comes when something was written, ``failed`` carries what
+    was met instead.
     """
 
-    saved = Signal(object)
+    saved = Signal()
     failed = Signal(object)
     _done = Signal(object)
 
     def __init__(self) -> None:
         super().__init__()
+        self.liquids = liquids_at_hand()
+        self.said = ""
         self._before: threading.Thread | None = None
+        self._files: list[tuple[Scene, Path]] = []
         self._done.connect(self._tell, Qt.ConnectionType.QueuedConnection)
 
-    def save(self, path: Path, setting: Setting, at_hand: tuple[str, ...]) -> None:
-        """Write a setting as a preset to ``path``; ``at_hand`` are files to look for liquids in, beside the usual."""
-        words = (self._before, path, setting, at_hand)
-        self._before = threading.Thread(target=self._write, args=words, name="preset", daemon=True)
-        self._before.start()
+    def save(self, path: Path, setting: Setting) -> None:
+        """Write a setting as a preset to ``path``."""
+        self._begin(partial(self._save, path, setting), (str(path),))
+
+    def use(self, study: Path, setting: Setting) -> None:
+        """Name a setting's file in a study, after it was saved beside the study where it has no file yet."""
+        self._begin(partial(self._use, study, setting), ())
+
+    def open(self, path: Path) -> Choice:
+        """Have the liquids of a file at hand; return the first.
+
+        Raises
+        ------
+        ProtocolError
+            Every problem of the file.
+        """
+        found = liquids_of(str(path))
+        self.liquids = (*(it for it in self.liquids if it not in found), *found)
+        if len(found) == 1:
+            self._files.insert(0, (found[0].scene, path))
+        self.said = f"Opened {path.name}: {', '.join(spoken(it.liquid) for it in found)}"
+        return found[0]
 
     def wait(self) -> None:
         """Wait until everything is on the disk, and tell of it."""
@@ -40,16 +65,36 @@ class LabSaving(QObject):
             self._before.join(PATIENCE_S)
             QCoreApplication.sendPostedEvents(self)
 
-    def _write(self, before: threading.Thread | None, path: Path, setting: Setting, at_hand: tuple[str, ...]) -> None:
-        """Write a preset, in a thread of its own, after the one before."""
+    def _begin(self, write: Callable[[], str], more: tuple[str, ...]) -> None:
+        at_hand = (*(it.source for it in self.liquids), *more)
+        self._before = threading.Thread(
+            target=self._write, args=(self._before, write, at_hand), name="preset", daemon=True
+        )
+        self._before.start()
+
+    def _write(self, before: threading.Thread | None, write: Callable[[], str], at_hand: tuple[str, ...]) -> None:
+        """Write, in a thread of its own, after the one before."""
         if before is not None:
             before.join()
         try:
-            save(path, preset_text(setting))
-            found: object = liquids_at_hand(saved=(*at_hand, str(path)))
+            found: object = write(), liquids_at_hand(saved=at_hand)
         except Exception as error:  # noqa: BLE001 - handed over, not swallowed: a thread has nobody to raise it to
             found = error
         self._done.emit(found)
 
-    def _tell(self, found: object) -> None:
-        (self.failed if isinstance(found, Exception) else self.saved).emit(found)
+    def _save(self, path: Path, setting: Setting) -> str:
+        save(path, preset_text(setting))
+        self._files = [(setting.scene, path), *((scene, file) for scene, file in self._files if file != path)]
+        return f"Saved as {path.name} in {path.parent}"
+
+    def _use(self, study: Path, setting: Setting) -> str:
+        file = next((path for scene, path in self._files if scene == setting.scene and path.is_file()), None)
+        return use_in_study(study, setting, file)
+
+    def _tell(self, found: Exception | tuple[str, tuple[Choice, ...]]) -> None:
+        if isinstance(found, Exception):
+            self.failed.emit(found)
+            return
+        self.said, written = found
+        self.liquids = tuple(dict.fromkeys((*self.liquids, *written)))
+        self.saved.emit()

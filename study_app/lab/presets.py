@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -52,12 +53,20 @@ def liquids_at_hand(folders: tuple[Path, ...] | None = None, saved: tuple[str, .
     own = [str(path) for folder in folders for path in sorted(folder.glob("*.toml")) if path.stem not in shipped()]
     found: list[Choice] = []
     for source in dict.fromkeys([*shipped(), *own, *saved]):
-        try:
-            names = tuple(load_scenes(source))
-        except ProtocolError:
-            continue
-        found += [Choice(source, name, f"{spoken(name)} ({Path(source).stem})") for name in names]
+        with suppress(ProtocolError):
+            found += liquids_of(source)
     return tuple(found)
+
+
+def liquids_of(source: str) -> tuple[Choice, ...]:
+    """Return the liquids of a file or shipped protocol.
+
+    Raises
+    ------
+    ProtocolError
+        Every problem of the file.
+    """
+    return tuple(Choice(source, name, f"{spoken(name)} ({Path(source).stem})") for name in load_scenes(source))
 
 
 def preset_text(setting: Setting) -> str:

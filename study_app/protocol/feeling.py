@@ -25,7 +25,7 @@ def effects(protocol: Protocol) -> tuple[str, ...]:
 def warnings(protocol: Protocol) -> tuple[str, ...]:
     """Return what is permitted and may still be a mistake, a sentence each."""
     felt = {name: steady(protocol.scene_of(name)) for name in protocol.liquids}
-    return (*_alike(protocol, felt), *_clipped(felt), *_practised(protocol))
+    return (*_alike(protocol, felt), *_clipped(felt), *_practised(protocol), *_told_by_size(protocol))
 
 
 def _alike(protocol: Protocol, felt: dict[str, Steady]) -> Iterator[str]:
@@ -76,3 +76,15 @@ def _practised(protocol: Protocol) -> Iterator[str]:
                     f"practice {block.id} is in {name}, which block {judged[name]} presents too: participants know it "
                     "from the practice when they judge it"
                 )
+
+
+def _told_by_size(protocol: Protocol) -> Iterator[str]:
+    """Yield the blocks whose conditions show balls of different sizes, by which participants can tell them apart."""
+    for block in protocol.main_blocks:
+        sizes = {1000 * protocol.scene_for(it).body.diameter_m for it in block.conditions}
+        if len(sizes) > 1:
+            listed = ", ".join(f"{size:g}" for size in sorted(sizes))
+            yield (
+                f"block {block.id} shows balls of different sizes ({listed} mm): participants can tell its conditions "
+                "apart by sight"
+            )

@@ -342,5 +342,5 @@ def schema(of: type[BaseModel] = Protocol) -> dict[str, Any]:
                 part["required"].remove("id")
                 if "body" in part["properties"]:  # a liquid of a study may be that of a file instead
                     part["properties"]["file"] = {"type": "string", "description": LIQUID_FILE}
-                    part["anyOf"] = [{"required": part.pop("required")}, {"required": ["file"]}]
+                    part["if"], part["then"] = {"not": {"required": ["file"]}}, {"required": part.pop("required")}
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **described}

@@ -22,7 +22,7 @@ from study_app.evaluation.appraiser import Told
 from study_app.gui.lab.place import LabPlace
 from study_app.haptics.scene import Scene
 from study_app.lab.presets import Choice, save
-from study_app.protocol.load import load_scene
+from study_app.protocol.load import load, load_scene, source_bytes
 from tests.compiled import needs_servo
 
 pytestmark = [needs_servo, pytest.mark.usefixtures("qapp")]
@@ -307,6 +307,27 @@ def test_a_setting_is_saved_as_a_preset_that_is_at_hand_from_then_on(
     assert load_scene(path, "honey") == felt.bench.a.scene
     felt.place.save_asked.emit(tmp_path / "nowhere" / "mine.toml", asked)
     qtbot.waitUntil(lambda: "cannot be written" in felt.view().trouble, timeout=SOON_MS)
+    assert felt.live is not None
+
+
+def test_a_preset_is_saved_opened_again_and_used_in_a_study(felt: LabVisit, qtbot: Any, tmp_path: Path) -> None:
+    study = tmp_path / "study.toml"
+    study.write_bytes(source_bytes("demo"))
+    felt.place.changed.emit("liquid.density_kg_m3", 1234.5, False)
+    felt.place.save_asked.emit(tmp_path / "syrup.toml", felt.bench.in_hand)
+    qtbot.waitUntil(lambda: felt.view().said == f"Saved as syrup.toml in {tmp_path}", timeout=SOON_MS)
+    felt.place.undo_asked.emit()
+    assert felt.bench.in_hand.scene.liquids[0].density_kg_m3 != 1234.5
+    felt.place.preset_opened.emit(tmp_path / "syrup.toml")
+    assert felt.bench.in_hand.scene.liquids[0].density_kg_m3 == 1234.5
+    assert felt.view().said == "Opened syrup.toml: Honey"
+    felt.place.use_asked.emit(study, felt.bench.in_hand)
+    qtbot.waitUntil(lambda: felt.view().said.startswith("Added to study.toml as [liquids.syrup]"), timeout=SOON_MS)
+    assert load(study).scene_of("syrup").liquids[0].density_kg_m3 == 1234.5
+    assert sorted(path.name for path in tmp_path.glob("*.toml")) == ["study.toml", "syrup.toml"]
+    (tmp_path / "broken.toml").write_text("format = 1")
+    felt.place.preset_opened.emit(tmp_path / "broken.toml")
+    assert "broken.toml" in felt.view().trouble
     assert felt.live is not None
 
 

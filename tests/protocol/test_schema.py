@@ -114,7 +114,7 @@ def test_every_reference_of_the_schema_leads_somewhere():
 
 def test_names_of_tables_are_not_asked_for_again():
     assert "id" not in SCHEMA["$defs"]["Block"]["properties"]
-    assert "id" not in SCHEMA["$defs"]["Liquid"]["required"]
+    assert "id" not in SCHEMA["$defs"]["StudyLiquid"]["then"]["required"]
     assert "id" in SCHEMA["$defs"]["Item"]["required"]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from dataclasses import replace
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -13,11 +14,17 @@ from study_app.errors import ProtocolError, StoreError
 from study_app.evaluation.replay import replay
 from study_app.gui.choices import resumed
 from study_app.protocol.describe import describe
+from study_app.protocol.feeling import warnings
 from study_app.protocol.liquid_files import unbundled
 from study_app.protocol.load import load, load_scenes, parse, protocol_hash, source_bytes
 from study_app.protocol.model import schema
-from study_app.protocol.schedule import stream
+from study_app.protocol.orders import block_codes
+from study_app.protocol.schedule import Trial, build_schedule, stream
 from study_app.session import rehearsal
+from study_app.session.compose import page
+from study_app.session.machine import open_session
+from study_app.session.pages import TaskPage
+from study_app.session.state import Phase
 from study_app.store.blinding import open_or_draw_key, read_key
 from study_app.store.layout import StudyFolder
 from study_app.store.open_session import SessionStore
@@ -130,10 +137,32 @@ def test_a_drag_coefficient_may_be_a_liquids_own_and_the_rest_the_scenes() -> No
     assert protocol.scene_for("thin").body == scenes
 
 
+def test_a_ball_of_its_own_is_drawn_as_large_as_it_is_and_warned_of_where_it_tells_a_condition(study: Path) -> None:
+    assert not any("sizes" in one for one in warnings(load(study)))
+    syrup = study.parent / "liquids" / "syrup.toml"
+    syrup.write_text(SYRUP.replace("diameter_m = 0.068", "diameter_m = 0.04"))
+    protocol = load(study)
+    (warned,) = (one for one in warnings(protocol) if "sizes" in one)
+    assert "block liquids shows balls of different sizes (40, 68 mm)" in warned
+    schedule = build_schedule(protocol, "P001", 1)
+    codes = {
+        block: dict(zip(block_codes(protocol.blocks[block]), protocol.blocks[block].conditions, strict=True))
+        for block in protocol.blocks
+    }
+    drawn = {}
+    for index, step in enumerate(schedule.steps):
+        if isinstance(step, Trial):
+            state = replace(open_session(protocol, schedule, codes, "en"), index=index, phase=Phase.TASK)
+            shown = page(state)
+            assert isinstance(shown, TaskPage)
+            drawn[codes[step.block][step.code]] = shown.body_radius_m
+    assert drawn == pytest.approx({"thin": 0.0034, "thick": 0.002, "prompt": 0.0034, "late": 0.0034})
+
+
 def test_editors_are_told_of_file() -> None:
     liquid = schema()["$defs"]["StudyLiquid"]
     assert "file" in liquid["properties"]
-    assert {"required": ["file"]} in liquid["anyOf"]
+    assert (liquid["if"], liquid["then"]) == ({"not": {"required": ["file"]}}, {"required": ["density_kg_m3"]})
 
 
 @needs_servo

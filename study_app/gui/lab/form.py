@@ -11,7 +11,7 @@ from study_app.gui.hidden import Hidden
 from study_app.gui.lab.rows import ParameterRow, SwitchRow, row_for
 from study_app.gui.lab.switch import Badge
 from study_app.gui.lab.view import FormSection, LabView, form
-from study_app.gui.labels import label
+from study_app.gui.labels import Elided, label
 from study_app.gui.theme import font
 from study_app.gui.themed import dress
 from study_app.lab.workbench import Setting, other
@@ -81,6 +81,8 @@ class FormPanel(Card):
     changed = Signal(str, object, bool)
     liquid_chosen = Signal(str, object)
     copied = Signal()
+    open_asked = Signal()
+    use_asked = Signal()
 
     def __init__(self) -> None:
         super().__init__(padding=16, gap=8)
@@ -98,6 +100,12 @@ class FormPanel(Card):
         self.copy = ActionButton("copy", "Copy to B", height=32)
         self.copy.setProperty("dense", "true")
         self.copy.clicked.connect(self.copied)
+        self.open = ActionButton("file", "Open preset …", height=32)
+        self.use = ActionButton("layers", "Use in a study …", height=32)
+        self.said = Elided("small", "text2")
+        for button, asked in ((self.open, self.open_asked), (self.use, self.use_asked)):
+            button.setProperty("dense", "true")
+            button.clicked.connect(asked)
         self._lay_out()
 
     def _lay_out(self) -> None:
@@ -122,6 +130,13 @@ class FormPanel(Card):
         column.addLayout(head)
         column.addWidget(Rule())
         column.addWidget(self.area, 1)
+        foot = QHBoxLayout()
+        foot.setSpacing(8)
+        foot.addWidget(self.open, 1)
+        foot.addWidget(self.use, 1)
+        column.addWidget(Rule())
+        column.addLayout(foot)
+        column.addWidget(self.said)
         self.hidden = Hidden(HIDDEN, "Parameters tell settings apart.")
         self._stack = QStackedLayout()
         self._stack.addWidget(whole)
@@ -135,6 +150,8 @@ class FormPanel(Card):
         if bench.blind:
             return
         self._show_liquids(view)
+        self.said.show_text(view.said)
+        self.said.setVisible(bool(view.said))
         setting = bench.in_hand
         if setting != self._setting or bench.felt != self._side:
             refused = self._side != bench.felt

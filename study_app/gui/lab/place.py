@@ -23,6 +23,8 @@ from study_app.gui.lab.tank import LabTank
 from study_app.gui.lab.view import LabView
 from study_app.gui.place import Place
 from study_app.gui.theme import SPACE
+from study_app.lab.workbench import Setting
+from study_app.workspace import workspace
 
 FORM_WIDTH, FORM_WIDTH_NARROW, SIDE_WIDTH = 404, 380, 300
 LEAST = QSize(928, 560)
@@ -37,7 +39,7 @@ class LabPlace(Place):
     ``changed(name, value, held)`` is a parameter of the felt side in SI, ``held`` while its slider is dragged;
     ``hand_moved`` [m, hand frame] and ``hand_pressed`` are the mouse's while it moves the ball; ``entered`` and
     ``left`` come as the place is shown and hidden; ``save_asked`` is a file and the `Setting` that was felt when it was
-    asked for.
+    asked for; ``use_asked`` a study's file and that `Setting`, ``preset_opened`` the file of a preset.
     """
 
     changed = Signal(str, object, bool)
@@ -52,6 +54,8 @@ class LabPlace(Place):
     fade_in_asked = Signal()
     cancel_asked = Signal()
     save_asked = Signal(Path, object)
+    use_asked = Signal(Path, object)
+    preset_opened = Signal(Path)
     copied = Signal()
     hand_moved = Signal(float, float, float)
     hand_pressed = Signal(int)
@@ -152,6 +156,8 @@ class LabPlace(Place):
         ):
             part.connect(mine)
         header.save_asked.connect(self.ask_where_to_save)
+        form.open_asked.connect(self.ask_which_to_open)
+        form.use_asked.connect(self.ask_which_study)
         self._escape.held.connect(self._stop)
 
     def _shortcuts(self) -> None:
@@ -181,17 +187,42 @@ class LabPlace(Place):
 
     def ask_where_to_save(self) -> None:
         """Ask for the preset's file; nothing waits meanwhile, and the force can be stopped beside the dialog."""
-        if self.dialog is not None or self._view is None or self._view.workbench.blind:
+        if (setting := self._free_to_ask()) is None:
             return
-        setting = self._view.workbench.in_hand
-        dialog = QFileDialog(self, f"Save preset: {setting.title}", f"{preset_name(setting.title)}{SUFFIX}")
+        dialog = self._file_dialog(f"Save preset: {setting.title}", "Presets")
         dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
-        dialog.setNameFilter("Presets (*.toml)")
         dialog.setDefaultSuffix(SUFFIX[1:])
+        dialog.selectFile(f"{preset_name(setting.title)}{SUFFIX}")
         dialog.fileSelected.connect(lambda name: self.save_asked.emit(Path(name), setting))
-        dialog.finished.connect(self._forget_dialog)
-        self.dialog = dialog
         dialog.show()
+
+    def ask_which_to_open(self) -> None:
+        """Ask for a preset's file."""
+        if self._free_to_ask() is not None:
+            dialog = self._file_dialog("Open preset", "Presets and protocols")
+            dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
+            dialog.fileSelected.connect(lambda name: self.preset_opened.emit(Path(name)))
+            dialog.show()
+
+    def ask_which_study(self) -> None:
+        """Ask for the study that is to use the felt setting."""
+        if (setting := self._free_to_ask()) is not None:
+            dialog = self._file_dialog(f"Use {setting.title} in a study", "Protocols")
+            dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
+            dialog.fileSelected.connect(lambda name: self.use_asked.emit(Path(name), setting))
+            dialog.show()
+
+    def _free_to_ask(self) -> Setting | None:
+        """Return the felt setting; None while another question is open, or the comparison is blind."""
+        if self.dialog is not None or self._view is None or self._view.workbench.blind:
+            return None
+        return self._view.workbench.in_hand
+
+    def _file_dialog(self, title: str, files: str) -> QFileDialog:
+        """Return a question for a file, which begins in the workspace's protocols."""
+        self.dialog = QFileDialog(self, title, str(workspace().protocols), f"{files} (*{SUFFIX})")
+        self.dialog.finished.connect(self._forget_dialog)
+        return self.dialog
 
     def _forget_dialog(self) -> None:
         if self.dialog is not None:

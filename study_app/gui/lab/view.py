@@ -127,10 +127,10 @@ class LabView:
 
     ``liquids`` are what a side can be set to, ``paths`` the programmed motions; ``path`` is the one that runs, None for
     live motion alone. ``busy`` says what is waited for ("Opening the Falcon"); ``refused`` is the parameter that could
-    not be changed and one line why,
-    a new pair for every refusal. ``tail_a``, ``tail_b``, ``trace`` and ``now`` are None where nothing has moved yet,
-    a tail also where the setting has no wake. ``cost`` and ``errors`` are of the felt setting, empty until they are
-    measured; ``measuring`` while they are measured anew.
+    not be changed and one line why, a new pair for every refusal; ``said`` tells what was saved or opened last.
+    ``tail_a``, ``tail_b``, ``trace`` and ``now`` are None where nothing has moved yet, a tail also where the setting
+    has no wake. ``cost`` and ``errors`` are of the felt setting, empty until they are measured; ``measuring`` while
+    they are measured anew.
     """
 
     workbench: Workbench
@@ -152,6 +152,7 @@ class LabView:
     busy: str = ""
     trouble: str = ""
     refused: tuple[str, str] | None = None
+    said: str = ""
     workspace_m: Point = (0.1, 0.06, 0.06)
     body_radius_m: float = 0.0034
 

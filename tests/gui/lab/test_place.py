@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -228,6 +229,26 @@ def test_a_preset_is_saved_where_one_says(place: Any, still: LabView, qtbot: Any
     place.dialog.reject()
     assert said == [(tmp_path / "mine.toml", still.workbench.a)]
     assert place.dialog is None
+
+
+def test_a_preset_is_opened_and_the_felt_setting_used_where_one_says(
+    place: Any, still: LabView, tmp_path: Path, qtbot: Any
+) -> None:
+    place.show_view(still)
+    opened, used = heard(place, "preset_opened"), heard(place, "use_asked")
+    place.form.open.click()
+    place.dialog.fileSelected.emit(str(tmp_path / "syrup.toml"))
+    place.dialog.reject()
+    place.form.use.click()
+    assert "Water" in place.dialog.windowTitle()
+    place.dialog.fileSelected.emit(str(tmp_path / "study.toml"))
+    place.dialog.reject()
+    assert opened == [(tmp_path / "syrup.toml",)]
+    assert used == [(tmp_path / "study.toml", still.workbench.a)]
+    assert not place.form.said.isVisible()
+    place.show_view(replace(still, said="Saved as syrup.toml in /there"))
+    assert place.form.said.isVisible()
+    assert place.form.said.accessibleName() == "Saved as syrup.toml in /there"
 
 
 @pytest.mark.parametrize(
