@@ -90,6 +90,16 @@ class Clamped(QLabel):
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
         """Cut the text anew."""
         super().resizeEvent(event)
+        self._cut()
+
+    def show_text(self, text: str) -> None:
+        """Show ``text``, as much of it as there is room for."""
+        if text != self._whole:
+            self._whole = text
+            self.setAccessibleName(text)
+            self._cut()
+
+    def _cut(self) -> None:
         lines = self._broken(self.width())
         if len(lines) > self._most:
             rest = " ".join(lines[self._most - 1 :])

@@ -11,7 +11,7 @@ from study_app.gui.hidden import Hidden
 from study_app.gui.lab.rows import ParameterRow, SwitchRow, row_for
 from study_app.gui.lab.switch import Badge
 from study_app.gui.lab.view import FormSection, LabView, form
-from study_app.gui.labels import Elided, label
+from study_app.gui.labels import Clamped, label
 from study_app.gui.theme import font
 from study_app.gui.themed import dress
 from study_app.lab.workbench import Setting, other
@@ -102,7 +102,7 @@ class FormPanel(Card):
         self.copy.clicked.connect(self.copied)
         self.open = ActionButton("file", "Open preset …", height=32)
         self.use = ActionButton("layers", "Use in a study …", height=32)
-        self.said = Elided("small", "text2")
+        self.said = Clamped("", 2, "small", "text2")
         for button, asked in ((self.open, self.open_asked), (self.use, self.use_asked)):
             button.setProperty("dense", "true")
             button.clicked.connect(asked)
