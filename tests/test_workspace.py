@@ -6,7 +6,9 @@ from pathlib import Path
 import pytest
 
 from study_app import workspace as workspaces
+from study_app.app.entry import run
 from study_app.app.visit import Visit
+from study_app.cli.words import keep_offered_workspace
 from study_app.errors import StoreError
 from study_app.gui.home.facts import sources, study_facts
 from study_app.protocol.load import load as load_protocol
@@ -158,3 +160,28 @@ def test_home_shows_no_card_for_a_liquid_file(tmp_path, monkeypatch):
     Path("protocols/broken.toml").write_text("format = 1\n[study]\n")
     assert "syrup" not in sources()
     assert "broken" in sources()
+
+
+def test_the_first_command_that_writes_keeps_the_offered_workspace_and_says_so_once(documents, tmp_path, monkeypatch):
+    start_folder(tmp_path / "start", monkeypatch)
+    said = []
+    monkeypatch.setattr("click.echo", lambda words, err: said.append(words))
+    keep_offered_workspace()
+    assert "Liquid Study" in said[0]
+    start_folder(tmp_path / "clone", monkeypatch, "results", "protocols")
+    keep_offered_workspace()
+    assert workspace().folder == documents / "Liquid Study"
+    assert len(said) == 1
+
+
+def test_a_protocol_file_of_a_command_is_among_the_recent_ones_and_its_results_in_the_workspace(
+    documents, tmp_path, monkeypatch
+):
+    start_folder(tmp_path / "start", monkeypatch)
+    keep_workspace(Workspace(tmp_path / "kept"))
+    held = []
+    monkeypatch.setattr("study_app.app.entry.hold", lambda chosen, _tell: held.append(chosen) or 0)
+    Path("mine.toml").write_bytes(source_bytes("demo"))
+    assert run("mine.toml", participant="P001") == 0
+    assert held[0].results == tmp_path / "kept" / "results" / "demo"
+    assert recent_protocols() == (str(tmp_path / "start" / "mine.toml"),)
