@@ -60,7 +60,7 @@ def _named(study: bytes) -> list[str]:
 
 def _read(path: Path) -> str | None:
     try:
-        return path.read_bytes().decode()
+        return path.read_bytes().decode() if path.is_file() else None  # never a device or a pipe, which may not end
     except (OSError, ValueError):
         return None
 

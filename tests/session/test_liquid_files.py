@@ -100,6 +100,8 @@ def test_the_key_of_an_earlier_study_is_drawn_and_sealed_to_the_byte(tmp_path: P
     ("table", "file", "said"),
     [
         ('file = "gone.toml"', SYRUP, 'no UTF-8 text file "gone.toml"'),
+        ('file = "liquids"', SYRUP, 'no UTF-8 text file "liquids"'),
+        ('file = "/dev/zero"', SYRUP, 'no UTF-8 text file "/dev/zero"'),
         ("file = 3", SYRUP, "must be a string"),
         ('file = "liquids/syrup.toml"\ndensity_kg_m3 = 1', SYRUP, "liquids.thick.density_kg_m3"),
         ('file = "liquids/syrup.toml"', SYRUP.replace("1387.25", "0"), "density_kg_m3: is 0, must be"),
