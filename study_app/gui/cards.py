@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Literal, TypeAlias
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPaintEvent, QPen
+from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
 from study_app.gui.icons import draw_icon, draw_logo
 from study_app.gui.labels import Ink, label
-from study_app.gui.theme import RADIUS_CARD, font
+from study_app.gui.theme import RADIUS_CARD, Theme, font
 from study_app.gui.themed import Themed
 
 Tone: TypeAlias = Literal["ok", "warn", "bad", "accent", "neutral"]
@@ -90,7 +90,6 @@ class Chip(Themed, QWidget):
     def __init__(self, tone: Tone = "neutral", icon: str = "ring", word: str = "", *, small: bool = False) -> None:
         super().__init__()
         self._small = small
-        self._font = font("small" if small else "label", weight=500, tabular=True)
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self.tone, self.icon, self.word = tone, icon, word
         self.setAccessibleName(word)
@@ -108,8 +107,7 @@ class Chip(Themed, QWidget):
 
     def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
         """Return the room for icon and word."""
-        width = QFontMetricsF(self._font).horizontalAdvance(self.word)
-        return QSize(round(width) + 40, 24 if self._small else 28)
+        return chip_size(self.word, small=self._small)
 
     def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
         """Return the same as the hint: a chip is never cut."""
@@ -117,19 +115,31 @@ class Chip(Themed, QWidget):
 
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
         """Paint the pill, the icon and the word."""
-        t = self.theme
-        fills = {"ok": t.ok_bg, "warn": t.warn_bg, "bad": t.bad_bg, "accent": t.selected, "neutral": t.sunk}
-        inks = {"ok": t.ok, "warn": t.warn, "bad": t.bad, "accent": t.accent, "neutral": t.text2}
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(fills[self.tone]))
-        middle = self.height() / 2
-        painter.drawRoundedRect(QRectF(self.rect()), middle, middle)
-        draw_icon(painter, self.icon, QRectF(10, middle - 7, 14, 14), inks[self.tone], 2.2)
-        painter.setPen(QColor(inks[self.tone]))
-        painter.setFont(self._font)
-        painter.drawText(QRectF(29, 0, self.width() - 29, self.height()), Qt.AlignmentFlag.AlignVCenter, self.word)
+        paint_chip(painter, QRectF(self.rect()), self.theme, self.tone, self.icon, self.word, small=self._small)
+
+
+def _chip_font(*, small: bool) -> QFont:
+    return font("small" if small else "label", weight=500, tabular=True)
+
+
+def chip_size(word: str, *, small: bool) -> QSize:
+    """Return the room for a chip's icon and word."""
+    return QSize(round(QFontMetricsF(_chip_font(small=small)).horizontalAdvance(word)) + 40, 24 if small else 28)
+
+
+def paint_chip(painter: QPainter, body: QRectF, t: Theme, tone: Tone, icon: str, word: str, *, small: bool) -> None:
+    """Paint a chip's pill, icon and word into ``body``."""
+    fills = {"ok": t.ok_bg, "warn": t.warn_bg, "bad": t.bad_bg, "accent": t.selected, "neutral": t.sunk}
+    inks = {"ok": t.ok, "warn": t.warn, "bad": t.bad, "accent": t.accent, "neutral": t.text2}
+    painter.setPen(Qt.PenStyle.NoPen)
+    painter.setBrush(QColor(fills[tone]))
+    painter.drawRoundedRect(body, body.height() / 2, body.height() / 2)
+    draw_icon(painter, icon, QRectF(body.left() + 10, body.center().y() - 7, 14, 14), inks[tone], 2.2)
+    painter.setPen(QColor(inks[tone]))
+    painter.setFont(_chip_font(small=small))
+    painter.drawText(body.adjusted(29, 0, 0, 0), Qt.AlignmentFlag.AlignVCenter, word)
 
 
 class Bar(Themed, QWidget):

@@ -189,6 +189,10 @@ QToolTip {{ background: {t.surface}; color: {t.text}; border: 1px solid {t.ctl};
 
 def _scrollbars(t: Theme) -> str:
     return f"""
+QTableView, QHeaderView, QHeaderView::section {{ background: transparent; border: none; outline: none; }}
+QTableView {{ selection-background-color: transparent; selection-color: {t.text}; }}
+QHeaderView::section {{ color: {t.text2}; padding: 0 4px; }}
+QHeaderView::section:first {{ padding-left: 12px; }}
 QScrollArea, QScrollArea > QWidget > QWidget {{ background: transparent; border: none; }}
 QScrollBar:vertical {{ background: transparent; width: 12px; margin: 0; }}
 QScrollBar::handle:vertical {{ background: {t.ctl}; border-radius: 4px; min-height: 32px; margin: 2px; }}

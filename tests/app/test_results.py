@@ -122,7 +122,7 @@ def test_a_blinded_study_is_shown_by_code(shown: Opened) -> None:
     drawn = b"".join(card.figure.svg for card in shown.place.figures.cards)
     assert b">L1<" in drawn
     assert b">Thick<" not in drawn
-    assert [line.facts.participant for line in shown.place.sessions.rows.lines] == ["P001", "P002", "P003"]
+    assert [one.participant for one in shown.place.sessions.rows.shown] == ["P001", "P002", "P003"]
     assert shown.place.sessions.head.text() == "3 of 3 sessions in the figures"
     assert shown.desk.view.testing is None
 
@@ -141,7 +141,7 @@ def test_unblinding_is_recorded_and_shows_names_at_once(shown: Opened, results: 
 
 def test_leaving_out_changes_foot_figures_and_list(shown: Opened, results: Path) -> None:
     before = shown.place.figures.cards[0].figure
-    shown.click(shown.place.sessions.rows.lines[1])
+    shown.place.sessions.rows.table.selectRow(1)
     shown.decide(shown.place.exclusions.leave_out, "AK", "fell asleep")
     assert [one.what for one in exclusions(results / "demo")] == [("P002", 1, None)]
     assert shown.place.sessions.head.text() == "2 of 3 sessions in the figures"
@@ -164,7 +164,7 @@ def test_an_exclusion_is_taken_back_from_its_row(shown: Opened, results: Path) -
 
 def test_what_the_store_refuses_is_said(shown: Opened, results: Path) -> None:
     exclude(results / "demo", "P001", 1, by="BC", reason="late")  # meanwhile, by another program
-    shown.click(shown.place.sessions.rows.lines[0])
+    shown.place.sessions.rows.table.selectRow(0)
     shown.decide(shown.place.exclusions.leave_out, "AK", "fell asleep")
     assert shown.window.notice is not None
     assert shown.window.notice.windowTitle() == "It was not left out"
@@ -246,7 +246,7 @@ def test_a_damaged_session_is_named_and_the_others_stay_listed(qtbot: QtBot, res
     trouble = opened.place.figures.trouble
     assert trouble.title.text() == "The study cannot be read"
     assert "P002" in trouble.sentence.text()
-    assert len(opened.place.sessions.rows.lines) == 3
+    assert len(opened.place.sessions.rows.shown) == 3
     assert opened.titles == []
 
 

@@ -309,8 +309,8 @@ def test_from_home_into_a_session_and_home_again(tmp_path, monkeypatch):
             steps.append("ended")
             operator.end_asked.emit("withdrawn", "")
             operator.close()
-        elif steps == ["asked", "looked", "ended"] and home is not None and home.sessions.lines:
-            steps.append(home.sessions.lines[0].status.word)
+        elif steps == ["asked", "looked", "ended"] and home is not None and home.sessions.shown:
+            steps.append(home.sessions.shown[0].status)
             home.window().close()
 
     timer = QTimer()
@@ -318,7 +318,7 @@ def test_from_home_into_a_session_and_home_again(tmp_path, monkeypatch):
     timer.start(20)
     assert app.home(tmp_path / "results") == 0
     timer.stop()
-    assert steps == ["asked", "looked", "ended", "Withdrawn"]
+    assert steps == ["asked", "looked", "ended", "withdrawn"]
     assert events(tmp_path / "results" / "demo")[-1]["status"] == "withdrawn"
 
 
@@ -448,7 +448,9 @@ def test_home_offers_first_to_go_on_with_a_session_that_stopped(stopped, results
             steps.append(operator.rail.heading.text())
             operator.end_asked.emit("withdrawn", "")
             operator.close()
-        elif len(steps) == 3 and home is not None and home.sessions.lines:
+        elif len(steps) == 3 and home is not None and not home.reading:
+            home.sessions.show_kind("every")
+            steps.append([one.status for one in home.sessions.shown])
             steps.append(home.banner.isVisible())
             home.window().close()
 
@@ -459,7 +461,7 @@ def test_home_offers_first_to_go_on_with_a_session_that_stopped(stopped, results
     timer.stop()
     assert steps[0] == "P001, session 1 stopped in part 1, liquid setting 2 of 2"
     assert "2 of 8 answers are on disk" in steps[1]
-    assert steps[2:] == ["Trial 2 of 4", False]
+    assert steps[2:] == ["Trial 2 of 4", ["withdrawn"], False]
 
 
 def test_a_pilot_is_marked_framed_and_kept_apart(short_demo, tmp_path, monkeypatch):

@@ -30,7 +30,8 @@ def take_places(camera: Camera, results: Path, theme: Theme) -> None:
     visit.open()
     try:
         home: Any = window.place("home")
-        camera.until(lambda: home.sessions.lines, "the list of sessions")
+        home.sessions.show_kind("every")
+        camera.until(lambda: home.sessions.shown, "the list of sessions")
         camera.until(lambda: visit.devices.shown, "the list of devices")
         camera.take(window, f"home-{theme.name}", HOME)
         _take_questions(camera, home, theme)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from datetime import datetime
+from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import Qt, QTimer, Signal
@@ -16,6 +17,7 @@ from study_app.gui.cards import SHADOW
 from study_app.gui.choices import resumed
 from study_app.gui.controls import ActionButton
 from study_app.gui.devices.view import DeviceShown, looking
+from study_app.gui.disk_reader import DiskReader
 from study_app.gui.home.banner import ResumeBanner
 from study_app.gui.home.beside import DeviceCard, LabCard
 from study_app.gui.home.cards import BrokenCard, CardGrid, StudyCard
@@ -35,7 +37,7 @@ from study_app.gui.labels import Elided, label
 from study_app.gui.new_session import NewSessionDialog
 from study_app.gui.place import Place
 from study_app.gui.screens import screens_shown
-from study_app.gui.sessions.facts import sessions
+from study_app.gui.sessions.facts import SessionFacts, sessions
 from study_app.gui.themed import dress
 from study_app.store.machine import DEFAULTS, MachineSettings
 from study_app.workspace import workspace
@@ -67,6 +69,8 @@ class HomePlace(Place):
         self.dialog: NewSessionDialog | RehearsalDialog | None = None
         self._opened: list[str] = []
         self._facts: list[StudyFacts | BrokenFacts] = []
+        self._reader = DiskReader(self)
+        self._reader.done.connect(self._show_read)
         self.banner = ResumeBanner()
         self.grid = CardGrid()
         self.sessions = SessionsCard()
@@ -131,6 +135,11 @@ class HomePlace(Place):
         row.setContentsMargins(0, 0, 0, 0)
         row.addWidget(self._area)
 
+    @property
+    def reading(self) -> bool:
+        """Whether the results folder is being read."""
+        return self._reader.reading
+
     def show_results(self, results: Path) -> None:
         """Show the protocols of the workspace and the sessions of another folder from now on."""
         self.results = results
@@ -156,13 +165,14 @@ class HomePlace(Place):
         self._arrange()
 
     def show_sessions(self) -> None:
-        """Read the results folder again."""
-        studies = [facts for facts in self._facts if isinstance(facts, StudyFacts)]
-        answers = {facts.protocol.study.name: facts.protocol.responses_per_participant() for facts in studies}
-        found = sessions(self.results, answers)
-        now = datetime.now().astimezone()
-        self.sessions.show_sessions(found, str(self.results), now)
-        self.banner.show_interrupted(interrupted(found, studies, now))
+        """Read the results folder again, beside the window's thread."""
+        studies = tuple(facts for facts in self._facts if isinstance(facts, StudyFacts))
+        self._reader.read(partial(_read, self.results, studies))
+
+    def _show_read(self, read: tuple[Path, tuple[SessionFacts, ...], Interrupted | None]) -> None:
+        results, found, stopped = read
+        self.sessions.show_sessions(found, str(results), datetime.now().astimezone())
+        self.banner.show_interrupted(stopped)
         for card in self.grid.cards:
             if isinstance(card, StudyCard):
                 card.held.setText(held(found, card.facts.protocol.study.name))
@@ -193,6 +203,7 @@ class HomePlace(Place):
         dialog = RehearsalDialog(facts, self.results, theme=self.theme, parent=self)
         self._open(dialog)
         dialog.finished.connect(self.show_sessions)
+        dialog.finished.connect(lambda: self.sessions.show_kind("simulated") if dialog.over else None)
         dialog.accepted.connect(lambda: self.results_asked.emit(dialog.folder))
 
     def end(self) -> None:
@@ -232,6 +243,13 @@ class HomePlace(Place):
         """Make room: cards go below each other."""
         super().resizeEvent(event)
         self._arrange()
+
+
+def _read(results: Path, studies: tuple[StudyFacts, ...]) -> tuple[Path, tuple[SessionFacts, ...], Interrupted | None]:
+    """Return the sessions in the results folder, and the one that can go on."""
+    answers = {facts.protocol.study.name: facts.protocol.responses_per_participant() for facts in studies}
+    found = sessions(results, answers)
+    return results, found, interrupted(found, studies, datetime.now().astimezone())
 
 
 def _screens(settings: MachineSettings) -> tuple[str, ...]:

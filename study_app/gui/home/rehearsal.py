@@ -64,7 +64,7 @@ class RehearsalDialog(QDialog):
         self.process.setProcessChannelMode(QProcess.ProcessChannelMode.MergedChannels)
         self._told = ""
         self._stopping = False
-        self._over = False
+        self.over = False
         self._lay_out()
         wear(self, theme)
         self.start.clicked.connect(self._start)
@@ -98,7 +98,7 @@ class RehearsalDialog(QDialog):
         column.addLayout(foot)
 
     def _start(self) -> None:
-        if self._over:
+        if self.over:
             self.accept()
             return
         if self.process.state() != QProcess.ProcessState.NotRunning:
@@ -137,7 +137,7 @@ class RehearsalDialog(QDialog):
         self._listen()
         self.progress.hide()
         if code == 0:
-            self._over = True
+            self.over = True
             self.said.setText(f"Done: {self.participants.value()} simulated sessions, kept in {self.folder}.")
             self.start.show_action("", "Open results")
             self.start.setEnabled(True)

@@ -13,7 +13,8 @@ from study_app.gui.controls import ActionButton, Choice
 from study_app.gui.labels import label
 from study_app.gui.results.view import LeftOut, in_figures
 from study_app.gui.sessions.facts import SessionFacts, started_words
-from study_app.gui.sessions.rows import Column, SessionRows, matching, states_of
+from study_app.gui.sessions.rows import Column, matching, states_of
+from study_app.gui.sessions.table import SessionsTable
 from study_app.gui.theme import font
 from study_app.gui.themed import dress, take_away
 
@@ -40,7 +41,7 @@ class SessionsCard(Card):
         self.state.setAccessibleName("State")
         self.state.setFont(font("body"))
         self.state.addItem(EVERY, "")
-        self.rows = SessionRows(COLUMNS, "No session.", chosen_from=True, after=self.state)
+        self.rows = SessionsTable(COLUMNS, "No session.")
         self.head = label("", "label")
         self.head.setFont(font("label", weight=600, tabular=True))
         self.why = label("", "small", "text2", wraps=True)

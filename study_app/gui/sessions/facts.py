@@ -7,12 +7,17 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, TypeAlias
 
 from study_app.errors import StoreError
 from study_app.store.exclusions import Exclusion, exclusions
 from study_app.store.layout import StudyFolder
 from study_app.store.participants import participants_at_once
+
+Kind: TypeAlias = Literal["", "pilot", "simulated", "sample"]
+KINDS: dict[Kind, str] = {"": "Participants", "pilot": "Pilot", "simulated": "Simulated", "sample": "Sample"}
+"""What sessions are, with the words for a filter; simulated are rehearsals and sessions on simulated devices."""
+SAMPLE = "sample-"
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,9 +38,14 @@ class SessionFacts:
     excluded: str | None = None
 
     @property
-    def kind(self) -> str:
-        """What it is where it is not a participant's: "simulated", "pilot", else nothing."""
-        return "simulated" if self.simulated else "pilot" if self.pilot else ""
+    def kind(self) -> Kind:
+        """What it is where it is not a participant's: "sample", "simulated", "pilot", else nothing.
+
+        Samples are the simulated sessions that ship with the program, in a folder whose name begins with "sample-".
+        """
+        if self.simulated:
+            return "sample" if self.folder.parents[2].name.startswith(SAMPLE) else "simulated"
+        return "pilot" if self.pilot else ""
 
     @property
     def needs_care(self) -> bool:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from PySide6.QtCore import QPoint, QProcess, Qt
-from PySide6.QtWidgets import QLabel, QPushButton
+from PySide6.QtCore import QProcess, Qt
+from PySide6.QtGui import QAccessible, QFontMetrics
+from PySide6.QtWidgets import QPushButton
 
 from study_app.devices.backends import NONE, Backend
 from study_app.gui.devices.view import devices_shown
@@ -13,7 +14,8 @@ from study_app.gui.home.facts import study_facts
 from study_app.gui.home.place import HomePlace
 from study_app.gui.home.rehearsal import RehearsalDialog
 from study_app.gui.main_window import LEAST, MainWindow
-from study_app.gui.theme import DARK
+from study_app.gui.table import GAP
+from study_app.gui.theme import DARK, font
 from study_app.protocol.load import load, source_bytes
 from study_app.store.exclusions import exclude
 from study_app.store.layout import rehearsal_folder
@@ -54,15 +56,21 @@ def open_home(qtbot, results, size=None):
     window.show()
     home = window.place("home")
     home.main = window  # or it would be collected here
-    qtbot.waitUntil(lambda: bool(home.sessions.lines) or not home.sessions.none.isHidden())
+    qtbot.waitUntil(lambda: not home.reading and home.sessions.where.text() != "")
     return home
 
 
 @pytest.fixture
 def home(qtbot, results):
-    home = open_home(qtbot, results)
-    qtbot.waitUntil(lambda: bool(home.sessions.lines))
-    return home
+    return open_home(qtbot, results)
+
+
+def cell(home, row, heading, role=Qt.ItemDataRole.AccessibleTextRole):
+    """Return what a cell of the table of sessions says."""
+    model = home.sessions.rows.table.model()
+    across = Qt.Orientation.Horizontal
+    column = [model.headerData(at, across) for at in range(model.columnCount())].index(heading)
+    return model.index(row, column).data(role)
 
 
 def study_cards(home):
@@ -76,29 +84,78 @@ def test_every_protocol_has_a_card_and_one_is_the_next_step(home):
 
 
 def test_sessions_are_listed_with_status_and_answers(home):
-    line = home.sessions.lines[0]
-    assert line.status.word == "Complete"
-    assert line.answers.text() == "0 of 8"
+    assert cell(home, 0, "Status") == "Complete"
+    assert cell(home, 0, "Answers") == "0 of 8"
     demo = next(card for card in study_cards(home) if card.facts.protocol.study.name == "demo")
     assert demo.held.text() == "1 session, 1 complete"
+
+
+def test_participants_pilots_simulated_and_sample_sessions_are_shown_apart(qtbot, tmp_path):
+    hold(tmp_path / "demo", "P001")
+    hold(tmp_path / "demo-rehearsal-1", "P002", simulated=True)
+    hold(tmp_path / "sample-demo", "P003", simulated=True)
+    home = open_home(qtbot, tmp_path)
+    kinds = home.sessions.kind
+    said = [kinds.itemText(at) for at in range(kinds.count())]
+    assert said == ["Participants (1)", "Pilot (0)", "Simulated (1)", "Sample (1)", "All (3)"]
+    shown = {}
+    for at, words in enumerate(said):
+        kinds.setCurrentIndex(at)
+        shown[words.split()[0]] = sorted(one.participant for one in home.sessions.shown)
+    ids = {"Participants": ["P001"], "Pilot": [], "Simulated": ["P002"], "Sample": ["P003"]}
+    assert shown == ids | {"All": ["P001", "P002", "P003"]}
+
+
+def test_a_fresh_clone_greets_with_no_session_and_says_what_is_not_shown(qtbot, tmp_path):
+    hold(tmp_path / "sample-demo", "P001", simulated=True)
+    home = open_home(qtbot, tmp_path)
+    assert home.sessions.shown == ()
+    assert home.sessions.none.isVisible()
+    assert home.sessions.none.text().endswith("Not shown: 1 sample session.")
+
+
+def test_the_sessions_are_a_table_to_a_screen_reader(home):
+    table = QAccessible.queryAccessibleInterface(home.sessions.rows.table)
+    assert table.role() == QAccessible.Role.Table
+    assert table.text(QAccessible.Text.Name) == "Sessions"
+    inside = [table.child(at) for at in range(table.childCount())]
+    roles = {QAccessible.Role.ColumnHeader: [], QAccessible.Role.Cell: []}
+    for part in inside:
+        if part.role() in roles:
+            roles[part.role()].append(part.text(QAccessible.Text.Name))
+    heads, cells = roles.values()
+    assert heads == ["Participant", "Study", "Started", "Status", "Validity", "Answers"]
+    assert (cells[0], *cells[3:]) == ("P001", "Complete", "Open", "0 of 8")
+
+
+def test_a_session_is_opened_by_the_keyboard_a_double_click_and_a_button(home, qtbot):
+    table, asked = home.sessions.rows.table, []
+    home.sessions.open_asked.connect(lambda facts: asked.append(facts.participant))
+    assert not home.sessions.details.isEnabled()
+    table.setFocus()
+    qtbot.keyClick(table, Qt.Key.Key_Down)
+    qtbot.keyClick(table, Qt.Key.Key_Return)
+    middle = table.visualRect(table.model().index(0, 1)).center()
+    qtbot.mouseClick(table.viewport(), Qt.MouseButton.LeftButton, pos=middle)
+    qtbot.mouseDClick(table.viewport(), Qt.MouseButton.LeftButton, pos=middle)
+    qtbot.mouseClick(home.sessions.details, Qt.MouseButton.LeftButton)
+    assert asked == ["P001"] * 3
 
 
 def test_a_simulated_session_says_so_in_full_in_the_smallest_window(qtbot, tmp_path):
     hold(tmp_path / "demo", "P001", simulated=True)
     home = open_home(qtbot, tmp_path, LEAST)
-    qtbot.waitUntil(lambda: bool(home.sessions.lines))
-    line = home.sessions.lines[0]
+    home.sessions.show_kind("simulated")
+    assert cell(home, 0, "Study") == "demo, simulated"
+    table = home.sessions.rows.table
 
     def whole():
-        words = [one for one in line.findChildren(QLabel) if one.text() in ("demo", "simulated")]
-        assert len(words) == 2
-        for one in words:
-            assert one.fontMetrics().horizontalAdvance(one.text()) <= one.width()
-            assert one.height() >= one.fontMetrics().height()
-            assert line.rect().contains(one.geometry().translated(one.parentWidget().mapTo(line, QPoint())))
+        room = table.columnWidth(1) - 2 * GAP
+        for words, face in (("demo", font("label", weight=400)), ("simulated", font("small"))):
+            assert QFontMetrics(face).horizontalAdvance(words) <= room
+        assert sum(table.columnWidth(at) for at in range(6)) <= table.viewport().width()
 
     qtbot.waitUntil(whole)
-    assert "simulated" in line.accessibleName()
 
 
 def test_an_excluded_session_is_not_called_valid(qtbot, tmp_path):
@@ -106,17 +163,16 @@ def test_an_excluded_session_is_not_called_valid(qtbot, tmp_path):
     hold(tmp_path / "demo", "P002")
     exclude(tmp_path / "demo", "P001", 1, by="AB", reason="fell asleep")
     home = open_home(qtbot, tmp_path)
-    qtbot.waitUntil(lambda: bool(home.sessions.lines))
-    said = {line.accessibleName().split(",")[0]: line.validity for line in home.sessions.lines}
-    assert (said["P001"].word, said["P002"].word) == ("Excluded", "Open")
-    assert "fell asleep" in said["P001"].toolTip()
+    rows = {one.participant: row for row, one in enumerate(home.sessions.shown)}
+    assert (cell(home, rows["P001"], "Validity"), cell(home, rows["P002"], "Validity")) == ("Excluded", "Open")
+    assert "fell asleep" in cell(home, rows["P001"], "Validity", Qt.ItemDataRole.ToolTipRole)
 
 
 def test_an_empty_results_folder_says_so(qtbot, tmp_path):
     home = open_home(qtbot, tmp_path / "none")
     home.show_sessions()
     assert not home.sessions.none.isHidden()
-    assert home.sessions.lines == []
+    assert home.sessions.shown == ()
     assert not (tmp_path / "none").exists()
 
 
@@ -144,7 +200,7 @@ def test_a_protocol_opened_from_elsewhere_gets_a_card(home, tmp_path, monkeypatc
 def test_the_theme_changes(home, qtbot):
     rail = home.main.rail
     qtbot.mouseClick(rail.switch, Qt.MouseButton.LeftButton)
-    assert home.sessions.lines[0].theme is DARK
+    assert home.sessions.rows.table.theme is DARK
     assert rail.switch.text() == "Light theme"
 
 

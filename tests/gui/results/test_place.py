@@ -76,14 +76,14 @@ def test_an_open_study_says_by_whom_and_why_and_cannot_be_unblinded_again(place)
 
 def test_what_needs_care_is_first_and_the_foot_says_who_counts(place):
     rows = place.sessions.rows
-    assert rows.lines[0].facts.participant == "P007"
+    assert rows.shown[0].participant == "P007"
     assert place.sessions.head.text() == "6 of 7 sessions in the figures"
     assert place.sessions.why.text() == "P007 is not complete."
 
 
 def test_sessions_are_searched_and_filtered(place, qtbot):
     def shown():
-        return [line.facts.participant for line in place.sessions.rows.lines if not line.isHidden()]
+        return [one.participant for one in place.sessions.rows.shown]
 
     qtbot.keyClicks(place.sessions.search, "p00")
     assert len(shown()) == 7
@@ -91,7 +91,7 @@ def test_sessions_are_searched_and_filtered(place, qtbot):
     assert shown() == ["P003"]
     place.sessions.state.setFocus()
     qtbot.keyClick(place.sessions.state, Qt.Key.Key_Tab)
-    assert place.sessions.rows.lines[3].hasFocus(), "the keyboard finds what is shown"
+    assert place.sessions.rows.table.hasFocus(), "the keyboard finds what is shown"
     place.sessions.search.clear()
     place.sessions.state.setCurrentIndex(place.sessions.state.findData("unfinished"))
     assert shown() == ["P007"]
@@ -102,29 +102,25 @@ def test_sessions_are_searched_and_filtered(place, qtbot):
     assert place.sessions.state.currentData() == "unfinished", "what was filtered stays so when sessions come"
 
 
-def test_many_sessions_are_made_while_the_window_answers(place, qtbot):
-    place.show_view(replace(view(), sessions=tuple(facts(f"P{number:03d}") for number in range(1, 71))))
-    assert 0 < len(place.sessions.rows.lines) < 70
-    qtbot.waitUntil(lambda: len(place.sessions.rows.lines) == 70)
-    assert [line.facts.participant for line in place.sessions.rows.lines][-1] == "P070"
-
-
 def test_rows_are_chosen_by_the_keyboard_and_the_choice_begins_the_dialog(place, qtbot):
-    first = place.sessions.rows.lines[0]
+    table = place.sessions.rows.table
     place.sessions.state.setFocus()
     qtbot.keyClick(place.sessions.state, Qt.Key.Key_Tab)
-    assert first.hasFocus()
-    qtbot.keyClick(first, Qt.Key.Key_Down)
-    qtbot.keyClick(place.sessions.rows.lines[1], Qt.Key.Key_Down)
-    assert place.sessions.rows.lines[2].hasFocus()
+    assert table.hasFocus()
+    for _ in range(3):
+        qtbot.keyClick(table, Qt.Key.Key_Down)
+    assert place.sessions.rows.chosen.participant == "P003"
+    qtbot.keyClick(table, Qt.Key.Key_Up)
     assert place.sessions.rows.chosen.participant == "P002"
+    place.show_view(replace(view(), sessions=(facts("P000"), *view().sessions)))
+    assert place.sessions.rows.chosen.participant == "P002", "what was chosen stays so when sessions come"
     click(qtbot, place.exclusions.leave_out)
     assert place.dialog.session.currentText() == "P002"
     place.dialog.reject()
 
 
 def test_leaving_out_wants_a_name_and_a_reason(place, qtbot):
-    click(qtbot, place.sessions.rows.lines[1])
+    place.sessions.rows.table.selectRow(1)
     click(qtbot, place.exclusions.leave_out)
     dialog = place.dialog
     assert [dialog.trial.itemText(at) for at in range(3)] == [
@@ -338,7 +334,7 @@ def test_what_comes_and_goes_in_one_turn_is_never_a_window_of_its_own(place, qtb
     before = set(QApplication.topLevelWidgets())
     third = FigureShown("recognition", "What each liquid was named", "", SVG)
     place.show_view(replace(view(), figures=(*view().figures, third), sessions=(*view().sessions, facts("P020"))))
-    gone = [place.figures.cards[-1], *place.sessions.rows.lines]
+    gone = [place.figures.cards[-1]]
     place.show_view(view())
     shown = []
     for part in gone:

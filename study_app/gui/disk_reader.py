@@ -1,0 +1,70 @@
+"""Reading folders beside the window's thread: a slow or full disk never freezes a window."""
+
+from __future__ import annotations
+
+import queue
+import threading
+from collections.abc import Callable
+from typing import Any
+
+from PySide6.QtCore import QObject, QTimer, Signal
+
+LOOK_MS = 10
+
+
+class DiskReader(QObject):
+    """Runs one job at a time in a thread; ``done`` carries what the last job that was asked for returned.
+
+    A job that was asked for while another runs begins after it, unless a newer one takes its place. The job returns
+    refusals (`StudyError`) as values; what else it raises goes to ``threading.excepthook``, and ``done`` does not come.
+    """
+
+    done = Signal(object)
+
+    def __init__(self, parent: QObject) -> None:
+        super().__init__(parent)
+        self._made: queue.SimpleQueue[tuple[Callable[[], Any], bool, Any]] = queue.SimpleQueue()
+        self._wanted: Callable[[], Any] | None = None
+        self._thread: threading.Thread | None = None
+        self._look = QTimer(self)
+        self._look.setInterval(LOOK_MS)
+        self._look.timeout.connect(self._take)
+
+    @property
+    def reading(self) -> bool:
+        """Whether something was asked for and has not come."""
+        return self._wanted is not None
+
+    def read(self, job: Callable[[], Any]) -> None:
+        """Run ``job`` in a thread; what was asked for before it does not come any more."""
+        self._wanted = job
+        if self._thread is None:
+            self._begin(job)
+
+    def _begin(self, job: Callable[[], Any]) -> None:
+        made = self._made
+
+        def run() -> None:
+            found, whole = None, False
+            try:
+                found, whole = job(), True
+            finally:
+                made.put((job, whole, found))
+
+        self._thread = threading.Thread(target=run, name="reading", daemon=True)
+        self._thread.start()
+        self._look.start()
+
+    def _take(self) -> None:
+        try:
+            job, whole, found = self._made.get_nowait()
+        except queue.Empty:
+            return
+        self._look.stop()
+        self._thread = None
+        if self._wanted is not job and self._wanted is not None:
+            self._begin(self._wanted)
+            return
+        self._wanted = None
+        if whole:
+            self.done.emit(found)
