@@ -13,8 +13,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Final, TypeAlias
 
-from PySide6.QtCore import QObject, QTimer, QUrl
-from PySide6.QtGui import QDesktopServices
+from PySide6.QtCore import QObject, QTimer
 
 from study_app.analysis.analyst import Analyst
 from study_app.analysis.orders import (
@@ -36,6 +35,7 @@ from study_app.analysis.orders import (
     WriteTables,
 )
 from study_app.app.results_rows import left_out, opened
+from study_app.gui.application import open_here
 from study_app.gui.results.place import ResultsPlace
 from study_app.gui.results.view import (
     FigureShown,
@@ -61,11 +61,6 @@ REFUSALS: Final = {
     TakeBack: "It is still left out",
     OpenKey: "The study is still blinded",
 }
-
-
-def open_here(path: Path) -> None:
-    """Open a file or a folder with the program that the system has for it."""
-    QDesktopServices.openUrl(QUrl.fromLocalFile(str(path.resolve())))
 
 
 class ResultsDesk(QObject):

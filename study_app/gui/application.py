@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Qt
-from PySide6.QtGui import QGuiApplication
+from pathlib import Path
+
+from PySide6.QtCore import Qt, QUrl
+from PySide6.QtGui import QDesktopServices, QGuiApplication
 from PySide6.QtWidgets import QApplication
 
 from study_app.gui.display import check_display
@@ -25,3 +27,8 @@ def application_here() -> QApplication:
     application.setWindowIcon(logo(32, LIGHT.accent, LIGHT.on_accent))
     application.setQuitOnLastWindowClosed(False)
     return application
+
+
+def open_here(path: Path) -> None:
+    """Open a file or a folder with the program that the system has for it."""
+    QDesktopServices.openUrl(QUrl.fromLocalFile(str(path.resolve())))

@@ -13,6 +13,7 @@ from PySide6.QtWidgets import QBoxLayout, QFileDialog, QHBoxLayout, QScrollArea,
 
 from study_app.devices import kind_of
 from study_app.errors import StudyError
+from study_app.gui.application import open_here
 from study_app.gui.cards import SHADOW
 from study_app.gui.choices import resumed
 from study_app.gui.controls import ActionButton
@@ -38,6 +39,7 @@ from study_app.gui.new_session import NewSessionDialog
 from study_app.gui.place import Place
 from study_app.gui.screens import screens_shown
 from study_app.gui.sessions.facts import SessionFacts, sessions
+from study_app.gui.sessions.page import SessionPage
 from study_app.gui.themed import dress
 from study_app.store.machine import DEFAULTS, MachineSettings
 from study_app.workspace import workspace
@@ -66,7 +68,7 @@ class HomePlace(Place):
         super().__init__()
         self.results = results
         self.machine = DEFAULTS
-        self.dialog: NewSessionDialog | RehearsalDialog | None = None
+        self.dialog: NewSessionDialog | RehearsalDialog | SessionPage | None = None
         self._opened: list[str] = []
         self._facts: list[StudyFacts | BrokenFacts] = []
         self._reader = DiskReader(self)
@@ -82,6 +84,7 @@ class HomePlace(Place):
         self.open_protocol.clicked.connect(self._open_protocol)
         self.banner.resume_asked.connect(self._resume)
         self.sessions.all_asked.connect(lambda: self.go_asked.emit("results"))
+        self.sessions.open_asked.connect(self._open_session)
         self.device.devices_asked.connect(lambda: self.go_asked.emit("devices"))
         self.device.display_asked.connect(lambda: self.go_asked.emit("machine"))
         self.lab.lab_asked.connect(lambda: self.go_asked.emit("lab"))
@@ -206,12 +209,18 @@ class HomePlace(Place):
         dialog.finished.connect(lambda: self.sessions.show_kind("simulated") if dialog.over else None)
         dialog.accepted.connect(lambda: self.results_asked.emit(dialog.folder))
 
+    def _open_session(self, session: SessionFacts) -> None:
+        """Show a session's page; what changes there is read again."""
+        page = SessionPage(self, self.theme, session, open_here)
+        page.changed.connect(self.show_sessions)
+        self._open(page)
+
     def end(self) -> None:
         """Stop a rehearsal that is under way."""
         for dialog in self.findChildren(RehearsalDialog):
             dialog.end()
 
-    def _open(self, dialog: NewSessionDialog | RehearsalDialog) -> None:
+    def _open(self, dialog: NewSessionDialog | RehearsalDialog | SessionPage) -> None:
         self.dialog = dialog
         dialog.finished.connect(dialog.deleteLater)
         dialog.open()

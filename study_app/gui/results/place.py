@@ -18,6 +18,8 @@ from study_app.gui.results.dialogs import LeaveOutDialog, TakeBackDialog, Unblin
 from study_app.gui.results.figures import FiguresPanel
 from study_app.gui.results.view import LeftOut, ResultsView
 from study_app.gui.results.writing import Extra, WriteDialog
+from study_app.gui.sessions.facts import SessionFacts
+from study_app.gui.sessions.page import SessionPage
 from study_app.gui.theme import font
 from study_app.gui.themed import take_away
 
@@ -88,6 +90,7 @@ class ResultsPlace(Place):
         self.exclusions.take_back_asked.connect(self._ask_take_back)
         self.exclusions.list_asked.connect(lambda: self.open_asked.emit(self.view.exclusions_file))
         self.figures.asked.connect(self._remedy)
+        self.sessions.rows.opened.connect(self._open_session)
 
     def _lay_out(self) -> None:
         self._chips_there = QWidget()
@@ -210,6 +213,12 @@ class ResultsPlace(Place):
         dialog = UnblindDialog(self, self.theme, self._name(), running=open_ones)
         dialog.accepted.connect(lambda: self.unblind_asked.emit(dialog.by.text(), dialog.reason.text()))
         self._open(dialog)
+
+    def _open_session(self, session: SessionFacts) -> None:
+        """Show a session's page; what changes there is read again."""
+        page = SessionPage(self, self.theme, session, self.open_asked.emit)
+        page.changed.connect(self.entered)
+        self._open(page)
 
     def _ask_leave_out(self) -> None:
         there = [one for one in self.view.sessions if one.excluded is None]
