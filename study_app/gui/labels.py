@@ -8,14 +8,17 @@ from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QFontMetricsF, QResizeEvent, QTextLayout
 from PySide6.QtWidgets import QLabel, QSizePolicy
 
+from study_app.gui.accessible import HeadingLabel
 from study_app.gui.theme import TypeRole, font
 
+HEADINGS: frozenset[TypeRole] = frozenset({"display", "title", "title_dense", "card"})
+"""The type roles of headings, for people who see them and for screen readers."""
 Ink: TypeAlias = Literal["text", "text2", "text3", "ok", "warn", "bad", "accent"]
 
 
 def label(text: str = "", role: TypeRole = "body", ink: Ink = "text", *, wraps: bool = False) -> QLabel:
     """Return a label in the type ``role`` and the colour role ``ink``."""
-    made = QLabel(text)
+    made = HeadingLabel(text) if role in HEADINGS else QLabel(text)
     made.setTextFormat(Qt.TextFormat.PlainText)
     made.setFont(font(role))
     made.setProperty("role", ink)

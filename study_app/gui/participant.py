@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QEvent, QRect, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import (
+    QAccessible,
     QCloseEvent,
     QColor,
     QGuiApplication,
@@ -21,6 +22,7 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QWidget
 
+from study_app.gui.accessible import give_role
 from study_app.gui.escape import EscapeHold
 from study_app.gui.pages.base import PageWidget
 from study_app.gui.pages.notices import NoticeWidget, PauseWidget
@@ -136,6 +138,7 @@ class ParticipantWindow(QWidget):
         self.setFont(font("body"))
         self.setStyleSheet(stylesheet(PARTICIPANT))
         self.setMinimumSize(LEAST_SIZE)
+        give_role(self, QAccessible.Role.Window)
         if strip is not None:
             strip.setParent(self)
 
@@ -292,6 +295,7 @@ class ParticipantWindow(QWidget):
     def _title(self) -> None:
         title = self._words.window_title
         self.setWindowTitle(f"{title} – pilot" if self._pilot else title)
+        self.setAccessibleName(self.windowTitle())
 
     def _room(self) -> QRect:
         """Return where pages are."""

@@ -11,6 +11,7 @@ from PySide6.QtCore import QPointF, QSize
 from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QStackedLayout, QVBoxLayout, QWidget
 
+from study_app.gui.accessible import describe_plot
 from study_app.gui.cards import Card
 from study_app.gui.hidden import Hidden
 from study_app.gui.lab.form import HIDDEN
@@ -160,12 +161,17 @@ class CurvePlot(Plot):
         self.box.setYRange(-0.02 * self._top, self._top / (1 - share), padding=0)
 
 
+FORCE_SENTENCE = f"Size of the force of settings A and B on the same motion over the last {SPAN_S:g} s, in N."
+SPEED_SENTENCE = f"Speed of the body, and of the wake in settings A and B, over the last {SPAN_S:g} s, in m/s."
+
+
 class PlotCard(Card):
     """A plot under its heading and its curves' names; while blind, nothing of it in the same place."""
 
-    def __init__(self, title: str, unit: str, plot: CurvePlot) -> None:
+    def __init__(self, title: str, unit: str, plot: CurvePlot, sentence: str) -> None:
         super().__init__(title, label(unit, "small", "text2"), padding=14, gap=4)
         self.plot, self.legend = plot, Legend()
+        describe_plot(plot, title, sentence)
         shown = QWidget()
         column = QVBoxLayout(shown)
         column.setContentsMargins(0, 0, 0, 0)
@@ -187,7 +193,7 @@ class ForceCard(PlotCard):
     """The force of both settings on the same motion, and the limit of the one that is felt."""
 
     def __init__(self) -> None:
-        super().__init__("Force on the hand", f"N, last {SPAN_S:g} s", CurvePlot((B, A), 1.0))
+        super().__init__("Force on the hand", f"N, last {SPAN_S:g} s", CurvePlot((B, A), 1.0), FORCE_SENTENCE)
 
     def show_view(self, view: LabView) -> None:
         """Draw both forces as of now."""
@@ -208,7 +214,7 @@ class SpeedCard(PlotCard):
     """How fast the body is, and the wake that it meets in both settings."""
 
     def __init__(self) -> None:
-        super().__init__("Body and wake", f"m/s, last {SPAN_S:g} s", CurvePlot((BODY, B, A), 0.5))
+        super().__init__("Body and wake", f"m/s, last {SPAN_S:g} s", CurvePlot((BODY, B, A), 0.5), SPEED_SENTENCE)
         self.legend.show_entries(((BODY, "body"), (A, "wake of A"), (B, "wake of B")))
 
     def show_view(self, view: LabView) -> None:

@@ -6,6 +6,7 @@ import pyqtgraph as pg
 from PySide6.QtCore import QPointF, QSize
 from PySide6.QtGui import QColor
 
+from study_app.gui.accessible import describe_plot
 from study_app.gui.cards import Card
 from study_app.gui.labels import label
 from study_app.gui.operator.forces import Forces
@@ -157,7 +158,10 @@ class ForceCard(Card):
         self.column.addWidget(self.wake, 3)
         for plot in (self.plot, self.wake):
             plot.setMinimumHeight(48)
-        self.setAccessibleName("Force on the hand and speed of the wake, live")
+        span = f"over the last {TRACE_WINDOW_S:.0f} s"
+        force = f"Force along x, y and z and its size {span}, in N, with the limit of {limit_n:g} N."
+        describe_plot(self.plot, "Force on the hand", force)
+        describe_plot(self.wake, "Wake speed", f"Speed of the wake in the scene {span}, in m/s.")
 
     def show_forces(self, forces: Forces, now_ns: int) -> None:
         """Draw force and wake as of now, on the servo's clock."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtCore import QSize, Qt
 
+from study_app.gui.accessible import describe_plot
 from study_app.gui.cards import Card, Chip
 from study_app.gui.hidden import Hidden
 from study_app.gui.labels import label
@@ -18,6 +19,7 @@ class LatenessCard(Card):
     def __init__(self, limit_s: float) -> None:
         super().__init__("Tick lateness", label("last 60 s", "small", "text2"), padding=16, gap=4)
         self.plot = LatenessPlot(limit_s * 1e6)
+        describe_plot(self.plot, "Tick lateness", "Histogram of how late the ticks of the last minute began, in µs.")
         axes = label("lateness, µs (log), ticks per bin (log)", "small", "text2")
         axes.setAlignment(Qt.AlignmentFlag.AlignHCenter)
         self.column.addWidget(self.plot, 1)
@@ -37,6 +39,8 @@ class PositionCard(Card):
         title = "Position of the pointer" if pointer else "Position of the hand"
         super().__init__(title, label(f"last {TRACE_WINDOW_S:.0f} s, mm", "small", "text2"), padding=16, gap=4)
         self.plot = TracePlot(TRACE_WINDOW_S, reach_m * 1000)
+        what = f"Position along x, y and z over the last {TRACE_WINDOW_S:.0f} s, in mm."
+        describe_plot(self.plot, title, what)
         self.column.addWidget(self.plot, 1)
 
     def show_health(self, health: ServoHealth, now_s: float) -> None:

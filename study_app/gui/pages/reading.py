@@ -10,6 +10,7 @@ from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QColor, QKeyEvent, QPaintEvent, QPen
 from PySide6.QtWidgets import QFrame, QLabel, QScrollArea, QScroller, QVBoxLayout, QWidget
 
+from study_app.gui.accessible import HeadingLabel
 from study_app.gui.icons import draw_icon
 from study_app.gui.keys import GoButton
 from study_app.gui.pages.base import PageWidget, page_painter
@@ -73,7 +74,7 @@ class Column(QWidget):
         flip = self.layoutDirection() == Qt.LayoutDirection.RightToLeft
         self._start = Qt.AlignmentFlag.AlignRight if flip else Qt.AlignmentFlag.AlignLeft
         self._badge = Badge(icon, colour)
-        self._title = QLabel(title)
+        self._title = HeadingLabel(title)
         self._title.setWordWrap(True)
         self._body = QLabel()
         self._body.setWordWrap(True)

@@ -13,7 +13,7 @@ from study_app.gui.icons import draw_icon
 from study_app.gui.pages.base import mirrored, page_painter
 from study_app.gui.pages.cells import Cell
 from study_app.gui.pages.grid import NUMBER, POINTS, Grid
-from study_app.gui.pages.speech import say
+from study_app.gui.pages.speech import point_at, say
 from study_app.gui.theme import PARTICIPANT, font
 from study_app.session.pages import ItemView
 
@@ -249,6 +249,7 @@ class Row(QGroupBox):
         self.answer(value)
         if changed:
             say(self, self.accessibleDescription())
+            point_at(next(cell for cell in self.cells if cell.value == value))
         if changed or by_key:
             self.chosen.emit(changed, by_key)
 

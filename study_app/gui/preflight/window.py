@@ -6,6 +6,7 @@ from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QCloseEvent, QKeyEvent
 from PySide6.QtWidgets import QAbstractSlider, QGridLayout, QHBoxLayout, QLabel, QScrollArea, QVBoxLayout, QWidget
 
+from study_app.gui.accessible import describe_plot
 from study_app.gui.cards import Card, Chip, Rule
 from study_app.gui.controls import ActionButton
 from study_app.gui.labels import figures, label
@@ -47,6 +48,7 @@ class PreflightWindow(QWidget):
         self.checks = Card(padding=10, gap=0)
         self.rows: list[CheckRow] = []
         self.plot = LatenessPlot(limit_us)
+        describe_plot(self.plot, "Tick lateness", "Histogram of how late the ticks of two seconds began, in µs.")
         self.cancel = ActionButton("", "Cancel", height=46)
         self.again = ActionButton("repeat", "Check again", height=46)
         self.start = ActionButton("play", "Start", role="primary", height=46)

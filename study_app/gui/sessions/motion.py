@@ -8,6 +8,7 @@ from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
+from study_app.gui.accessible import describe_plot
 from study_app.gui.theme import font
 from study_app.gui.themed import Themed
 
@@ -24,7 +25,7 @@ class MotionPlot(Themed, QWidget):
         super().__init__()
         self.setFixedHeight(HEIGHT)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        self.setAccessibleName("Motion of the hand")
+        describe_plot(self, "Motion of the hand", "")
         self._times_s = np.empty(0)
         self._mm = np.empty((0, 3))
         self._sentence = ""

@@ -1,0 +1,43 @@
+"""What screen readers are told beyond Qt's own roles: headings, plots, the participant's window."""
+
+from __future__ import annotations
+
+import shiboken6
+from PySide6.QtGui import QAccessible
+from PySide6.QtWidgets import QAccessibleWidget, QLabel, QWidget
+
+_given: list[QAccessibleWidget] = []
+_PRUNED_FROM = 256
+
+
+def give_role(widget: QWidget, role: QAccessible.Role) -> None:
+    """Give ``widget`` a role that Qt does not give to its class; its accessible name and description stay its own.
+
+    Qt owns the interface and deletes it with the widget; Python's reference must outlive it, or it is deleted twice.
+    """
+    if len(_given) >= _PRUNED_FROM:
+        _given[:] = [one for one in _given if shiboken6.isValid(one)]
+    made = QAccessibleWidget(widget, role)
+    QAccessible.registerAccessibleInterface(made)
+    _given.append(made)
+
+
+def describe_plot(plot: QWidget, name: str, sentence: str) -> None:
+    """Give a plot a name and a description of one sentence."""
+    plot.setAccessibleName(name)
+    plot.setAccessibleDescription(sentence)
+    give_role(plot, QAccessible.Role.Chart)
+
+
+class HeadingLabel(QLabel):
+    """A label that is a heading to a screen reader."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(text)
+        self.setAccessibleName(text)
+        give_role(self, QAccessible.Role.Heading)
+
+    def setText(self, text: str) -> None:  # noqa: N802 - Qt's name
+        """Show another text."""
+        super().setText(text)
+        self.setAccessibleName(text)
