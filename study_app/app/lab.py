@@ -12,6 +12,7 @@ import random
 import sys
 import traceback
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Final
@@ -27,7 +28,8 @@ from study_app.errors import StudyError
 from study_app.evaluation.appraiser import Appraiser
 from study_app.gui.lab.place import LabPlace
 from study_app.gui.lab.view import DeviceShown, LabView, Now
-from study_app.lab.presets import Choice, spoken
+from study_app.gui.tank import caustics
+from study_app.lab.presets import Choice, liquids_at_hand, spoken
 from study_app.lab.programmes import TITLES
 from study_app.lab.workbench import Chance, Setting, Side, Workbench
 
@@ -41,12 +43,28 @@ FIRST_B: Final = Choice("rek2024", "light_oil", "Light oil")
 log = logging.getLogger(__name__)
 
 
-def compose_lab(place: LabPlace, *, device: str = "mouse", firmware: Path | None = None) -> LabVisit:
+@dataclass(frozen=True, slots=True)
+class First:
+    """What the lab begins with: both settings, and the liquids at hand."""
+
+    bench: Workbench
+    liquids: tuple[Choice, ...]
+
+
+def prepare() -> First:
+    """Read what the lab begins with and compute the tank's light, in whatever thread."""
+    caustics.brightness()
+    return First(Workbench(FIRST_A.setting(), FIRST_B.setting()), liquids_at_hand())
+
+
+def compose_lab(
+    place: LabPlace, *, device: str = "mouse", firmware: Path | None = None, first: First | None = None
+) -> LabVisit:
     """Give a lab's place its device, servo and prices: they come as it is entered and go as it is left.
 
-    ``device`` is the one it begins with, ``firmware`` the file of a Falcon's program.
+    ``device`` is the one it begins with, ``firmware`` the file of a Falcon's program, ``first`` what was prepared.
     """
-    return LabVisit(place, device=device, firmware=firmware)
+    return LabVisit(place, device=device, firmware=firmware, first=first)
 
 
 class LabVisit(QObject):
@@ -58,6 +76,7 @@ class LabVisit(QObject):
     device, firmware : what it begins with, and the file of a Falcon's program
     open_live, make_appraiser : what opens a device by its name, what begins the process that appraises
     chance : what a blinding is drawn from
+    first : what it begins with, where that was prepared
     """
 
     def __init__(
@@ -69,12 +88,15 @@ class LabVisit(QObject):
         open_live: Callable[..., Live] | None = None,
         make_appraiser: Callable[[], AsksPrice] = Appraiser,
         chance: Chance | None = None,
+        first: First | None = None,
     ) -> None:
         super().__init__(place)
+        first = first if first is not None else prepare()
         self.place = place
         self.live: Live | None = None
         self.device = device
-        self.bench = Workbench(FIRST_A.setting(), FIRST_B.setting())
+        self.bench = first.bench
+        self.liquids = first.liquids
         self.trouble = ""
         self._refused: tuple[str, str] | None = None
         self._entered = False

@@ -12,6 +12,7 @@ from study_app.app.live_session import BUG, LiveSession
 from study_app.app.machine import MachineDesk, theme_named
 from study_app.errors import StoreError
 from study_app.gui.application import application_here
+from study_app.gui.background import Background
 from study_app.gui.choices import NewSession
 from study_app.gui.collector import collecting_here
 from study_app.gui.ending import ended_from_outside
@@ -25,7 +26,7 @@ from study_app.workspace import Workspace, chosen_workspace, offered_workspace, 
 LOOK_AFTER_MS = 300  # the window stands by then
 
 if TYPE_CHECKING:
-    from study_app.app.lab import LabVisit
+    from study_app.app.lab import First, LabVisit
     from study_app.app.results import ResultsDesk
     from study_app.gui.lab.place import LabPlace
     from study_app.gui.results.place import ResultsPlace
@@ -51,6 +52,13 @@ def home(results: Path | None = None) -> int:
     return visit.code
 
 
+def _first_of_lab() -> First:
+    """Load the lab's modules and what it begins with."""
+    from study_app.app.lab import prepare  # noqa: PLC0415
+
+    return prepare()
+
+
 class Visit(QObject):
     """The home window's stay: one session at a time, and home again after it."""
 
@@ -71,7 +79,11 @@ class Visit(QObject):
                 "machine": self.machine.make_place,
             },
             theme=theme_named(self.machine.settings.theme),
+            prepares={"lab": self._prepare_lab},
         )
+        self._lab_first: First | None = None
+        self._preparing = Background(self)
+        self._preparing.done.connect(self._lab_prepared)
         self.loop = QEventLoop()
         self.code = 0
         self.live: LiveSession | None = None
@@ -94,6 +106,7 @@ class Visit(QObject):
         elif self._follows_machine and chosen_workspace() is None:
             self._ask_for_workspace()
         QTimer.singleShot(LOOK_AFTER_MS, self.devices, self.devices.look)
+        QTimer.singleShot(LOOK_AFTER_MS, self, self._prepare_lab)
 
     def _ask_for_workspace(self) -> None:
         """Ask once which folder holds protocols and results; until it is answered the offered one is used."""
@@ -154,13 +167,23 @@ class Visit(QObject):
         self.desk = ResultsDesk(self.results)
         return self.desk.place
 
+    def _prepare_lab(self) -> bool:
+        """Load the lab beside the windows, from when home stands; return whether that is done."""
+        if self._lab_first is None and not self._preparing.busy:
+            self._preparing.run(_first_of_lab)
+        return self._lab_first is not None
+
+    def _lab_prepared(self, first: First) -> None:
+        self._lab_first = first
+        self.window.prepared("lab")
+
     def _lab(self) -> LabPlace:
         from study_app.app.lab import compose_lab  # noqa: PLC0415 - pyqtgraph: only once it is needed
         from study_app.gui.lab.place import LabPlace  # noqa: PLC0415
 
         made = LabPlace()
         settings = self.machine.settings
-        self.lab = compose_lab(made, device=settings.device, firmware=settings.firmware_file)
+        self.lab = compose_lab(made, device=settings.device, firmware=settings.firmware_file, first=self._lab_first)
         return made
 
     def end(self) -> None:

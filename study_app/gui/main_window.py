@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from types import MappingProxyType
 
 from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QCloseEvent, QKeySequence, QResizeEvent, QShortcut
-from PySide6.QtWidgets import QDialog, QHBoxLayout, QMainWindow, QStackedWidget, QWidget
+from PySide6.QtWidgets import QDialog, QHBoxLayout, QMainWindow, QStackedWidget, QVBoxLayout, QWidget
 
 from study_app.gui.dialogs import Notice
+from study_app.gui.labels import label
 from study_app.gui.place import Place
 from study_app.gui.rail import Rail
 from study_app.gui.theme import DARK, LIGHT, Theme
@@ -17,6 +19,15 @@ from study_app.gui.themed import dress, wear
 FULL = QSize(1440, 900)
 LEAST = QSize(1024, 640)
 NARROW_BELOW = 1400
+NONE: Mapping[str, Callable[[], bool]] = MappingProxyType({})
+
+
+def _waiting_place() -> Place:
+    """Return a line in the middle, in place of what is being prepared."""
+    made = Place()
+    column = QVBoxLayout(made)
+    column.addWidget(label("Preparing …", "card", "text2"), 0, Qt.AlignmentFlag.AlignCenter)
+    return made
 
 
 class MainWindow(QMainWindow):
@@ -26,6 +37,9 @@ class MainWindow(QMainWindow):
     ----------
     makers
         What makes each place, by its name; the first is where one begins.
+    prepares
+        For a place that takes long to make, what prepares it beside the window's thread and returns whether that is
+        done; until `prepared` is called, a line stands in its place.
 
     ``closed`` comes when the operator is done, ``theme_changed`` with the `Theme` that was asked for here.
     """
@@ -33,17 +47,26 @@ class MainWindow(QMainWindow):
     closed = Signal()
     theme_changed = Signal(object)
 
-    def __init__(self, makers: Mapping[str, Callable[[], Place]], *, theme: Theme = LIGHT) -> None:
+    def __init__(
+        self,
+        makers: Mapping[str, Callable[[], Place]],
+        *,
+        theme: Theme = LIGHT,
+        prepares: Mapping[str, Callable[[], bool]] = NONE,
+    ) -> None:
         super().__init__()
         self.setWindowTitle("Liquid Study")
         self.setMinimumSize(LEAST)
         self.theme = theme
         self.notice: Notice | None = None
         self._makers = makers
+        self._prepares = prepares
         self._places: dict[str, Place] = {}
+        self._waiting = _waiting_place()
         self._here = next(iter(makers))
         self.rail = Rail(makers)
         self.stack = QStackedWidget()
+        self.stack.addWidget(self._waiting)
         whole = QWidget()
         whole.setProperty("role", "window")
         row = QHBoxLayout(whole)
@@ -79,26 +102,36 @@ class MainWindow(QMainWindow):
 
     def go(self, name: str) -> None:
         """Leave the place one is at and show another."""
-        asked = self.place(name)
+        ready = name in self._places or name not in self._prepares or self._prepares[name]()
+        asked = self.place(name) if ready else self._waiting
         if self.stack.currentWidget() is asked and name == self._here and asked.isVisible():
             return
         if name != self._here:
-            self.place(self._here).leave()
+            self._now().leave()
         self._here = name
         self.rail.mark(name)
         self.stack.setCurrentWidget(asked)
         self._arrange()
         asked.enter()
 
+    def prepared(self, name: str) -> None:
+        """Show a place that was waited for, if one is still there."""
+        if self._here == name and name not in self._places:
+            self.go(name)
+
+    def _now(self) -> Place:
+        """Return the place one is at, or the line that stands there until it is prepared."""
+        return self._places.get(self._here, self._waiting)
+
     def rest(self) -> None:
         """Leave the place one is at, and the screen: a session takes over."""
-        self.place(self._here).leave()
+        self._now().leave()
         self.hide()
 
     def come_back(self) -> None:
         """Be there again, where one was."""
         self.show()
-        self.place(self._here).enter()
+        self._now().enter()
 
     def tell(self, title: str, sentence: str) -> None:
         """Say what went wrong, with one button."""
@@ -118,7 +151,7 @@ class MainWindow(QMainWindow):
         self.theme_changed.emit(self.theme)
 
     def _arrange(self) -> None:
-        self.rail.narrow(self.width() < NARROW_BELOW or self.place(self._here).wants_narrow_rail())
+        self.rail.narrow(self.width() < NARROW_BELOW or self._now().wants_narrow_rail())
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
         """Make room: the rail becomes narrow in a small window."""

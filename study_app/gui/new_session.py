@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import Qt
@@ -20,6 +22,7 @@ from PySide6.QtWidgets import (
 
 from study_app.devices import kind_of, list_devices
 from study_app.errors import DeviceError, StoreError
+from study_app.gui.background import Background
 from study_app.gui.cards import Icon, Rule
 from study_app.gui.choices import NewSession, draw_seed, study_results
 from study_app.gui.controls import ActionButton, Check, Choice, Number
@@ -29,9 +32,8 @@ from study_app.gui.labels import label, set_ink
 from study_app.gui.screens import screens_shown
 from study_app.gui.theme import LIGHT, Theme, font
 from study_app.gui.themed import wear
-from study_app.store.abandoned import abandoned
 from study_app.store.description import check_study
-from study_app.store.layout import MAX_SESSION, StudyFolder, check_participant, check_unused, suggest_id
+from study_app.store.layout import MAX_SESSION, StudyFolder, UsedIds, check_participant, used_ids
 from study_app.store.machine import DEFAULTS, MachineSettings
 from study_app.workspace import workspace
 
@@ -44,6 +46,26 @@ _NOTES = {
 DEVICE_WORDS = {name: f"{title}{_NOTES.get(name, '')}" for name, title in TITLES.items()}
 NEEDS_FIRMWARE = "falcon"
 FRAME = 60  # of a window, at most
+
+
+@dataclass(frozen=True, slots=True)
+class _FolderState:
+    """A study's folder when it was read: which ids are used, and why no session of the study can be put there."""
+
+    path: Path
+    used: UsedIds
+    fault: str
+
+
+def _state_of(path: Path, study: str) -> _FolderState:
+    folder, fault = StudyFolder(path), ""
+    used = UsedIds(path, frozenset(), ())
+    try:
+        check_study(folder, study)
+        used = used_ids(folder)
+    except StoreError as error:
+        fault = str(error)
+    return _FolderState(path, used, fault)
 
 
 class NewSessionDialog(QDialog):
@@ -71,6 +93,9 @@ class NewSessionDialog(QDialog):
         super().__init__(parent)
         self.facts = facts
         self._machine = machine
+        self._state: _FolderState | None = None
+        self._reader = Background(self)
+        self._reader.done.connect(self._take_state)
         self.setWindowTitle("New session")
         self.setModal(True)
         self.setMinimumWidth(720)
@@ -104,7 +129,7 @@ class NewSessionDialog(QDialog):
 
     def _fill(self) -> None:
         study = self.facts.protocol.study
-        self.participant.setText(suggest_id(StudyFolder(Path(self.results.text()))))
+        self.participant.setText(self._state_now().used.suggested())
         self.session.setAccessibleName("Session")
         self.seed.setText(str(draw_seed()))
         self.seed.setValidator(QIntValidator(0, 2_147_483_647, self))
@@ -287,6 +312,11 @@ class NewSessionDialog(QDialog):
         self._check()
 
     def _check(self) -> None:
+        """Judge what stands there, and look whether the folder has changed since."""
+        self._show_verdict()
+        self._look()
+
+    def _show_verdict(self) -> None:
         """Say at once whether this can begin, and if not, why and what to do."""
         fault = self._fault()
         inside = Path(self.results.text()).resolve().is_relative_to(workspace().folder.resolve())
@@ -298,15 +328,33 @@ class NewSessionDialog(QDialog):
             self._say(f"{self.participant.text().strip()} is free, session {self.session.value()}", good=True)
         self._fit()
 
+    def _look(self) -> None:
+        """Read the study's folder again, beside the window's thread: another program may use it, too."""
+        if text := self.results.text().strip():
+            self._reader.run(partial(_state_of, Path(text), self.facts.protocol.study.name))
+
+    def _take_state(self, state: _FolderState) -> None:
+        if state.path == Path(self.results.text().strip()) and state != self._state:
+            self._state = state
+            self._show_verdict()
+
+    def _state_now(self) -> _FolderState:
+        """Return the study's folder as it was last read; one that was just chosen is read at once."""
+        path = Path(self.results.text().strip() or ".")
+        if self._state is None or self._state.path != path:
+            self._state = _state_of(path, self.facts.protocol.study.name)
+        return self._state
+
     def _fault(self) -> str:
         """Return why this cannot begin; nothing is touched to find out."""
         if not self.results.text().strip():
             return "choose a results folder"
-        participant, folder = self.participant.text().strip(), StudyFolder(Path(self.results.text().strip()))
+        participant, state = self.participant.text().strip(), self._state_now()
         try:
             check_participant(participant, pilot=self.pilot.isChecked())
-            check_study(folder, self.facts.protocol.study.name)
-            check_unused(folder, participant, self.session.value())
+            if state.fault:
+                return state.fault
+            state.used.check_unused(participant, self.session.value())
         except StoreError as error:
             return str(error)
         firmware = self.firmware.text().strip()
@@ -316,16 +364,12 @@ class NewSessionDialog(QDialog):
 
     def _offer_ways(self) -> None:
         """Where the id is used, offer the ways to go on that need no thought; going on with its session is for home."""
-        participant, folder = self.participant.text().strip(), StudyFolder(Path(self.results.text().strip() or "."))
-        held = [
-            session.number
-            for session in folder.sessions()
-            if session.participant == participant and not abandoned(session.path)
-        ]
+        participant, used = self.participant.text().strip(), self._state_now().used
+        held = used.numbers(participant)
         self._ways_row.setVisible(self.session.value() in held)
         if self.session.value() not in held:
             return
-        self._free = min(max(held) + 1, MAX_SESSION), suggest_id(folder)
+        self._free = min(max(held) + 1, MAX_SESSION), used.suggested()
         another, new = self.ways
         another.show_action("", f"Session {self._free[0]} of {participant}")
         new.show_action("", f"New participant {self._free[1]}")

@@ -24,7 +24,6 @@ from pathlib import Path
 
 from study_app.errors import StoreError
 from study_app.store.abandoned import abandoned
-from study_app.store.atomic import is_there
 
 MAX_ID_LENGTH = 32
 MAX_SESSION = 99
@@ -205,27 +204,67 @@ def check_participant(participant: str, *, pilot: bool = False) -> None:
         )
 
 
-def check_unused(folder: StudyFolder, participant: str, number: int) -> None:
-    """Refuse a session that exists, or an id that differs from a used one in nothing but capitals.
+@dataclass(frozen=True, slots=True)
+class UsedIds:
+    """The sessions of a study's folder as they were when it was read: ids and numbers are checked without the disk.
 
-    A session that was claimed by a program that is gone, and never begun, can be begun.
-
-    Raises
-    ------
-    StoreError
-        Names the three ways to go on. Nothing is touched.
+    ``held`` are participant and number of the sessions that were begun, or are claimed by a program that runs; ``ids``
+    the ids of all folders.
     """
-    if not 1 <= number <= MAX_SESSION:
-        raise StoreError(f"session number {number} cannot be used: it must be from 1 to {MAX_SESSION}")
-    for used in folder.ids():
-        if used != participant and used.lower() == participant.lower():
-            raise StoreError(
-                f"participant id {participant!r} differs from the used {used!r} in capitals alone: use {used!r} with a "
-                "new session number, or another id"
-            )
-    path = folder.session(participant, number).path
-    if is_there(path) and not abandoned(path):
-        raise used_id(folder, participant, number)
+
+    path: Path
+    held: frozenset[tuple[str, int]]
+    ids: tuple[str, ...]
+
+    def numbers(self, participant: str) -> tuple[int, ...]:
+        """Return the numbers of a participant's sessions."""
+        return tuple(sorted(number for one, number in self.held if one == participant))
+
+    def suggested(self) -> str:
+        """Return the next free id: P001, P002 ...; those of sessions that were never begun are free again."""
+        matches = (_NUMBERED.fullmatch(participant.upper()) for participant, _ in self.held)
+        return f"P{max((int(match[1]) for match in matches if match), default=0) + 1:03d}"
+
+    def check_unused(self, participant: str, number: int) -> None:
+        """Refuse a session that exists, or an id that differs from a used one in nothing but capitals.
+
+        A session that was claimed by a program that is gone, and never begun, can be begun.
+
+        Raises
+        ------
+        StoreError
+            Names the three ways to go on.
+        """
+        if not 1 <= number <= MAX_SESSION:
+            raise StoreError(f"session number {number} cannot be used: it must be from 1 to {MAX_SESSION}")
+        for used in self.ids:
+            if used != participant and used.lower() == participant.lower():
+                raise StoreError(
+                    f"participant id {participant!r} differs from the used {used!r} in capitals alone: use {used!r} "
+                    "with a new session number, or another id"
+                )
+        if (participant, number) in self.held:
+            raise self.refusal(participant, number)
+
+    def refusal(self, participant: str, number: int) -> StoreError:
+        """Return the refusal of a used id, with the three ways to go on."""
+        free = max(self.numbers(participant), default=number)
+        return StoreError(
+            f"participant {participant} already has session {number} in {self.path}: use a new session number "
+            f"({free + 1}), resume that session, or use another id (next free: {self.suggested()}); nothing was changed"
+        )
+
+
+def used_ids(folder: StudyFolder) -> UsedIds:
+    """Return which ids and session numbers of a study are used; nothing is touched."""
+    sessions = folder.sessions()
+    held = frozenset((one.participant, one.number) for one in sessions if not abandoned(one.path))
+    return UsedIds(folder.path, held, tuple(sorted({one.participant for one in sessions})))
+
+
+def check_unused(folder: StudyFolder, participant: str, number: int) -> None:
+    """Refuse a session that exists (see `UsedIds.check_unused`); nothing is touched."""
+    used_ids(folder).check_unused(participant, number)
 
 
 def refuse_never_begun(session: SessionFolder) -> None:
@@ -245,18 +284,9 @@ def refuse_never_begun(session: SessionFolder) -> None:
 
 def used_id(folder: StudyFolder, participant: str, number: int) -> StoreError:
     """Return the refusal of a used id, with the three ways to go on."""
-    free = max((session.number for session in folder.sessions() if session.participant == participant), default=number)
-    return StoreError(
-        f"participant {participant} already has session {number} in {folder.path}: use a new session number "
-        f"({free + 1}), resume that session, or use another id (next free: {suggest_id(folder)}); nothing was changed"
-    )
+    return used_ids(folder).refusal(participant, number)
 
 
 def suggest_id(folder: StudyFolder) -> str:
-    """Return the next free id: P001, P002 ...; those of sessions that were never begun are free again."""
-    numbers = [
-        int(match[1])
-        for session in folder.sessions()
-        if (match := _NUMBERED.fullmatch(session.participant.upper())) and not abandoned(session.path)
-    ]
-    return f"P{max(numbers, default=0) + 1:03d}"
+    """Return the next free id (see `UsedIds.suggested`)."""
+    return used_ids(folder).suggested()

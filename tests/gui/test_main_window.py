@@ -113,3 +113,30 @@ def test_the_words_of_a_narrow_rail_stay_whole_in_another_theme(main, qtbot):
     for button in (*main.rail.buttons.values(), main.rail.switch):
         qtbot.waitUntil(lambda button=button: button.height() == 58)
         assert QFontMetrics(font("key")).horizontalAdvance(button.text()) <= button.width()
+
+
+def test_a_place_that_is_not_prepared_never_freezes_the_window(qtbot):
+    ready, made = [], []
+
+    def make():
+        made.append("lab")
+        return Place()
+
+    window = MainWindow({"home": Place, "lab": make}, prepares={"lab": lambda: bool(ready)})
+    qtbot.addWidget(window)
+    window.show()
+    window.go("lab")
+    assert (window.here, made) == ("lab", [])
+    waits = window.stack.currentWidget()
+    window.go("home")
+    window.prepared("lab")
+    assert (window.here, made) == ("home", []), "nobody waits for it any more"
+    window.go("lab")
+    ready.append(True)
+    window.prepared("lab")
+    assert made == ["lab"]
+    assert window.stack.currentWidget() is window.place("lab") is not waits
+    window.go("home")
+    window.rest()
+    window.come_back()
+    window.close()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from pathlib import Path
 
 import pytest
@@ -37,6 +38,35 @@ def use(results: Path, participant: str, session: int = 1) -> None:
     (folder / "checksums.sha256").touch()  # something that comes after a session's beginning
 
 
+def test_a_key_in_a_field_reads_no_folder_in_the_windows_thread(dialog, qtbot, monkeypatch):
+    threads, read = [], new_session._state_of
+
+    def noted(*arguments):
+        threads.append(threading.current_thread())
+        return read(*arguments)
+
+    monkeypatch.setattr(new_session, "_state_of", noted)
+    dialog.participant.clear()
+    qtbot.keyClicks(dialog.participant, "P0042")
+    dialog.session.setValue(3)
+    settle(qtbot, dialog)
+    assert threads
+    assert threading.main_thread() not in threads
+
+
+def test_what_another_program_began_meanwhile_is_refused(dialog, results, qtbot):
+    settle(qtbot, dialog)
+    use(results, "P001")
+    dialog.seed.setText("7")
+    qtbot.waitUntil(lambda: not dialog.begin.isEnabled())
+    assert "already has session 1" in dialog.verdict.text()
+
+
+def settle(qtbot, dialog):
+    """Wait until the folder was read again."""
+    qtbot.waitUntil(lambda: not dialog._reader.busy)
+
+
 def files(folder: Path) -> list[Path]:
     return sorted(folder.rglob("*"))
 
@@ -65,9 +95,10 @@ def test_ids_kept_for_pilots_are_refused(dialog, kept):
     assert not dialog.begin.isEnabled()
 
 
-def test_a_used_id_is_refused_with_the_ways_to_go_on_until_one_is_taken(dialog, results):
+def test_a_used_id_is_refused_with_the_ways_to_go_on_until_one_is_taken(dialog, results, qtbot):
     use(results, "P007")
     dialog.participant.setText("P007")
+    settle(qtbot, dialog)
     assert not dialog.begin.isEnabled()
     for way in ("new session number (2)", "resume", "another id"):
         assert way in dialog.verdict.text()
@@ -228,6 +259,7 @@ def test_the_foot_stays_on_a_small_screen_and_every_question_is_reached(dialog, 
     use(results, "P001")
     dialog.device.setCurrentIndex(dialog.device.findData("falcon"))
     dialog.participant.setText("P001")
+    settle(qtbot, dialog)
     dialog.show()
     QApplication.processEvents()
     assert dialog.height() <= 640 - 60

@@ -14,11 +14,11 @@ from PySide6.QtWidgets import QBoxLayout, QFileDialog, QHBoxLayout, QScrollArea,
 from study_app.devices import kind_of
 from study_app.errors import StudyError
 from study_app.gui.application import open_here
+from study_app.gui.background import Background
 from study_app.gui.cards import SHADOW
 from study_app.gui.choices import resumed
 from study_app.gui.controls import ActionButton
 from study_app.gui.devices.view import DeviceShown, looking
-from study_app.gui.disk_reader import DiskReader
 from study_app.gui.home.banner import ResumeBanner
 from study_app.gui.home.beside import DeviceCard, LabCard
 from study_app.gui.home.cards import BrokenCard, CardGrid, StudyCard
@@ -71,7 +71,7 @@ class HomePlace(Place):
         self.dialog: NewSessionDialog | RehearsalDialog | SessionPage | None = None
         self._opened: list[str] = []
         self._facts: list[StudyFacts | BrokenFacts] = []
-        self._reader = DiskReader(self)
+        self._reader = Background(self)
         self._reader.done.connect(self._show_read)
         self.banner = ResumeBanner()
         self.grid = CardGrid()
@@ -141,7 +141,7 @@ class HomePlace(Place):
     @property
     def reading(self) -> bool:
         """Whether the results folder is being read."""
-        return self._reader.reading
+        return self._reader.busy
 
     def show_results(self, results: Path) -> None:
         """Show the protocols of the workspace and the sessions of another folder from now on."""
@@ -170,7 +170,7 @@ class HomePlace(Place):
     def show_sessions(self) -> None:
         """Read the results folder again, beside the window's thread."""
         studies = tuple(facts for facts in self._facts if isinstance(facts, StudyFacts))
-        self._reader.read(partial(_read, self.results, studies))
+        self._reader.run(partial(_read, self.results, studies))
 
     def _show_read(self, read: tuple[Path, tuple[SessionFacts, ...], Interrupted | None]) -> None:
         results, found, stopped = read

@@ -25,13 +25,14 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
+from study_app.gui.background import Background
 from study_app.gui.icons import draw_icon
 from study_app.gui.lab.tail import TailPlaces, draw_head, draw_ring, paint_floor, paint_tail, tail_places
 from study_app.gui.lab.view import LabView, Point
 from study_app.gui.operator.view import grouped
 from study_app.gui.pointer import PointerCapture
 from study_app.gui.tank import sprites
-from study_app.gui.tank.backdrop import backdrop
+from study_app.gui.tank.backdrop import Backdrop, backdrop
 from study_app.gui.tank.camera import Box, Camera
 from study_app.gui.tank.frame import BallPlace, BallPlacer
 from study_app.gui.theme import PARTICIPANT, RADIUS_CARD, TANK, font
@@ -69,6 +70,10 @@ class LabTank(Themed, QWidget):
         self._workspace_m, self._radius_m = WORKSPACE_M, BALL_M
         self._box = Box.around(WORKSPACE_M, BALL_M)
         self._placer: BallPlacer | None = None
+        self._still: Backdrop | None = None
+        self._wanted: object = None
+        self._painting = Background(self)
+        self._painting.done.connect(self._take_still)
         self._name_font = font("label", weight=600)
         self.pointer = PointerCapture(self)
         self.pointer.moved.connect(self.moved)
@@ -151,8 +156,11 @@ class LabTank(Themed, QWidget):
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
         """Paint tank, tail, ball, arrows and words."""
         camera = self._ready()
-        still = backdrop((self.width(), self.height()), self.devicePixelRatioF(), self._box, camera)
+        still = self._still_of(camera)
         painter = QPainter(self)
+        if still is None:
+            painter.fillRect(self.rect(), QColor(PARTICIPANT.window))
+            return
         painter.drawImage(QPointF(0, 0), still.back)
         painter.setRenderHints(QPainter.RenderHint.Antialiasing | QPainter.RenderHint.SmoothPixmapTransform)
         view = self._view
@@ -173,6 +181,19 @@ class LabTank(Themed, QWidget):
         painter.drawImage(still.front_at.topLeft(), still.front)
         self._paint_words(painter, places)
         self._paint_corners(painter)
+
+    def _still_of(self, camera: Camera) -> Backdrop | None:
+        """Return what stands still, painted for this size; None while it is being painted, beside this thread."""
+        wanted = ((self.width(), self.height()), self.devicePixelRatioF(), self._box, camera)
+        if wanted != self._wanted:
+            self._wanted, self._still = wanted, None
+            self._painting.run(lambda: (wanted, backdrop(*wanted)))
+        return self._still
+
+    def _take_still(self, painted: tuple[object, Backdrop]) -> None:
+        if painted[0] == self._wanted:
+            self._still = painted[1]
+            self.update()
 
     def _ball(self) -> BallPlace | None:
         if self._view is None or self._view.now is None or self._placer is None:

@@ -11,9 +11,9 @@ from PySide6.QtCore import QAbstractTableModel, QModelIndex, Qt, Signal
 from PySide6.QtWidgets import QDialog, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
 
 from study_app.errors import StoreError
+from study_app.gui.background import Background
 from study_app.gui.cards import Card, Chip
 from study_app.gui.controls import ActionButton
-from study_app.gui.disk_reader import DiskReader
 from study_app.gui.labels import label, set_ink
 from study_app.gui.results.dialogs import LeaveOutDialog
 from study_app.gui.sessions.facts import SessionFacts
@@ -113,7 +113,7 @@ class SessionPage(QDialog):
         self.record: SessionRecord | None = None
         self.decision: LeaveOutDialog | None = None
         self._theme = theme
-        self._reader, self._mover = DiskReader(self), DiskReader(self)
+        self._reader, self._mover = Background(self), Background(self)
         self._reader.done.connect(self._show)
         self._mover.done.connect(self._show_motion)
         self.setWindowTitle(f"{facts.name}, {facts.study}")
@@ -144,7 +144,7 @@ class SessionPage(QDialog):
 
     def read(self) -> None:
         """Read the session's folder again."""
-        self._reader.read(partial(_told, read_record, self.facts.folder))
+        self._reader.run(partial(_told, read_record, self.facts.folder))
 
     def _lay_out(self) -> None:
         head = QHBoxLayout()
@@ -249,7 +249,7 @@ class SessionPage(QDialog):
             self.motion.show_sentence(NO_MOTION if trial.recording is None else self.record.motion_hidden)
             return
         self.motion.show_sentence("Reading …")
-        self._mover.read(partial(_told, motion, trial.recording))
+        self._mover.run(partial(_told, motion, trial.recording))
 
     def _show_motion(self, told: Any) -> None:
         if isinstance(told, StoreError):
@@ -279,7 +279,7 @@ class SessionPage(QDialog):
             decide()
             return read_record(folder)
 
-        self._reader.read(partial(_told, decided, self.facts.folder))
+        self._reader.run(partial(_told, decided, self.facts.folder))
         self._reader.done.connect(self._tell_change, Qt.ConnectionType.SingleShotConnection)
 
     def _tell_change(self) -> None:

@@ -1,4 +1,4 @@
-"""Reading folders beside the window's thread: a slow or full disk never freezes a window."""
+"""Jobs beside the window's thread: neither a slow disk nor a long computation freezes a window."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from PySide6.QtCore import QObject, QTimer, Signal
 LOOK_MS = 10
 
 
-class DiskReader(QObject):
+class Background(QObject):
     """Runs one job at a time in a thread; ``done`` carries what the last job that was asked for returned.
 
     A job that was asked for while another runs begins after it, unless a newer one takes its place. The job returns
@@ -31,11 +31,11 @@ class DiskReader(QObject):
         self._look.timeout.connect(self._take)
 
     @property
-    def reading(self) -> bool:
+    def busy(self) -> bool:
         """Whether something was asked for and has not come."""
         return self._wanted is not None
 
-    def read(self, job: Callable[[], Any]) -> None:
+    def run(self, job: Callable[[], Any]) -> None:
         """Run ``job`` in a thread; what was asked for before it does not come any more."""
         self._wanted = job
         if self._thread is None:
@@ -44,14 +44,14 @@ class DiskReader(QObject):
     def _begin(self, job: Callable[[], Any]) -> None:
         made = self._made
 
-        def run() -> None:
+        def work() -> None:
             found, whole = None, False
             try:
                 found, whole = job(), True
             finally:
                 made.put((job, whole, found))
 
-        self._thread = threading.Thread(target=run, name="reading", daemon=True)
+        self._thread = threading.Thread(target=work, name="background", daemon=True)
         self._thread.start()
         self._look.start()
 
