@@ -272,10 +272,12 @@ def _warned(protocol: Protocol) -> Iterator[Iterable[str]]:
 
 def _limits(protocol: Protocol) -> list[tuple[str, str]]:
     limits = protocol.limits
+    least = limits.targets_percent
     return [
         (f"{limits.lateness_ms:g} ms", "lateness of ticks (99th percentile)"),
         (f"{limits.worst_gap_ms:g} ms", "between two ticks"),
         (f"{limits.delay_error_ms:g} ms", "error of the delay (95th percentile)"),
         (f"{limits.frame_gap_ms:g} ms", "before the first frame, and between two"),
         (f"{limits.withheld_percent:g} %", "of the force withheld by the passivity controller and the slew limit"),
+        *([] if least is None else [(f"{least:g} %", "of the targets reached, at least")]),
     ]

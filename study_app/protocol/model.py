@@ -175,7 +175,7 @@ class PageText(Table):
 
 
 class Limits(Table):
-    """What a trial may show at most and still be valid."""
+    """What a trial may show at most, and what it must show at least, and still be valid."""
 
     lateness_ms: Annotated[float, within(0.01, 1000, "no servo is more punctual, and 1 s is a failure")] = Field(
         default=2, description="99th percentile of the lateness of ticks [ms]."
@@ -193,6 +193,14 @@ class Limits(Table):
     withheld_percent: Annotated[float, within(0.01, 100, "a share of the force; none withheld at all is rare")] = Field(
         default=5, description="Share of the force that passivity controller and slew limit withhold [%]."
     )
+    targets_percent: Annotated[float, within(0.01, 100, "a share of the targets; left out, any is enough")] | None = (
+        Field(default=None, description="Least share of a reaching task's targets that must be reached [%].")
+    )
+
+    @model_serializer(mode="wrap")
+    def _without_what_is_not_asked(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave a completeness that is not asked for out of files: those of earlier versions do not know it."""
+        return {name: value for name, value in plain(self).items() if value is not None}
 
 
 class OwnBody(Table):

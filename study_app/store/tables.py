@@ -34,6 +34,7 @@ _JUDGED = (
     ("worst_frame_gap_ms", "frame_gap_ms"),
     ("withheld_share", "withheld_percent"),
 )
+_LEAST = "targets_reached"  # judged by "targets_percent": the only measure with a least value
 
 
 class SessionRows:
@@ -158,15 +159,23 @@ def beyond_limits(measured: Mapping[str, Any], limits: Mapping[str, float]) -> t
 
     Value and limit are in the limit's unit, ms or percent.
     """
-    return tuple(one for one in _judged(measured, limits) if not abs(one[1]) <= one[2])
+    return tuple(one for one in _judged(measured, limits) if not _keeps(*one))
+
+
+def _keeps(measure: str, value: float, limit: float) -> bool:
+    return value >= limit if measure == _LEAST else abs(value) <= limit
 
 
 def _judged(measured: Mapping[str, Any], limits: Mapping[str, float]) -> list[tuple[str, float, float]]:
-    return [
+    judged = [
         (measure, measured[measure] * (100 if limit.endswith("_percent") else 1), limits[limit])
         for measure, limit in _JUDGED
         if measured.get(measure) is not None and limit in limits
     ]
+    reached, targets = measured.get(_LEAST), measured.get("targets")
+    if "targets_percent" in limits and reached is not None and targets:
+        judged.append((_LEAST, 100 * reached / targets, limits["targets_percent"]))
+    return judged
 
 
 def latest(rows: Iterable[Row]) -> list[Row]:

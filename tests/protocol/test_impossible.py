@@ -110,7 +110,8 @@ IMPOSSIBLE: tuple[tuple[str, tuple[str, str], str, str], ...] = (
     ("trial of nothing", ("min_s = 3\nmax_s = 9", "min_s = 0\nmax_s = 1e-300"), "tasks.explore.max_s", RANGE),
     ("time limit of nothing", (COUNT, "count = 4\ntimeout_s = 1e-300"), "tasks.reach.timeout_s", RANGE),
     *((f"limit {key} = {value}", limits(f"{key} = {value}"), f"limits.{key}", RANGE)
-      for key in ("lateness_ms", "worst_gap_ms", "delay_error_ms", "frame_gap_ms", "withheld_percent")
+      for key in ("lateness_ms", "worst_gap_ms", "delay_error_ms", "frame_gap_ms", "withheld_percent",
+                  "targets_percent")
       for value in ("1e308", "1e-300")),
     ("nothing is significant", decided("alpha = 1e-300"), "analysis.alpha", RANGE),
     ("nothing is equivalent", decided("equivalence_bound = 1e-300"), "analysis.equivalence_bound", RANGE),

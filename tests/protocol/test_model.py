@@ -5,11 +5,16 @@ from pydantic import ValidationError
 
 from study_app.errors import ProtocolError
 from study_app.protocol.load import load, parse
-from study_app.protocol.model import Protocol
+from study_app.protocol.model import Limits, Protocol
 from study_app.protocol.texts import tidy
 from tests.protocol.cases import SOUND
 
 SMALL = parse(SOUND.encode(), "small.toml")
+
+
+def test_a_completeness_that_is_not_asked_for_stands_in_no_file():
+    assert "targets_percent" not in Limits().model_dump(mode="json")
+    assert Limits(targets_percent=80).model_dump(mode="json")["targets_percent"] == 80
 
 
 def test_a_protocol_never_changes():

@@ -212,11 +212,15 @@ def test_notes_and_marks_stay_with_the_trial_they_were_made_in() -> None:
         ({"lateness_p99_ms": 0.1, "withheld_share": 0.05}, True),
         ({"lateness_p99_ms": 0.1, "withheld_share": 0.0501}, False),
         ({"lateness_p99_ms": 0.1, "withheld_share": None}, True),
+        ({"lateness_p99_ms": 0.1, "targets_reached": 3, "targets": 6}, True),
+        ({"lateness_p99_ms": 0.1, "targets_reached": 2, "targets": 6}, False),
+        ({"targets_reached": 0, "targets": 6}, False),
+        ({"lateness_p99_ms": 0.1, "targets_reached": 9, "targets": None}, True),
         ({}, None),
     ],
 )
 def test_a_trial_is_valid_within_the_protocols_limits(measured: dict[str, float], *, valid: bool | None) -> None:
-    limits = {"lateness_ms": 2, "worst_gap_ms": 20, "delay_error_ms": 25, "withheld_percent": 5}
+    limits = {"lateness_ms": 2, "worst_gap_ms": 20, "delay_error_ms": 25, "withheld_percent": 5, "targets_percent": 50}
     script = Script(limits=limits)
     script.trial(1)
     script.end(1, **measured)

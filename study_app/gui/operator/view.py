@@ -23,6 +23,7 @@ MEASURES = {
     "lateness_p99_ms": "servo lateness, p99,",
     "worst_gap_ms": "longest gap of the servo",
     "delay_error_p95_ms": "delay error, p95,",
+    "targets_reached": "targets reached, at least,",
     "first_frame_gap_ms": "time to the first frame",
     "worst_frame_gap_ms": "longest gap between frames",
     "withheld_share": "force withheld",
@@ -354,7 +355,7 @@ def _beyond(session: Session, progress: SessionProgress) -> tuple[str, ...]:
 
 
 def _unit(measure: str) -> str:
-    return "%" if measure == "withheld_share" else "ms"
+    return "%" if measure in {"withheld_share", "targets_reached"} else "ms"
 
 
 def _force_rows(session: Session, forces: ForceFigures | None) -> tuple[tuple[str, str], ...]:

@@ -29,6 +29,7 @@ LIMIT_WORDS: Mapping[str, tuple[str, str]] = {
     "first_frame_gap_ms": ("time before the first frame", "ms"),
     "worst_frame_gap_ms": ("longest time between two frames", "ms"),
     "withheld_share": ("share of the force withheld", "%"),
+    "targets_reached": ("targets reached, at least", "%"),
 }
 """Of every measure that a limit judges: what it is, and its unit."""
 MOTION_HIDDEN = "Hidden while the study is blinded: with this device, the recorded motion shows how the liquid resists."

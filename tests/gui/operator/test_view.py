@@ -7,6 +7,7 @@ import dataclasses
 import pytest
 
 from study_app.gui.operator.view import MEASURES, duration_words, grouped, minutes
+from study_app.protocol.model import Limits
 from study_app.store.columns import TRIALS, header
 from study_app.store.tables import beyond_limits
 
@@ -247,8 +248,9 @@ def test_what_tells_a_condition_is_judged_before_an_operator_who_sees_forces_alo
 
 
 def test_every_limit_of_a_trial_has_a_name_for_the_operator(told):
-    bad = dict.fromkeys(header(TRIALS), 1000000000.0)
-    judged = {measure for measure, _, _ in beyond_limits(bad, told.protocol.limits.model_dump())}
+    bad = dict.fromkeys(header(TRIALS), 1000000000.0) | {"targets_reached": 0.0}
+    limits = Limits(targets_percent=50).model_dump()
+    judged = {measure for measure, _, _ in beyond_limits(bad, limits)}
     assert judged == set(MEASURES)
 
 
