@@ -224,7 +224,15 @@ class LiveSession(QObject):
         start = FIRST if chosen.resumes is None else resume_at(protocol, schedule, self._store.lines)
         text_scale = text_scale_on(self.settings, shown_on)
         self.bridge = open_windows(
-            chosen, protocol, schedule, self._store, machine, self.theme, start, text_scale=text_scale
+            chosen,
+            protocol,
+            schedule,
+            self._store,
+            machine,
+            self.theme,
+            start,
+            text_scale=text_scale,
+            photodiode=self.settings.photodiode,
         )
         self.bridge.done.connect(self._finished)
         self.bridge.diagnose_asked.connect(self._diagnose)

@@ -69,6 +69,7 @@ class ParticipantWindow(QWidget):
     pilot : a coloured frame and the title say that this is no participant's session
     text_scale : how much larger than designed words must be at least, for this screen at this distance
     on_card : whether the tank is drawn on a surface of the graphics card, in step with the screen
+    photodiode : whether the tank has a corner that a photodiode looks at
     strip : what stands above every page, where the operator has no screen of their own
 
     While ``may_close`` is false, closing the window in the middle of a session is a pause.
@@ -96,11 +97,13 @@ class ParticipantWindow(QWidget):
         text_scale: float = 1.0,
         on_card: bool = False,
         strip: QWidget | None = None,
+        photodiode: bool = True,
     ) -> None:
         super().__init__()
         load_fonts()
         self._strip = strip
         self._on_card = on_card
+        self._photodiode = photodiode
         self._words = said
         self._clock = clock
         self._text_scale = text_scale
@@ -309,7 +312,15 @@ class ParticipantWindow(QWidget):
         match page:
             case TaskPage():
                 by_click = replace(said, continue_now=said.click_now) if self._captures else said
-                tank = TankWidget(page, by_click, self, text_scale=text, on_card=self._on_card)
+                tank = TankWidget(
+                    page,
+                    by_click,
+                    self,
+                    text_scale=text,
+                    on_card=self._on_card,
+                    photodiode=self._photodiode,
+                    by_mouse=self._captures,
+                )
                 tank.painted.connect(self.painted)
                 tank.swapped.connect(self.swapped)
                 return tank

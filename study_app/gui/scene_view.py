@@ -6,6 +6,7 @@ delayed clock, and nothing is smoothed or eased. Nothing here knows which liquid
 
 from __future__ import annotations
 
+import math
 from threading import Thread
 from typing import TYPE_CHECKING
 
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
 
 # Where the tank lies in the window, in shares of it.
 AREA = (0.075, 0.122, 0.85, 0.712)
+BESIDE_RADII = 2.0  # of a target: within them the ball is before or behind it
 ALWAYS = QRegion(0, 0, 1, 1)  # a frame in which nothing moved is a frame too
 
 
@@ -67,7 +69,8 @@ class TankWidget(QWidget):
 
     ``painted(sample_ns)`` comes once for every view with the time of what was drawn: when it was painted and handed to
     the window's system, or with ``on_card``, on a surface of the graphics card, when that swapped. ``swapped`` comes
-    with each swap.
+    with each swap. ``photodiode`` is whether a corner toggles with each movement that begins;
+    ``by_mouse`` whether a wheel moves the hand in depth: where only the depth is wrong, that is told.
     """
 
     painted = Signal(object)
@@ -81,8 +84,12 @@ class TankWidget(QWidget):
         *,
         text_scale: float = 1.0,
         on_card: bool = False,
+        photodiode: bool = True,
+        by_mouse: bool = False,
     ) -> None:
         super().__init__(parent)
+        self._by_mouse = by_mouse
+        self._photodiode = photodiode
         self._pane: QWidget | None = self._made_pane() if on_card else None
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.setAccessibleName(page.instruction)
@@ -190,13 +197,26 @@ class TankWidget(QWidget):
         self._paint_things(painter, region)
         if region.intersects(still.front_at.toAlignedRect()):
             painter.drawImage(still.front_at.topLeft(), still.front)
-        self._captions.draw(painter, region, self._task)
+        self._captions.draw(painter, region, self._task, self._depth())
         self._paint_patch(painter, region)
         self._drawn_ns = None if self._view is None else self._view.sample_time_ns
 
     @property
     def _task(self) -> TaskShown | None:
         return None if self._view is None else self._view.task
+
+    def _depth(self) -> int:
+        """Return -1 where the ball shown must go further away to be in the lit target, 1 where it must come nearer.
+
+        0 where its depth is right, where it is beside the target, too, or where no wheel moves it.
+        """
+        todo, view = self._page.task, self._view
+        if not self._by_mouse or not isinstance(todo, Reach) or view is None or view.task.lit is None:
+            return 0
+        target = todo.targets_m[view.task.lit]
+        x, y, z = (there - float(here) for there, here in zip(target, view.position_m, strict=True))
+        off = math.hypot(x, y) <= BESIDE_RADII * todo.radius_m and abs(z) > todo.radius_m
+        return int(math.copysign(1, z)) if off else 0
 
     def _ready(self) -> Backdrop:
         """Return the still images for the present size and screen; lay everything out if they changed."""
@@ -236,8 +256,9 @@ class TankWidget(QWidget):
             x, y, z = (float(value) for value in self._view.position_m)
             self._ball = self._placer.place((x, y, z))
             things |= ball_things(self._ball)
-        things |= self._captions.things(task)
-        things["patch"] = Placed(self._patch.lit, self._patch_place())
+        things |= self._captions.things(task, self._depth())
+        if self._photodiode:
+            things["patch"] = Placed(self._patch.lit, self._patch_place())
         return things
 
     def _paint_things(self, painter: QPainter, region: QRegion) -> None:
@@ -311,5 +332,5 @@ class TankWidget(QWidget):
 
     def _paint_patch(self, painter: QPainter, region: QRegion) -> None:
         place = self._patch_place()
-        if region.intersects(place.toAlignedRect()):
+        if self._photodiode and region.intersects(place.toAlignedRect()):
             paint_patch(painter, place, lit=self._patch.lit)

@@ -48,12 +48,14 @@ def open_windows(
     start: Start = FIRST,
     *,
     text_scale: float = 1.0,
+    photodiode: bool = True,
     refresh_hz: float | None = None,
 ) -> SessionBridge:
     """Open the operator's and the participant's window; the bridge returned is to be started.
 
     ``start`` is where a resumed session goes on, ``text_scale`` how much larger than designed the participant's words
-    must be at least. With ``refresh_hz`` there are so many frames a second by the clock, whatever the screen's rate is.
+    must be at least, ``photodiode`` whether the tank has a corner for one. With ``refresh_hz`` there are so many
+    frames a second by the clock, whatever the screen's rate is.
     """
     clock, device, servo = store.clock.seconds, machine.device, machine.servo
     journal = WatchedJournal(
@@ -78,6 +80,7 @@ def open_windows(
         pilot=chosen.pilot,
         on_card=refresh_hz is None and has_card(),
         text_scale=text_scale,
+        photodiode=photodiode,
         strip=strip,
     )
     hand = hand_of(device)

@@ -37,6 +37,8 @@ class Words:
     continue_in: str  # {seconds}
     continue_now: str
     click_now: str  # where the mouse is the device
+    further_away: str  # of the target, where the mouse's wheel moves the hand in depth
+    nearer: str
     time_is_up: str
     pause_hint: str
 

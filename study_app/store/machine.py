@@ -59,7 +59,8 @@ class MachineSettings(_Strict):
     ``viewing_distance_mm`` and ``screen_width_mm`` are None until somebody measured them. ``firmware`` is the file of a
     Falcon's program, ``workspace`` the folder of protocols and results (None: not chosen, see `study_app.workspace`);
     ``recent`` are the protocol files outside it that were opened last, newest first; ``operator`` are the initials that
-    were given last. Whether ``device`` is known is for those to say who open it.
+    were given last; ``photodiode`` is whether the tank has a corner that a photodiode looks at. Whether ``device`` is
+    known is for those to say who open it.
     """
 
     screen: str = ""
@@ -73,6 +74,7 @@ class MachineSettings(_Strict):
     recent: Annotated[tuple[Place, ...], Field(max_length=MOST_RECENT, strict=False)] = ()
     theme: Literal["light", "dark"] = "light"
     sound: bool = False
+    photodiode: bool = True
     operator: Annotated[str, Field(max_length=40)] = ""
 
     @property
@@ -124,6 +126,7 @@ class MachineSettings(_Strict):
             "viewing_distance_mm": self.viewing_distance_mm,
             "width_mm": self.screen_width_mm if self.screen_width_mm is not None else round(system_mm, 1),
             "width_measured": self.screen_width_mm is not None,
+            "photodiode_patch": self.photodiode,
             "text_scale": round(self.text_scale(width_px, system_mm), 3),
             "display_offset": None if offset is None else offset.model_dump(exclude={"screen"}),
         }

@@ -315,3 +315,51 @@ def test_references_to_none_stay_flat_over_200_repaints(tank: TankWidget) -> Non
     before = sys.getrefcount(None)
     paint(200)
     assert abs(sys.getrefcount(None) - before) < 100
+
+
+def hint_at(qtbot, position_m, *, by_mouse=True, language="en", **changed):
+    """Return what is said below the tank while the ball is at a place [m]; the lit target is at x = 30 mm."""
+    widget = TankWidget(task_page(reach(**changed)), words(language), by_mouse=by_mouse)
+    qtbot.addWidget(widget)
+    widget.resize(1366, 768)
+    widget.show()
+    widget.show_view(view(position_m))
+    return widget._things["hint"].state
+
+
+@pytest.mark.parametrize(
+    ("position_m", "said"),
+    [
+        ((0.03, 0.0, 0.0), ""),
+        ((0.03, 0.0, 0.02), "A little further away: wheel forwards"),
+        ((0.035, 0.004, -0.02), "A little nearer: wheel backwards"),
+        ((-0.03, 0.0, 0.02), ""),
+    ],
+)
+def test_depth_that_the_wheel_lost_is_told_where_the_mouse_is_the_device(qtbot, position_m, said):
+    assert hint_at(qtbot, position_m) == said
+    assert hint_at(qtbot, position_m, by_mouse=False) == ""
+
+
+@pytest.mark.parametrize("language", ["ar", "de", "en", "fr", "nl"])
+def test_depth_is_told_in_every_language_and_before_the_time(qtbot, language):
+    said = words(language)
+    left = said.seconds_left.format(seconds=18)
+    assert hint_at(qtbot, (0.03, 0, 0.02), language=language, count=None, duration_s=30) == (
+        f"{said.further_away} · {left}"
+    )
+
+
+def test_the_photodiodes_square_can_be_switched_off(qtbot):
+    corners = {}
+    for photodiode in (True, False):
+        widget = TankWidget(task_page(), words("en"), photodiode=photodiode)
+        qtbot.addWidget(widget)
+        widget.resize(1366, 768)
+        widget.show()
+        widget.show_view(view())
+        image = widget.grab().toImage()
+        corners[photodiode] = image.pixelColor(image.width() - 82, image.height() - 82).name()
+        assert ("patch" in widget._things) is photodiode
+    assert corners[True] == "#000000"
+    assert corners[False] != "#000000"

@@ -178,12 +178,19 @@ def _size_words(settings: MachineSettings, screen: ScreenShown, scale: float) ->
 
 
 class OffsetCard(Card):
-    """The display's offset as it was measured."""
+    """The display's offset as it was measured, and whether there is something to measure by."""
+
+    changed = Signal(str, object)
 
     def __init__(self) -> None:
         super().__init__("Display offset", gap=8)
         self.form = OffsetForm()
+        self.patch = Toggle("Square for a photodiode in the tank's corner")
+        self.patch.setFont(font("body"))
+        self.patch.clicked.connect(lambda on: self.changed.emit("photodiode", on))
         self.column.addWidget(self.form)
+        self.column.addWidget(Rule())
+        self.column.addWidget(self.patch)
 
 
 class SessionsCard(Card):

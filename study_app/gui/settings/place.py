@@ -89,7 +89,7 @@ class MachinePlace(Place):
         row.addWidget(self._area)
 
     def _connect(self) -> None:
-        for card in (self.seen, self.sessions, self.windows):
+        for card in (self.seen, self.sessions, self.windows, self.offset):
             card.changed.connect(lambda name, value: self.changed.emit({name: value}))
         self.screens.chosen.connect(
             lambda screen: self.changed.emit({"screen": screen.name, "screen_number": screen.number})
@@ -127,6 +127,7 @@ class MachinePlace(Place):
         self.undo.show_action("undo", f"Undo {undo}" if undo else "Undo")
         self.sessions.show_settings(settings, folder)
         self.windows.show_settings(settings)
+        self.offset.patch.setChecked(settings.photodiode)
         self.kept_in.show_text(f"Kept in {kept_in}")
         self._show()
 

@@ -115,15 +115,15 @@ class Captions:
         key, _ = key_size(self._words.escape_key, 1.1 * self._fine)
         return key + 12 * self._fine + QFontMetricsF(self._pause_font).horizontalAdvance(self._words.pause_hint) + 4
 
-    def things(self, task: TaskShown | None) -> dict[str, Placed]:
+    def things(self, task: TaskShown | None, depth: int = 0) -> dict[str, Placed]:
         """Return what can change among the words."""
         return {
             "count": Placed(self._counted(task), self._count),
-            "hint": Placed(self._hint_words(task), self._hint),
+            "hint": Placed(self._hint_words(task, depth), self._hint),
         }
 
-    def draw(self, painter: QPainter, region: QRegion, task: TaskShown | None) -> None:
-        """Draw the words in ``region``."""
+    def draw(self, painter: QPainter, region: QRegion, task: TaskShown | None, depth: int = 0) -> None:
+        """Draw the words in ``region``; ``depth`` is where the lit target is: -1 further away, 1 nearer, 0 not told."""
         page, words = self._page, self._words
         painter.setLayoutDirection(self._way)
         if page.progress is not None and region.intersects(self._head.toAlignedRect()):
@@ -134,9 +134,9 @@ class Captions:
             _text(painter, self._instruction, CENTRED, page.instruction, self._instruction_font, PARTICIPANT.text)
         if region.intersects(self._placed(self._foot).toAlignedRect()):
             self._draw_foot(painter)
-        hint = self._hint_words(task)
+        hint = self._hint_words(task, depth)
         if hint and region.intersects(self._hint.toAlignedRect()):
-            strong = hint.startswith(words.continue_now) or hint == words.time_is_up
+            strong = hint.startswith((words.continue_now, words.further_away, words.nearer)) or hint == words.time_is_up
             colour = PARTICIPANT.text if strong else PARTICIPANT.text3
             _text(painter, self._hint, int(Qt.AlignmentFlag.AlignCenter), hint, self._small, colour)
 
@@ -152,6 +152,8 @@ class Captions:
         words = self._words
         counted = words.seconds_left.format(seconds=999)
         both = words.seconds_left.format(seconds=COUNTED_DOWN_S)
+        if isinstance(self._page.task, Reach):
+            return tuple(f"{away} · {both}" for away in (words.further_away, words.nearer, words.time_is_up))
         return f"{words.continue_now} · {both}", words.continue_in.format(seconds=999), counted, words.time_is_up
 
     def _draw_foot(self, painter: QPainter) -> None:
@@ -163,8 +165,8 @@ class Captions:
         beside = self._foot.adjusted(key + 12 * fine, 0, 0, 0)
         _text(painter, self._placed(beside), BEGINNING, words.pause_hint, self._pause_font, PARTICIPANT.text2)
 
-    def _hint_words(self, task: TaskShown | None) -> str:
-        """Return how long it takes until the participant may or must go on."""
+    def _hint_words(self, task: TaskShown | None, depth: int) -> str:
+        """Return how long it takes until the participant may or must go on, and in which depth the target is."""
         todo, words = self._page.task, self._words
         elapsed_s = task.elapsed_s if task else 0.0  # before the first view nothing has happened yet
         left = math.ceil(todo.limit_s - elapsed_s)
@@ -176,7 +178,9 @@ class Captions:
             if wait > 0:
                 return words.continue_in.format(seconds=wait)
             return words.continue_now if left > COUNTED_DOWN_S else f"{words.continue_now} · {counted}"
-        return counted if todo.duration_s is not None or left <= COUNTED_DOWN_S else ""
+        counts = todo.duration_s is not None or left <= COUNTED_DOWN_S
+        away = {0: "", -1: words.further_away, 1: words.nearer}[depth]
+        return " · ".join(filter(None, (away, counted if counts else "")))
 
     def _counted(self, task: TaskShown | None) -> tuple[int, int | None]:
         if task is not None:

@@ -109,6 +109,10 @@ def test_device_folder_theme_and_sound_are_chosen(place, qtbot, monkeypatch, tmp
     with qtbot.waitSignal(place.changed) as changed:
         qtbot.mouseClick(place.windows.sound, Qt.MouseButton.LeftButton)
     assert changed.args == [{"sound": True}]
+    assert place.offset.patch.isChecked()
+    with qtbot.waitSignal(place.changed) as changed:
+        qtbot.mouseClick(place.offset.patch, Qt.MouseButton.LeftButton)
+    assert changed.args == [{"photodiode": False}]
     for choice, value, name in (
         (place.sessions.device, "falcon", "device"),
         (place.windows.theme_choice, "dark", "theme"),
