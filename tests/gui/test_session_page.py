@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QLabel, QPushButton, QWidget
 
 from study_app.gui.sessions.facts import sessions
 from study_app.gui.sessions.page import SessionPage
@@ -86,6 +86,28 @@ def test_a_page_says_which_trial_broke_which_limit_and_what_out_of_limits_means(
     assert page.opened == [page.facts.folder]
 
 
+def test_choices_that_were_not_confirmed_stay_visible(qtbot, tmp_path):
+    with begin(
+        tmp_path / "demo", load("demo"), source_bytes("demo"), "P007", seed=1, operator="", language="en",
+        device={"name": "mouse"}, screens={}, simulated=False,
+    ) as store:  # fmt: skip
+        which = {"block": "feeling", "phase": "main", "part": 1, "of": 2}
+        for trial in (1, 2):
+            store.append("trial_started", trial=trial, attempt=1, index=trial, code=f"L{trial}", **which)
+            store.append("trial_ended", trial=trial, attempt=1, outcome="complete")
+            store.append("choice", trial=trial, item="feels_liquid", value=3)
+            store.append("choice", trial=trial, item="feels_liquid", value=5)
+            if trial == 1:
+                given = {"item": "feels_liquid", "number": 1, "value": 5, "changes": 1}
+                times = {"onset_s": 0.0, "first_s": 0.1, "last_s": 0.2}
+                store.append("responses", trial=1, attempt=1, items=[given | times])
+        store.finish("aborted")
+    page = page_of(qtbot, tmp_path / "demo")
+    assert [said(page, row, 4) for row in range(2)] == ["1", "0 + 1?"]
+    page.trials.selectRow(1)
+    assert page.trial.text().endswith("Chosen and not confirmed, so in no table: feels_liquid: 5.")
+
+
 def test_a_page_shows_the_motion_of_a_trial_once_it_may_be_seen(qtbot, study):
     sealed = page_of(qtbot, study)
     assert sealed.motion.accessibleDescription() == MOTION_HIDDEN
@@ -106,7 +128,7 @@ def test_no_page_names_a_condition_of_a_sealed_study(study):
     assert [name for name in protocol.conditions if re.search(rf"\b{name}\b", text)] == []
 
 
-def test_leaving_a_trial_out_is_kept_shown_and_told(qtbot, study):
+def test_a_trial_is_left_out_and_taken_back(qtbot, study):
     page = page_of(qtbot, study)
     changed = []
     page.changed.connect(lambda: changed.append(True))
@@ -120,9 +142,17 @@ def test_leaving_a_trial_out_is_kept_shown_and_told(qtbot, study):
     qtbot.waitUntil(lambda: bool(changed))
     (one,) = exclusions(study)
     assert (one.trial, one.reason) == (number, "phone rang")
-    assert page.lines[0].findChild(QWidget) or "phone rang" in page.lines[0].text()
+    assert "phone rang" in page.lines[0].findChild(QLabel).text()
     row = next(row for row, trial in enumerate(page.model.trials) if trial.number == number)
     assert said(page, row, 3) == "Excluded"
+    qtbot.mouseClick(page.lines[0].findChild(QPushButton), Qt.MouseButton.LeftButton)
+    page.decision.by.setText("BC")
+    page.decision.reason.setText("it was another phone")
+    qtbot.mouseClick(page.decision.go_on, Qt.MouseButton.LeftButton)
+    qtbot.waitUntil(lambda: len(changed) == 2)
+    assert exclusions(study) == ()
+    assert page.lines == []
+    assert said(page, row, 3) != "Excluded"
 
 
 def test_a_session_that_cannot_be_read_says_why(qtbot, tmp_path):

@@ -15,7 +15,7 @@ from study_app.gui.background import Background
 from study_app.gui.cards import Card, Chip
 from study_app.gui.controls import ActionButton
 from study_app.gui.labels import label, set_ink
-from study_app.gui.results.dialogs import LeaveOutDialog
+from study_app.gui.results.dialogs import LeaveOutDialog, TakeBackDialog
 from study_app.gui.sessions.facts import SessionFacts
 from study_app.gui.sessions.motion import MotionPlot
 from study_app.gui.sessions.record import NO_MOTION, SessionRecord, TrialRecord, motion, read_record
@@ -23,7 +23,7 @@ from study_app.gui.sessions.rows import VALIDITY, status_chip, validity_chip
 from study_app.gui.table import CHIP_ROLE, Index, Table
 from study_app.gui.theme import Theme, font
 from study_app.gui.themed import dress, take_away, wear
-from study_app.store.exclusions import Exclusion, exclude
+from study_app.store.exclusions import Exclusion, exclude, include
 
 HEADINGS = ("Trial", "Presented", "Ended", "Limits", "Answers", "Notes")
 WIDTHS = ((20, 56), (120, 130), (60, 90), (60, 134), (30, 70), (160, 120))
@@ -71,7 +71,7 @@ class TrialsModel(QAbstractTableModel):
             "Trial": str(trial.number),
             "Presented": trial.words,
             "Ended": trial.outcome,
-            "Answers": str(trial.answers),
+            "Answers": f"{trial.answers} + {len(trial.unconfirmed)}?" if trial.unconfirmed else str(trial.answers),
             "Notes": trial.notes,
         }
         return chip[2] if chip else said[heading]
@@ -90,8 +90,12 @@ def trial_words(trial: TrialRecord) -> str:
     if trial.excluded is not None:
         said += f"left out of the analysis ({trial.excluded}). "
     if trial.broken:
-        return said + "; ".join(trial.broken) + "."
-    return said + ("not measured." if trial.valid is None else "within all limits.")
+        said += "; ".join(trial.broken) + "."
+    else:
+        said += "not measured." if trial.valid is None else "within all limits."
+    if trial.unconfirmed:
+        said += f" Chosen and not confirmed, so in no table: {', '.join(trial.unconfirmed)}."
+    return said
 
 
 class SessionPage(QDialog):
@@ -111,7 +115,7 @@ class SessionPage(QDialog):
         super().__init__(parent)
         self.facts = facts
         self.record: SessionRecord | None = None
-        self.decision: LeaveOutDialog | None = None
+        self.decision: LeaveOutDialog | TakeBackDialog | None = None
         self._theme = theme
         self._reader, self._mover = Background(self), Background(self)
         self._reader.done.connect(self._show)
@@ -225,7 +229,15 @@ class SessionPage(QDialog):
         self.lines = []
         for one in listed:
             what = "The whole session" if one.trial is None else f"Trial {one.trial}"
-            line = label(f"{what}: {one.reason} ({one.rule_or_person})", "label", wraps=True)
+            back = ActionButton("undo", "Take back …", role="plain", height=30)
+            back.setAccessibleName(f"Take back: {what}")
+            back.setAutoDefault(False)
+            back.clicked.connect(partial(self._ask_take_back, one, what))
+            line = QWidget()
+            row = QHBoxLayout(line)
+            row.setContentsMargins(0, 0, 0, 0)
+            row.addWidget(label(f"{what}: {one.reason} ({one.rule_or_person})", "label", wraps=True), 1)
+            row.addWidget(back)
             dress(line, self._theme)
             self._out.addWidget(line)
             self.lines.append(line)
@@ -271,6 +283,17 @@ class SessionPage(QDialog):
         facts = self.facts
         leave_out = partial(exclude, facts.folder.parents[2], facts.participant, facts.session, trial=trial)
         self._decide(partial(leave_out, by=by, reason=reason))
+
+    def _ask_take_back(self, one: Exclusion, what: str) -> None:
+        dialog = TakeBackDialog(self, self._theme, what, one.reason)
+        dialog.accepted.connect(lambda: self._take_back(one, dialog.by.text(), dialog.reason.text()))
+        dialog.finished.connect(dialog.deleteLater)
+        self.decision = dialog
+        dialog.open()
+
+    def _take_back(self, one: Exclusion, by: str, reason: str) -> None:
+        take_back = partial(include, self.facts.folder.parents[2], one.participant, one.session, trial=one.trial)
+        self._decide(partial(take_back, by=by, reason=reason))
 
     def _decide(self, decide: Callable[[], object]) -> None:
         """Carry out a decision in the thread that reads, read the session again, and tell of it."""

@@ -41,7 +41,8 @@ class TrialRecord:
     """One presentation of a trial.
 
     ``broken`` has a sentence for each limit that was broken; ``valid`` is None where nothing was measured; ``excluded``
-    is why it is left out of the analysis, None where it is not.
+    is why it is left out of the analysis, None where it is not. ``unconfirmed`` are choices on a page that was left
+    before they were confirmed, as "item: value": they are in no table.
     """
 
     number: int
@@ -51,6 +52,7 @@ class TrialRecord:
     valid: bool | None
     broken: tuple[str, ...]
     answers: int
+    unconfirmed: tuple[str, ...]
     notes: str
     recording: Path | None
     excluded: str | None
@@ -88,7 +90,7 @@ def read_record(folder: Path) -> SessionRecord:
     own = tuple(one for one in listed if one.what[:2] == (facts.participant, facts.session))
     start = lines[0]
     rows = tables.trials(lines)
-    trials = _trials(session, rows, tables.responses(lines), start.get("limits", {}), own)
+    trials = _trials(session, rows, lines, start.get("limits", {}), own)
     felt = is_falcon(str(start.get("device")))
     return SessionRecord(
         facts=facts,
@@ -137,13 +139,14 @@ def motion(recording: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 def _trials(
     session: SessionFolder,
     rows: Sequence[Mapping[str, Any]],
-    responses: Sequence[Mapping[str, Any]],
+    lines: Sequence[Line],
     limits: Mapping[str, float],
     own: Sequence[Exclusion],
 ) -> tuple[TrialRecord, ...]:
     reasons = {one.trial: one.reason for one in own}
     answered: dict[tuple[int, int], int] = {}
-    for row in responses:
+    open_choices = _unconfirmed(lines)
+    for row in tables.responses(lines):
         which = (row["trial"], row["attempt"])
         answered[which] = answered.get(which, 0) + (row["first_choice_s"] is not None)
     return tuple(
@@ -155,12 +158,29 @@ def _trials(
             valid=row["valid"],
             broken=tuple(broken_words(*one) for one in tables.beyond_limits(row, limits)),
             answers=answered.get((row["trial"], row["attempt"]), 0),
+            unconfirmed=tuple(open_choices.get((row["trial"], row["attempt"]), ())),
             notes=" · ".join((["marked"] if row["marked"] else []) + (row["notes"] or "").splitlines()),
             recording=session.path / row["recording"] if row["recording"] else None,
             excluded=reasons.get(row["trial"]),
         )
         for row in rows
     )
+
+
+def _unconfirmed(lines: Sequence[Line]) -> dict[tuple[int, int], list[str]]:
+    """Return trial and attempt → choices that no confirmation followed, as "item: value"."""
+    found: dict[tuple[int, int], dict[str, str]] = {}
+    which = (0, 0)
+    for line in lines:
+        match line["event"]:
+            case "trial_started":
+                which = (line["trial"], line["attempt"])
+            case "choice":
+                value = line["value"]
+                found.setdefault(which, {})[line["item"]] = "cannot judge" if value is None else str(value)
+            case "responses":
+                found.pop((line["trial"], line["attempt"]), None)
+    return {which: [f"{item}: {value}" for item, value in chosen.items()] for which, chosen in found.items()}
 
 
 def broken_words(measure: str, value: float, limit: float) -> str:
