@@ -13,6 +13,7 @@ import sys
 import threading
 import traceback
 from collections.abc import Callable
+from dataclasses import replace
 from functools import wraps
 from types import TracebackType
 from typing import Concatenate, ParamSpec
@@ -111,6 +112,9 @@ class SessionBridge(QObject):
         self.trouble = ""
         self.failure: BaseException | None = None
         ports = Ports(parts.servo, parts.journal, self.present, parts.clock, parts.recorder)
+        if parts.recorder is not None:
+            ports = replace(ports, settled=parts.recorder.settled)
+        self._leaves = False
         self.runner = Runner(parts.session.protocol, parts.schedule, parts.key, ports, parts.language, parts.start)
         self._hand: Hand | None = None
         self._gone = False
@@ -273,7 +277,9 @@ class SessionBridge(QObject):
             self._stalled = stalled
             log.warning("the disk takes data again" if stalled is None else f"the session waits: {stalled}")
         self._show()
-        if self.runner.finished and self.participant.isFullScreen():
+        if self.runner.finished and self._leaves:
+            QTimer.singleShot(0, self, self._leave)
+        elif self.runner.finished and self.participant.isFullScreen():
             QTimer.singleShot(END_SHOWN_MS, self.operator, self.operator.come_forward)
 
     def _show(self) -> None:
@@ -369,6 +375,10 @@ class SessionBridge(QObject):
         """Close the operator's window when all is over; else zero force and a question; asked again, leave."""
         if self.runner.finished:
             self._leave()
+            return
+        if self.runner.ending:  # as soon as the recordings are on the disk
+            self._leaves = True
+            self.operator.hide()
             return
         self.parts.servo.stop_force()
         if self.operator.question is not None:

@@ -38,6 +38,7 @@ class RecorderPanel(RecorderPort, Protocol):
 
     @property
     def lost(self) -> Sequence[LostRecording]: ...  # noqa: D102
+    def settled(self) -> bool: ...  # noqa: D102
 
 
 class Hand(Protocol):

@@ -63,7 +63,8 @@ class Ports:
     """The world: ``present`` shows a page, ``clock`` gives seconds since the session's origin.
 
     ``recorder`` is None where no recordings are kept. Without ``paints`` nobody shows a window: the first frame of a
-    trial is told of, and a later one need not come.
+    trial is told of, and a later one need not come. ``settled`` says whether all recordings are on the disk, so that
+    the session's end waits for none: until then it is put off.
     """
 
     servo: ServoPort
@@ -72,3 +73,4 @@ class Ports:
     clock: Callable[[], float]
     recorder: RecorderPort | None = None
     paints: bool = True
+    settled: Callable[[], bool] = lambda: True

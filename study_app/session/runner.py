@@ -95,6 +95,7 @@ class Runner:
         self._waiting: deque[Event] = deque()
         self._busy = False
         self._stall: _Stall | None = None
+        self._ending: tuple[Finish, float] | None = None
         self._stopped_by: Literal["operator", "program"] = "program"  # who stops the force of a session that stalls
         self._listeners: list[Callable[[SessionState], None]] = []
 
@@ -106,7 +107,12 @@ class Runner:
     @property
     def finished(self) -> bool:
         """Whether the session is over."""
-        return self._state.phase in FINAL
+        return self._state.phase in FINAL and self._ending is None
+
+    @property
+    def ending(self) -> bool:
+        """Whether the session's end is put off until its recordings are on the disk."""
+        return self._ending is not None
 
     @property
     def stalled(self) -> str | None:
@@ -154,6 +160,12 @@ class Runner:
         """Look at the device: follow the task, hear its buttons, notice a fault. Call it once a frame."""
         samples = np.asarray(self._reader.read())  # fields of a plain array are found faster
         self._recording.take(samples)
+        if self._ending is not None:
+            if self._ports.settled():
+                (finish, at_s), self._ending = self._ending, None
+                self._carry_out_all((finish,), at_s)
+                self._tell()
+            return
         if self._stall is not None:
             if self._ports.clock() >= self._stall.retry_s:
                 self._try_again(self._stall)
@@ -208,6 +220,9 @@ class Runner:
 
     def _carry_out_all(self, commands: Sequence[Command], at_s: float) -> None:
         for index, command in enumerate(commands):
+            if isinstance(command, Finish) and not self._ports.settled():
+                self._ending = command, at_s
+                continue
             try:
                 self._carry_out(command, at_s)
             except StoreError as error:

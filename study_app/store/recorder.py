@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import contextlib
 import threading
+import time
 from array import array
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -97,6 +98,7 @@ class Recorder:
         self._queue: deque[Any] = deque()
         self._waiting = 0
         self._closing = False
+        self._patient_until_s = 0.0
         self._kept: list[Kept] = []
         self._lost: list[Lost] = []
         self._underway: tuple[int, int] | None = None
@@ -172,14 +174,27 @@ class Recorder:
             found, self._kept = tuple(self._kept), []
         return found
 
-    def close(self, patience_s: float = PATIENCE_S) -> None:
-        """End what is under way and wait until all is on the disk, but not for ever; `kept` tells what became of it."""
+    def settled(self) -> bool:
+        """End what is under way; return whether all is on the disk, or it took too long, without waiting for it.
+
+        Then `close` returns at once.
+        """
+        self._end()
+        return not self._works() or time.monotonic() >= self._patient_until_s
+
+    def _end(self, patience_s: float = PATIENCE_S) -> None:
         self.stop()
         with self._changed:
+            if not self._closing:
+                self._patient_until_s = time.monotonic() + patience_s
             self._closing = True
             self._changed.notify_all()
+
+    def close(self, patience_s: float = PATIENCE_S) -> None:
+        """End what is under way and wait until all is on the disk, but not for ever; `kept` tells what became of it."""
+        self._end(patience_s)
         if self._thread is not None:
-            self._thread.join(patience_s)
+            self._thread.join(max(0.0, min(patience_s, self._patient_until_s - time.monotonic())))
         with self._changed:
             reason = "the disk did not take it in time" if self._works() else "its thread had ended"
             self._kept += [Lost(trial, attempt, reason) for trial, attempt in self._expected]

@@ -93,6 +93,9 @@ class Room:
     def append(self, samples):
         pass
 
+    def settled(self):
+        return True
+
     def stop(self):
         pass
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -9,6 +10,7 @@ import pytest
 from study_app.session.events import (
     Begin,
     Continue,
+    EndAsked,
     PauseAsked,
     ResumeAsked,
 )
@@ -122,3 +124,22 @@ def test_frames_are_recorded_with_their_trial_and_attempts_have_recordings_of_th
     told = [told for told in tape.told if isinstance(told, tuple)]
     first = [("start", 1, 1, 1000.0), ("frame", 0, 0), ("frame", 500, 400), ("stop",)]
     assert told == [*first, ("start", 1, 2, 1000.0), ("frame", 10**9, 10**9)]
+
+
+def test_the_end_is_put_off_until_the_recordings_are_on_the_disk() -> None:
+    world = unpainted()
+    settled: list[bool] = []
+    world.runner._ports = replace(world.runner._ports, settled=lambda: bool(settled))
+    told: list[bool] = []
+    world.runner.on_change(lambda _state: told.append(world.runner.finished))
+    world.runner.post(EndAsked(3.0, "aborted", "cable"))
+    world.run(0.5)
+    assert world.runner.ending
+    assert not world.runner.finished
+    assert world.servo.scene == 0, "the hand is let go of at once"
+    assert "finish" not in world.log
+    settled.append(True)
+    world.run(0.1)
+    assert world.runner.finished
+    assert "finish" in world.log
+    assert told == [False, True]

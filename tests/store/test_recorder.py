@@ -3,6 +3,7 @@ from __future__ import annotations
 import errno
 import os
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
 from pathlib import Path
@@ -248,6 +249,38 @@ def test_the_end_of_a_session_does_not_wait_for_ever(tmp_path: Path, samples_of:
     disk.works.set()
     recorder.close()
     assert recorder.kept() == ()
+
+
+def test_whether_all_is_on_the_disk_is_told_without_waiting(tmp_path: Path, samples_of: Make) -> None:
+    recorder, disk = slow(tmp_path / "recordings")
+    record(recorder, samples_of(40_000), chunk=5_000)
+    assert disk.asked.wait(20)
+    before = time.perf_counter()
+    assert not recorder.settled()
+    assert time.perf_counter() - before < 1.0  # and not the half minute that a disk is given
+    disk.works.set()
+    while not recorder.settled():
+        time.sleep(0.01)
+    recorder.close()
+    (kept,) = recorder.kept()
+    assert isinstance(kept, Recorded)
+
+
+def test_a_disk_that_never_comes_back_is_given_up_without_waiting(
+    tmp_path: Path, samples_of: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recorder, disk = slow(tmp_path / "recordings")
+    record(recorder, samples_of(40_000), chunk=5_000)
+    assert disk.asked.wait(20)
+    assert not recorder.settled()
+    later = time.monotonic() + 31
+    monkeypatch.setattr("study_app.store.recorder.time.monotonic", lambda: later)
+    assert recorder.settled()
+    recorder.close()
+    assert recorder.kept() == (Lost(3, 1, "the disk did not take it in time"),)
+    disk.works.set()
+    assert recorder._thread is not None
+    recorder._thread.join(20)
 
 
 def test_after_its_end_it_keeps_nothing(recorder: Recorder, samples_of: Make) -> None:

@@ -64,3 +64,29 @@ def test_an_end_that_cannot_be_written_still_lets_the_windows_go(bridge, world, 
         bridge.operator.close()
     assert "no space left" in caplog.text
     caplog.clear()
+
+
+def test_windows_answer_while_recordings_are_written_and_close_after_it(make, world, qtbot):
+    class Slow:
+        lost, on_disk = (), False
+
+        def start(self, *_arguments):
+            pass
+
+        append = frame = stop = start
+
+        def settled(self):
+            return self.on_disk
+
+    recorder = Slow()
+    bridge = make(recorder=recorder)
+    begin_trial(bridge, world)
+    bridge._end("withdrawn", "tired")
+    bridge.runner.poll()
+    assert isinstance(bridge.participant.page, EndPage)
+    assert bridge.runner.ending
+    bridge._close()
+    assert not bridge._gone, "the end is still to be written"
+    recorder.on_disk = True
+    with qtbot.waitSignal(bridge.done):
+        bridge.runner.poll()

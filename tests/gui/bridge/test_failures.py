@@ -234,6 +234,9 @@ def test_the_recorders_losses_reach_the_cockpit_without_an_event(make, world, qt
 
         append = frame = stop = start
 
+        def settled(self):
+            return True
+
     bridge = make(recorder=Losing())
     begin_trial(bridge, world)
     bridge._tiles()
