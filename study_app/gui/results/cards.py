@@ -19,7 +19,7 @@ from study_app.gui.theme import font
 from study_app.gui.themed import dress, take_away
 
 COLUMNS = (
-    Column("participant", "Participant", 90, 62),
+    Column("participant", "Participant", 90, 76),
     Column("status", "Status", 120, 112),
     Column("validity", "Validity", 110, 114),
 )
