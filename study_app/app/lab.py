@@ -96,13 +96,12 @@ class LabVisit(QObject):
         self.live: Live | None = None
         self.device = device
         self.bench = first.bench
-        self.liquids = first.liquids
         self.trouble = ""
         self._refused: tuple[str, str] | None = None
         self._entered = False
         self._prices = Prices(make_appraiser)
         self._opening = LabOpening(open_live, firmware)
-        self._saving = LabSaving()
+        self._saving = LabSaving(first.liquids)
         self._chance = chance if chance is not None else random.SystemRandom()
         self._said = ""
         self._hook_before = sys.excepthook

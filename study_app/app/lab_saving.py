@@ -28,9 +28,9 @@ class LabSaving(QObject):
     failed = Signal(object)
     _done = Signal(object)
 
-    def __init__(self) -> None:
+    def __init__(self, liquids: tuple[Choice, ...]) -> None:
         super().__init__()
-        self.liquids = liquids_at_hand()
+        self.liquids = liquids
         self.said = ""
         self._before: threading.Thread | None = None
         self._files: list[tuple[Scene, Path]] = []
