@@ -265,6 +265,8 @@ class LiveSession(QObject):
             self._tell(line)
         if self.note is not None:
             self.note.say(line)
+        elif self.bridge is not None:
+            self.bridge.tell_of_device(line)
 
     def _pass_checks(self, found: tuple[Check, ...]) -> None:
         """Tell what the pre-flight found; refuse the session if it must not begin."""
@@ -325,6 +327,8 @@ class LiveSession(QObject):
             asked.close()
 
     def _let_go(self) -> None:
+        if self.bridge is not None and self.bridge.reconnection is not None:
+            self.bridge.reconnection.wait()  # it gives up now that this is closed
         machine, self._machine = self._machine, None
         store, self._store = self._store, None
         crash_trace, self._crash_trace = self._crash_trace, None

@@ -79,13 +79,13 @@ def replay(session_folder: Path) -> Replayed:
     key = blinding.read_key(study.path)
     if key.hash != kept["key_hash"]:
         raise StoreError(f"{study.key} is not the key that {session.path} ran under: restore it from a copy")
-    protocol, devices = _ran(session.receipt, kept, key)
+    protocol, devices = _ran(session.receipt, kept, key, lines)
     _again(records(SAMPLE, 0), Scene(), *devices[None], None)  # loads the compiled code: no part of what is measured
     found = _Found()
     before: _Before | None = None
     resumed_at: str | None = None
     for started, line, resumed in _presented(lines):
-        if resumed != resumed_at:  # another program ran the servo: nothing goes on from the recording before
+        if resumed != resumed_at:  # the servo was started anew: nothing goes on from the recording before
             before, resumed_at = None, resumed
         if resumed not in devices:
             raise StoreError(f"{session.receipt} lacks the device since {resumed}: restore it from a copy")
@@ -282,7 +282,8 @@ def _listed(seconds: list[int]) -> str:
 def _presented(lines: Sequence[Line]) -> Iterator[tuple[Line, Line | None, str | None]]:
     """Yield the line of each presentation that was to be recorded, and the line about its recording, if there is one.
 
-    In the order of presentation, each with the time at which the session had been resumed last, None before that.
+    In the order of presentation, each with the time at which the session had been resumed, or its device connected
+    again, last; None before that.
     """
     events = ("recorded", "recording_lost")
     told = {(line["trial"], line["attempt"]): line for line in lines if line["event"] in events}
@@ -290,22 +291,23 @@ def _presented(lines: Sequence[Line]) -> Iterator[tuple[Line, Line | None, str |
         return
     resumed_at: str | None = None
     for line in lines:
-        if line["event"] == "session_resumed":
+        if line["event"] in ("session_resumed", "device_reconnected"):
             resumed_at = line["at"]
         elif line["event"] == "trial_started":
             yield line, told.get((line["trial"], line["attempt"])), resumed_at
 
 
 def _ran(
-    path: Path, kept: Mapping[str, Any], key: blinding.Key
+    path: Path, kept: Mapping[str, Any], key: blinding.Key, lines: Sequence[Line]
 ) -> tuple[Protocol, dict[str | None, tuple[float, Dynamics]]]:
     """Return the protocol of the session whose receipt was ``kept`` at ``path``, and the devices that it ran on.
 
-    A device is its force limit [N] and its dynamics, by the time at which the session was resumed with it; that of the
-    session's beginning is under None.
+    A device is its force limit [N] and its dynamics, by the time at which the session was resumed with it, or it was
+    connected again; that of the session's beginning is under None.
     """
     try:
         described = {None: kept["device"]} | {entry["at"]: entry["device"] for entry in kept.get("resumed", ())}
+        described |= {line["at"]: line["described"] for line in lines if line["event"] == "device_reconnected"}
         devices = {
             at: (float(device.get("force_limit_n", np.inf)), dynamics_from(device)) for at, device in described.items()
         }

@@ -16,11 +16,11 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import wraps
 from types import TracebackType
-from typing import Concatenate, ParamSpec
+from typing import Any, Concatenate, ParamSpec
 
 from PySide6.QtCore import QObject, Qt, QTimer, Signal
 
-from study_app.errors import SessionError, StudyError
+from study_app.errors import DeviceError, ServoFault, SessionError, StudyError
 from study_app.gui.collector import settle, unsettle
 from study_app.gui.frames import Frames
 from study_app.gui.lookout import Lookout
@@ -28,20 +28,22 @@ from study_app.gui.operator.strip import Strip
 from study_app.gui.operator.view import OperatorView
 from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.participant import ParticipantWindow
+from study_app.gui.reconnection import Reconnection
 from study_app.gui.session_parts import Hand, Parts
 from study_app.gui.slack import Slack
 from study_app.gui.urgency import Urgency
 from study_app.session.events import (
     Begin,
-    Broke,
     Continue,
     EndAsked,
     Event,
     ForceStopped,
     Note,
     PauseAsked,
+    Reconnected,
     RepeatAsked,
     ResumeAsked,
+    broken,
 )
 from study_app.session.pages import Page, TaskPage
 from study_app.session.ports import Ports
@@ -116,6 +118,7 @@ class SessionBridge(QObject):
             ports = replace(ports, settled=parts.recorder.settled)
         self._leaves = False
         self.runner = Runner(parts.session.protocol, parts.schedule, parts.key, ports, parts.language, parts.start)
+        self.reconnection = None if parts.reconnect is None else Reconnection(parts.reconnect)
         self._hand: Hand | None = None
         self._gone = False
         self._stalled: str | None = None
@@ -142,6 +145,11 @@ class SessionBridge(QObject):
         operator.exclude_asked.connect(self._exclude)
         operator.close_asked.connect(self._close)
         operator.diagnose_asked.connect(self._diagnose)
+        operator.reconnect_asked.connect(self._reconnect)
+        operator.panels.failed.connect(self._panel_failed)
+        if self.reconnection is not None:
+            self.reconnection.connected.connect(self._reconnected)
+            self.reconnection.failed.connect(self._not_reconnected)
         operator.escape.leave_to(participant)
         participant.event.connect(self._event)
         participant.left.connect(operator.come_forward)
@@ -195,26 +203,39 @@ class SessionBridge(QObject):
         self._post(PauseAsked(self._now(), "program"))
 
     def fail(self, error: BaseException) -> None:
-        """Zero force, then say what failed: to the journal, if it still takes it, and to the operator."""
+        """Zero force, then say what failed: to the journal, if it still takes it, and to the operator.
+
+        Where no more failed than one of the cockpit's panels, that is switched off, and the session goes on.
+        """
+        if self.operator.panels.take(error):
+            return
         self.parts.servo.stop_force()
         first = not self.trouble
         what = str(error) if isinstance(error, StudyError) else f"{type(error).__name__}: {error}"
         if not first:
             return
         self.trouble, self.failure = what, error
-        log.error("the session broke: %s", what, exc_info=None if isinstance(error, StudyError) else error)
+        log.error("the session broke: %s", what, exc_info=_trace_of(error))
         traceback.clear_frames(error.__traceback__)  # they may hold a painter, and Qt would paint no window any more
         try:
             if not self.runner.finished:
-                self.runner.post(Broke(self._now(), what))
+                self.runner.post(broken(self._now(), error))
             self._show()
         except Exception as second:  # noqa: BLE001 - the force is off; the first failure is the one that counts
             log.error("and could not be written down: %s", second)  # noqa: TRY400 - one line, the first has the trace
 
     def _uncaught(self, kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
         """Hear of exceptions that Qt met outside our slots, such as in painting."""
+        if self.operator.panels.take(error):
+            return
         self.fail(error)
         self._hook_before(kind, error, trace)
+
+    @_guarded
+    def _panel_failed(self, name: str, error: Exception) -> None:
+        """Log it and note it; the panel itself says so to the operator."""
+        log.error("the panel %r failed and is switched off: %s", name, error, exc_info=error)
+        self._remember(f"the cockpit's panel {name!r} failed: {type(error).__name__}: {error}")
 
     def _uncaught_in_thread(self, told: threading.ExceptHookArgs) -> None:
         """Hear of an exception that ended a thread, in that thread."""
@@ -293,7 +314,10 @@ class SessionBridge(QObject):
 
     def view(self) -> OperatorView:
         """Return what the operator is to see now."""
-        return self.lookout.view(self.trouble, self.runner.stalled)
+        view, again = self.lookout.view(self.trouble, self.runner.stalled), self.reconnection
+        if again is None or not self.runner.state.lost_device:
+            return view
+        return replace(view, may_reconnect=True, reconnects=again.under_way, reconnection=again.line)
 
     @_guarded
     def _stop_force(self) -> None:
@@ -321,6 +345,31 @@ class SessionBridge(QObject):
                 self._post(ForceStopped(self._now(), "operator"))
         finally:
             self.diagnose_asked.emit()
+
+    @_guarded
+    def _reconnect(self) -> None:
+        """Connect the device again, beside the windows; the force stays off until the operator resumes."""
+        if self.reconnection is not None and self.runner.state.lost_device:
+            self.reconnection.begin()
+            self._show()
+
+    def tell_of_device(self, line: str) -> None:
+        """Show what the device asks for while it is connected again."""
+        if self.reconnection is not None and self.reconnection.under_way:
+            self.reconnection.line = line
+            self._show()
+
+    @_guarded
+    def _reconnected(self, described: dict[str, Any]) -> None:
+        if isinstance(self.failure, DeviceError | ServoFault):
+            self.trouble, self.failure = "", None
+        log.info("the device was connected again")
+        self._post(Reconnected(self._now(), described))
+
+    @_guarded
+    def _not_reconnected(self, error: Exception) -> None:
+        log.warning("the device was not connected again: %s", error, exc_info=_trace_of(error))
+        self._show()
 
     @_guarded
     def _pause(self) -> None:
@@ -406,3 +455,8 @@ class SessionBridge(QObject):
         self.done.emit()
         for part in (self.participant, self.operator, self):
             part.deleteLater()  # here and now, in this thread: never by a garbage collection in another
+
+
+def _trace_of(error: BaseException) -> BaseException | None:
+    """Return what the log says of an error beside its sentence: nothing of one that the user can understand."""
+    return None if isinstance(error, StudyError) else error

@@ -41,22 +41,35 @@ class Lookout:
 
     def show_traces(self, operator: OperatorWindow) -> None:
         """Draw the hand's place, at once."""
-        operator.show_traces(self.health, self._parts.clock())
-        operator.position.plot.paint_now()
+
+        def draw() -> None:
+            operator.show_traces(self.health, self._parts.clock())
+            operator.position.plot.paint_now()
+
+        operator.panels.draw(operator.position, draw)
 
     def show_forces(self, operator: OperatorWindow) -> None:
         """Draw the force and the wake where they are seen, at once."""
-        if self.forces is None or not isinstance(operator.force, ForceCard):
+        forces, card = self.forces, operator.force
+        if forces is None or not isinstance(card, ForceCard):
             return
-        operator.show_forces(self.forces, self._parts.servo.now_ns())
-        for plot in (operator.force.plot, operator.force.wake):
-            plot.paint_now()
+
+        def draw() -> None:
+            operator.show_forces(forces, self._parts.servo.now_ns())
+            for plot in (card.plot, card.wake):
+                plot.paint_now()
+
+        operator.panels.draw(card, draw)
 
     def show_lateness(self, operator: OperatorWindow) -> None:
         """Draw how late ticks were, at once."""
         self.health.overruns = self._parts.servo.overruns
-        operator.show_lateness(self.health)
-        operator.lateness.plot.paint_now()
+
+        def draw() -> None:
+            operator.show_lateness(self.health)
+            operator.lateness.plot.paint_now()
+
+        operator.panels.draw(operator.lateness, draw)
 
     def view(self, trouble: str, stalled: str | None) -> OperatorView:
         """Return what the operator is to see now; ``stalled`` is why the disk takes nothing, None while it does."""
@@ -75,6 +88,7 @@ class Lookout:
             rate_hz=parts.servo.rate_hz,
             forces=None if self.forces is None else self.forces.figures(),
             lost={one.trial: one.reason for one in parts.recorder.lost} if parts.recorder is not None else {},
+            dropped=parts.recorder.dropped if parts.recorder is not None else 0,
         )
 
     def _count_faults(self) -> None:

@@ -29,6 +29,23 @@ class Machine:
         told = {name: value for name, value in self.servo.describe().items() if name != "elements"}
         return self.device.describe() | told
 
+    def reconnect(self) -> dict[str, Any]:
+        """Open a device that failed again, home it, and start the servo at zero force; return what describes it now.
+
+        The force stays off until the servo's `fade_in`. Takes as long as opening did.
+
+        Raises
+        ------
+        StudyError
+            It is not there, cannot be opened, or hangs; the force is zero, and this may be called again.
+        """
+        self.servo.stop_force()
+        self.servo.stop()
+        self.device.close()
+        self.device.open()
+        self.servo.start()
+        return self.described
+
     def stop(self) -> None:
         """Zero force, then let go of the device."""
         try:

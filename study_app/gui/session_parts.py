@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Any, Protocol
 
 from study_app.gui.operator.view import Session
 from study_app.gui.operator.watch import WatchedJournal
@@ -38,6 +38,8 @@ class RecorderPanel(RecorderPort, Protocol):
 
     @property
     def lost(self) -> Sequence[LostRecording]: ...  # noqa: D102
+    @property
+    def dropped(self) -> int: ...  # noqa: D102
     def settled(self) -> bool: ...  # noqa: D102
 
 
@@ -55,6 +57,7 @@ class Parts:
     is where a resumed session goes on. ``exclude`` leaves a trial, or with None the session, out of the analysis for a
     reason. ``aim_m`` gives where hand or pointer mean to be [m, hand frame]; ``point_to`` and ``press`` pass the mouse
     on, None where the device is not the mouse; ``hand_for`` makes the simulated hand for a page, None with a real hand.
+    ``reconnect`` opens a device that failed again and starts the servo at zero force; it may take minutes.
     """
 
     session: Session
@@ -71,3 +74,4 @@ class Parts:
     point_to: Callable[[float, float, float], None] | None = None
     press: Callable[[int], None] | None = None
     hand_for: Callable[[Page], Hand | None] | None = None
+    reconnect: Callable[[], dict[str, Any]] | None = None

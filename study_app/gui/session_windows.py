@@ -95,6 +95,7 @@ def open_windows(
         recorder=store.recorder,
         start=start,
         exclude=_excluder(chosen),
+        reconnect=machine.reconnect,
         aim_m=_aim(hand, servo),
         point_to=device.point_to if isinstance(device, MouseDevice) else None,
         press=device.press if isinstance(device, MouseDevice) else None,

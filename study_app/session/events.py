@@ -8,6 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
+from study_app.errors import DeviceError, ServoFault, StudyError
+
 
 @dataclass(frozen=True, slots=True)
 class Begin:
@@ -116,10 +118,22 @@ class EndAsked:
 
 @dataclass(frozen=True, slots=True)
 class Broke:
-    """Device or servo failed; ``what`` is for the operator and the journal, not for the participant."""
+    """Device, servo or program failed; ``what`` is for the operator and the journal, not for the participant.
+
+    After a failure ``by`` the device (or its servo) the session can go on, see `Reconnected`.
+    """
 
     at_s: float
     what: str
+    by: Literal["device", "program"] = "program"
+
+
+@dataclass(frozen=True, slots=True)
+class Reconnected:
+    """The device that failed is open and homed again, its servo runs at zero force; the journal keeps ``described``."""
+
+    at_s: float
+    described: dict[str, Any]
 
 
 Event: TypeAlias = (
@@ -137,4 +151,11 @@ Event: TypeAlias = (
     | RepeatAsked
     | EndAsked
     | Broke
+    | Reconnected
 )
+
+
+def broken(at_s: float, error: BaseException) -> Broke:
+    """Return that ``error`` broke the session."""
+    what = str(error) if isinstance(error, StudyError) else f"{type(error).__name__}: {error}"
+    return Broke(at_s, what, "device" if isinstance(error, DeviceError | ServoFault) else "program")

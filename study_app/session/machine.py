@@ -13,7 +13,8 @@ Rules of this file:
 A session is the steps of its schedule: pages to read, and trials. A trial is a task, then a questionnaire if its block
 has one. A pause during a task (asked for, or after a force stop) ends the attempt, and the trial starts again as the
 next attempt; a pause while reading or answering goes back to the same page with every choice kept. Whatever breaks
-leaves the force off and all answers on the disk, and waits for the operator to end the session.
+leaves the force off and all answers on the disk, and waits for the operator: to end the session, or, where the device
+failed, to connect it again. Then the session is paused, and the operator resumes it.
 """
 
 from __future__ import annotations
@@ -38,6 +39,7 @@ from study_app.session.events import (
     LanguageChosen,
     Note,
     PauseAsked,
+    Reconnected,
     RepeatAsked,
     ResumeAsked,
     Submitted,
@@ -92,6 +94,7 @@ TRANSITIONS: dict[tuple[Phase, type[Event]], Move] = {
     (Phase.ANSWERING, Broke): moves.call_operator,
     (Phase.PAUSED, Broke): moves.call_operator,
     (Phase.TROUBLE, Broke): moves.call_operator,
+    (Phase.TROUBLE, Reconnected): moves.reconnect,  # → paused, without force; only after a failure of the device
 }
 
 

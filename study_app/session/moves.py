@@ -31,6 +31,7 @@ from study_app.session.events import (
     LanguageChosen,
     Note,
     PauseAsked,
+    Reconnected,
     RepeatAsked,
     ResumeAsked,
     Submitted,
@@ -190,10 +191,26 @@ def end(state: SessionState, event: EndAsked) -> Result:
 
 
 def call_operator(state: SessionState, event: Broke) -> Result:
-    """Keep the force off and everything on the disk, and wait for the operator."""
-    trouble = replace(state, phase=Phase.TROUBLE, interrupted=None, force_off=True)
+    """Keep the force off and everything on the disk, and wait for the operator.
+
+    Where the device failed, ``interrupted`` keeps what the session goes back to once it is connected again.
+    """
+    waits = state.phase in {Phase.OPENING, Phase.PAUSED, Phase.TROUBLE}
+    before = state.interrupted if waits else state.phase
+    interrupted = before if event.by == "device" else None
+    trouble = replace(state, phase=Phase.TROUBLE, interrupted=interrupted, force_off=True)
     written = (Write("broke", {"what": event.what}), WriteTables())
     return trouble, (StopForce(), *_break_off(state), *written, _show(trouble))
+
+
+def reconnect(state: SessionState, event: Reconnected) -> Result:
+    """Pause at zero force until the operator resumes; a trial that the failure interrupted is then presented again."""
+    if not state.lost_device:
+        raise SessionError("the session did not stop because of its device: end it now, and resume it later")
+    paused = replace(state, phase=Phase.PAUSED, held="force")
+    facts = {"device": event.described.get("name"), "described": event.described}
+    told = Write("device_reconnected", facts, waits=True)
+    return paused, (StopForce(), told, Write("paused", {"by": "program"}), WriteTables(), _show(paused))
 
 
 def _enter(state: SessionState, index: int, done: Commands = (), *, at_s: float) -> Result:

@@ -42,6 +42,11 @@ class Recording:
         while self._held - len(self._before[0]) >= self._lead:
             self._held -= len(self._before.popleft())
 
+    def forget(self) -> None:
+        """Drop what came before: the servo was started again, so nothing felt from here on goes on from it."""
+        self._before.clear()
+        self._held = 0
+
     def start(self, trial: int, attempt: int) -> None:
         """Begin the recording of a trial, with what came just before it."""
         if self._recorder is None:

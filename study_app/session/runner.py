@@ -40,7 +40,17 @@ from study_app.session.commands import (
     Write,
     WriteTables,
 )
-from study_app.session.events import Broke, Continue, EndAsked, Event, ForceStopped, PauseAsked, TaskDone
+from study_app.session.events import (
+    Broke,
+    Continue,
+    EndAsked,
+    Event,
+    ForceStopped,
+    PauseAsked,
+    Reconnected,
+    TaskDone,
+    broken,
+)
 from study_app.session.machine import advance, open_session
 from study_app.session.ports import Ports
 from study_app.session.recording import Recording
@@ -175,7 +185,7 @@ class Runner:
             return
         fault = self._ports.servo.fault
         if fault is not None and self._state.phase not in {Phase.TROUBLE, *FINAL}:
-            self.post(Broke(self._ports.clock(), fault))
+            self.post(Broke(self._ports.clock(), fault, "device"))
         if len(samples) and self._state.phase is not Phase.OPENING:
             self._hear_buttons(samples)
             self._follow(samples)
@@ -206,6 +216,8 @@ class Runner:
                 self._running.leave()
             return
         self._state, commands = advance(self._state, event)
+        if isinstance(event, Reconnected):
+            self._recording.forget()
         self._carry_out_all(commands, event.at_s)
         if self._stall is None:
             self._tell()
@@ -235,7 +247,7 @@ class Runner:
     def _fail(self, error: StudyError) -> None:
         """Stop the force, and call the operator."""
         self._ports.servo.stop_force()
-        self.post(Broke(self._ports.clock(), str(error)))
+        self.post(broken(self._ports.clock(), error))
 
     def _carry_out(self, command: Command, at_s: float) -> None:
         servo, journal = self._ports.servo, self._ports.journal

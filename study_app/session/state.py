@@ -76,9 +76,9 @@ class SessionState:
 
     ``index`` counts the schedule's steps (−1 before the first, their number after the last), ``attempt`` the
     presentations of the present trial from 1. ``answers`` holds the statements of the present questionnaire that were
-    shown or answered. ``interrupted`` is the phase that a pause goes back to. ``force_off`` says that the force was
-    stopped and has not been faded in again, ``held`` what the operator stopped, so that the operator alone resumes.
-    ``since_s`` is when the present step was entered [s, session's clock].
+    shown or answered. ``interrupted`` is the phase that a pause, or the failure of a device, goes back to.
+    ``force_off`` says that the force was stopped and has not been faded in again, ``held`` what the operator stopped,
+    so that the operator alone resumes. ``since_s`` is when the present step was entered [s, session's clock].
     """
 
     plan: Plan = field(repr=False)
@@ -96,6 +96,11 @@ class SessionState:
         """The step under way; None before the first and after the last."""
         steps = self.plan.schedule.steps
         return steps[self.index] if 0 <= self.index < len(steps) else None
+
+    @property
+    def lost_device(self) -> bool:
+        """Whether the session stopped because of its device, so that it goes on once that is connected again."""
+        return self.phase is Phase.TROUBLE and self.interrupted is not None
 
     @property
     def page_id(self) -> str:

@@ -219,11 +219,18 @@ TRIALS: tuple[Column, ...] = (
     ),
     _count("samples_recorded", "Samples in the recording."),
     _count("samples_unrecorded", "Samples that the recording lacks, since the disk did not keep up."),
+    Column(
+        "recording_lost",
+        "text",
+        "Why the trial's recording could not be kept; n/a where it was, or where none was to be.",
+        may_miss=True,
+    ),
     Column("marked", "flag", "true where the operator marked the trial."),
     Column(
         "notes",
         "text",
-        "The operator's notes from this trial's beginning to the next one's, and why it was repeated, one a line.",
+        "The operator's notes from this trial's beginning to the next one's, why it was repeated, and how its device "
+        "failed, one a line.",
         may_miss=True,
     ),
 )
@@ -280,7 +287,14 @@ TABLES: dict[str, tuple[Column, ...]] = {
 
 
 LATER = frozenset(
-    {"first_frame_gap_ms", "withheld_share", "loop_delay_ticks", "loop_delay_changes", "limiter_estimator"}
+    {
+        "first_frame_gap_ms",
+        "withheld_share",
+        "loop_delay_ticks",
+        "loop_delay_changes",
+        "limiter_estimator",
+        "recording_lost",
+    }
 )
 """Columns that earlier versions did not write: a table without them is read as if they held n/a."""
 

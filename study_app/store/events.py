@@ -74,6 +74,11 @@ EVENTS: tuple[Event, ...] = (
     Event("note", "The operator wrote a note, or marked the trial.", ("kind", "text")),
     Event("repeat", "The operator had the trial presented again.", ("trial", "reason")),
     Event("broke", "Device, servo or program failed.", ("what",)),
+    Event(
+        "device_reconnected",
+        "The device that had failed was open and homed again, as `described`; the force stayed off until `resumed`.",
+        ("device", "described"),
+    ),
     Event("session_ended", "The session was over: always the last line.", ("status", "reason")),
 )
 
@@ -171,6 +176,7 @@ _KIND_OF: dict[str, tuple[str, bool]] = {column.name: (column.kind, True) for co
         "samples_unrecorded frames_recorded number value changes",
         "number": "t_s gap_s t_task_s onset_s first_s last_s",
         "time": "at",
+        "object": "described",
         "list of objects": "checks",
         "table of numbers": "limits",
         "list of answers": "items",

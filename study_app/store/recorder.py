@@ -2,8 +2,8 @@
 
 Handing samples over never waits for the disk. Where the disk cannot keep up for two minutes, or takes nothing at all,
 samples are dropped and counted and the session goes on: answers are worth more than recordings. Whatever else fails
-loses that trial's recording alone; `Recorder.lost` says so at once. In a rehearsal, where time waits for the program,
-handing over waits instead, and nothing is lost.
+loses that trial's recording alone, even where it ends the thread: the next trial starts another. `Recorder.lost` says
+so at once. In a rehearsal, where time waits for the program, handing over waits instead, and nothing is lost.
 """
 
 from __future__ import annotations
@@ -121,9 +121,8 @@ class Recorder:
                 return
             self._expected[trial, attempt] = None
             self._queue.append(_Begin(trial, attempt, rate_hz))
-            if self._thread is None:
-                self._thread = threading.Thread(target=self._write, name="recorder", daemon=True)
-                self._thread.start()
+            if not self._works():
+                self._begin_work()
             self._changed.notify_all()
 
     def append(self, samples: Any) -> None:
@@ -203,9 +202,38 @@ class Recorder:
     def _works(self) -> bool:
         return self._thread is not None and self._thread.is_alive()
 
+    def _begin_work(self) -> None:
+        """Start the thread, for the first trial or after it had ended; with the lock held."""
+        self._thread = threading.Thread(target=self._work, name="recorder", daemon=True)
+        try:
+            self._thread.start()
+        except RuntimeError as error:
+            self._lose_all(f"its thread cannot be started: {error}")
+
+    def _work(self) -> None:
+        """Write until all is written: the recorder's thread. Whatever ends it is told, and the next trial starts it."""
+        try:
+            self._write()
+        except BaseException as error:
+            with self._changed:
+                self._lose_all(f"its thread ended: {type(error).__name__}: {error}")
+            raise
+
+    def _lose_all(self, reason: str) -> None:
+        """Give up what is under way and what waits; with the lock held."""
+        lost = [Lost(trial, attempt, reason) for trial, attempt in self._expected]
+        self._kept += lost
+        self._lost += lost
+        self._expected.clear()
+        self._queue.clear()
+        self._waiting, self._underway, self._thread = 0, None, None
+        self._changed.notify_all()
+
     def _write(self) -> None:
-        """Work through the queue until it is empty and closed: the recorder's thread."""
-        while isinstance(begin := self._next(), _Begin):
+        """Work through the queue until it is empty and closed."""
+        while (begin := self._next()) is not None:
+            if not isinstance(begin, _Begin):
+                continue  # of a trial that was lost with an earlier thread
             kept = self._record(begin)
             with self._changed:
                 if (begin.trial, begin.attempt) in self._expected:

@@ -22,7 +22,7 @@ Row: TypeAlias = dict[str, Any]
 _SESSION_COLUMNS = ("study", "participant", "session", "simulated", "pilot")
 _TRIAL_COLUMNS = ("trial", "attempt", "block", "phase", "part", "index", "code")
 _RECORDED = ("recording", "recording_frames", "samples_recorded", "samples_unrecorded")
-_DERIVED = ("trial_started_at", "trial_started_s", "outcome", "valid", *_RECORDED, "marked", "notes")
+_DERIVED = ("trial_started_at", "trial_started_s", "outcome", "valid", *_RECORDED, "recording_lost", "marked", "notes")
 _MEASURED = tuple(name for name in header(TRIALS) if name not in (*_SESSION_COLUMNS, *_TRIAL_COLUMNS, "of", *_DERIVED))
 
 # What is judged in a trial's row by which limit of the protocol.
@@ -58,6 +58,7 @@ class SessionRows:
         self._limits = lines[0].get("limits", {})
         self._started: dict[tuple[int, int], Line] = {}
         self._places: dict[tuple[int, int], int] = {}  # in trials
+        self._broke = self._reconnected = ""
         for line in lines:
             self.take(line)
 
@@ -67,8 +68,12 @@ class SessionRows:
             case "trial_started":
                 self._interrupt()
                 which = line["trial"], line["attempt"]
+                repeats = bool(self.trials) and self.trials[-1]["trial"] == line["trial"]
                 self._started[which], self._places[which] = line, len(self.trials)
                 self.trials.append(_trial(self._session, line))
+                if self._reconnected and repeats:
+                    _note(self.trials[-1], f"presented again: {self._reconnected}")
+                self._reconnected = ""
             case "trial_ended":
                 row = self._row_of(line)
                 row |= {name: line.get(name) for name in _MEASURED}
@@ -82,6 +87,13 @@ class SessionRows:
             case "recorded":
                 row = self._row_of(line)
                 row |= {name: line[name] for name in _RECORDED}
+            case "recording_lost":
+                self._row_of(line)["recording_lost"] = line["reason"]
+            case "broke":
+                self._broke = line["what"]
+            case "device_reconnected" if self.trials:
+                self._reconnected = f"the device failed and was connected again ({self._broke})"
+                _note(self._last(), self._reconnected)
             case "note" if self.trials:
                 _note(self._last(), line["text"], mark=line["kind"] == "mark")
             case "repeat" if self.trials:

@@ -35,6 +35,7 @@ from study_app.session.events import (
     LanguageChosen,
     Note,
     PauseAsked,
+    Reconnected,
     RepeatAsked,
     ResumeAsked,
     Submitted,
@@ -67,7 +68,7 @@ def state_in(phase: Phase) -> SessionState:
         case Phase.PAUSED:
             return advance(answering, PauseAsked(9.0, "operator"))[0]
         case Phase.TROUBLE:
-            return advance(answering, Broke(9.0, "cable"))[0]
+            return advance(answering, Broke(9.0, "cable", "device"))[0]
         case _:
             return advance(answering, EndAsked(9.0, "withdrawn", ""))[0]
 
@@ -86,6 +87,7 @@ def event_of(kind: type[Any]) -> Any:
         RepeatAsked: ("a call",),
         EndAsked: ("aborted", "fire drill"),
         Broke: ("no sample for 50 ms",),
+        Reconnected: ({"name": "memory"},),
     }
     return kind(50.0, *more.get(kind, ()))
 

@@ -293,3 +293,45 @@ def test_after_its_end_it_keeps_nothing(recorder: Recorder, samples_of: Make) ->
 def test_a_session_without_trials_starts_no_thread(recorder: Recorder) -> None:
     recorder.close()
     assert "recorder" not in {thread.name for thread in threading.enumerate()}
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_a_thread_that_ends_loses_its_trial_at_once_and_the_next_trial_starts_another(
+    recorder: Recorder, samples_of: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Ended(BaseException):
+        """What no guard for exceptions holds back."""
+
+    def ends(_begin: Any) -> None:
+        raise Ended("pulled")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(recorder, "_record", ends)
+        recorder.start(1, 1, 1000.0)
+        with recorder._changed:
+            assert recorder._changed.wait_for(lambda: recorder._lost, 10.0)
+        assert recorder.lost == (Lost(1, 1, "its thread ended: Ended: pulled"),)
+        recorder.append(samples_of(10))
+        recorder.stop()
+    record(recorder, samples_of(20), trial=2)
+    recorder.close()
+    lost, kept = recorder.kept()
+    assert lost == Lost(1, 1, "its thread ended: Ended: pulled")
+    assert isinstance(kept, Recorded)
+    assert (kept.trial, kept.samples.rows) == (2, 20)
+
+
+def test_a_thread_that_cannot_be_started_loses_recordings_and_not_the_session(
+    recorder: Recorder, samples_of: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuses(_thread: threading.Thread) -> None:
+        raise RuntimeError("can't start new thread")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(threading.Thread, "start", refuses)
+        record(recorder, samples_of(10), trial=1)
+    assert [lost.trial for lost in recorder.lost] == [1]
+    assert "can't start new thread" in recorder.lost[0].reason
+    record(recorder, samples_of(20), trial=2)
+    recorder.close()
+    assert [type(kept) for kept in recorder.kept()] == [Lost, Recorded]

@@ -2,22 +2,30 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QRectF, Qt
+from PySide6.QtCore import QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from study_app.gui.cards import SHADOW, Icon
+from study_app.gui.controls import ActionButton
 from study_app.gui.labels import label
+from study_app.gui.operator.view import OperatorView
 from study_app.gui.theme import RADIUS_CARD
 from study_app.gui.themed import Themed
 
 WHAT_TO_DO = "The force is off and every answer so far is on disk. End the session, mend the cause, then begin anew."
+RECONNECT = (
+    "The force is off and every answer so far is on disk. Plug the device in, then reconnect it. The session stays "
+    "paused until you resume it; a trial that was under way starts again."
+)
 WAITS = "The force is off and nothing is lost. Make room or bring the drive back: the session then goes on, paused."
 AFTERWARDS = "The session is closed and the force is off. What the journal holds is safe."
 
 
 class Banner(Themed, QWidget):
-    """A tinted strip with a sign, what happened and what to do."""
+    """A tinted strip with a sign, what happened, what to do, and a button where the device can be reconnected."""
+
+    reconnect_asked = Signal()
 
     def __init__(self) -> None:
         super().__init__()
@@ -32,14 +40,22 @@ class Banner(Themed, QWidget):
         row.setSpacing(14)
         row.addWidget(Icon("warning", "bad", 24), 0, Qt.AlignmentFlag.AlignTop)
         row.addLayout(words, 1)
+        self.reconnect = ActionButton("repeat", "Reconnect", key="C", role="primary")
+        self.reconnect.clicked.connect(self.reconnect_asked)
+        row.addWidget(self.reconnect, 0, Qt.AlignmentFlag.AlignVCenter)
+        self.reconnect.hide()
         self.hide()
 
-    def show_trouble(self, what: str, *, over: bool, waits: bool = False) -> None:
-        """Say ``what`` happened, or nothing where nothing did."""
-        if what != self.what.text():
-            self.what.setText(what[:1].upper() + what[1:])
-        self.then.setText(WAITS if waits and not over else AFTERWARDS if over else WHAT_TO_DO)
-        self.setVisible(bool(what))
+    def show_view(self, view: OperatorView) -> None:
+        """Say what happened, or nothing where nothing did."""
+        if view.trouble != self.what.text():
+            self.what.setText(view.trouble[:1].upper() + view.trouble[1:])
+        offered = view.may_reconnect and not view.over
+        advice = RECONNECT if offered else WAITS if view.waits else WHAT_TO_DO
+        self.then.setText(AFTERWARDS if view.over else view.reconnection or advice)
+        self.reconnect.setVisible(offered)
+        self.reconnect.setEnabled(not view.reconnects)
+        self.setVisible(bool(view.trouble))
 
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
         """Paint the tint."""

@@ -37,7 +37,7 @@ class SessionProgress:
     is how long no program held the session, which no duration counts; ``answers`` counts the answered items of each
     trial, ``targets`` those reached in the trial under way or answered, ``trials_done`` says of each trial what was
     measured in it that broke the protocol's limits: column, value and limit, in a double-blind study of lateness and
-    gaps alone, ``lost`` why a trial's recording could not be kept.
+    gaps alone, ``lost`` why a trial's recording could not be kept, ``lacking`` how many samples it lacks where it does.
     """
 
     protocol: Protocol
@@ -51,6 +51,7 @@ class SessionProgress:
     trials_done: Mapping[int, tuple[Beyond, ...]] = field(default_factory=dict)
     answers: Mapping[int, int] = field(default_factory=dict)
     lost: Mapping[int, str] = field(default_factory=dict)
+    lacking: Mapping[int, int] = field(default_factory=dict)
     notes: tuple[NoteLine, ...] = ()
     repeats: int = 0
     paused: bool = False
@@ -147,6 +148,11 @@ def _trial_ended(progress: SessionProgress, at_s: float, fields: Mapping[str, An
     return replace(progress, trials_done={**progress.trials_done, fields["trial"]: beyond})
 
 
+def _recorded(progress: SessionProgress, _at_s: float, fields: Mapping[str, Any]) -> SessionProgress:
+    count = fields["samples_unrecorded"]
+    return replace(progress, lacking={**progress.lacking, fields["trial"]: count}) if count else progress
+
+
 def _responses(progress: SessionProgress, _at_s: float, fields: Mapping[str, Any]) -> SessionProgress:
     return replace(progress, answers={**progress.answers, fields["trial"]: len(fields["items"])})
 
@@ -192,6 +198,7 @@ _TELLERS = {
     "recording_lost": lambda progress, _at_s, fields: replace(
         progress, lost={**progress.lost, fields["trial"]: fields["reason"]}
     ),
+    "recorded": _recorded,
     "paused": lambda progress, _at_s, _fields: replace(progress, paused=True),
     "resumed": lambda progress, _at_s, _fields: replace(progress, paused=False),
     "force_stopped": lambda progress, _at_s, _fields: replace(progress, force_off=True),
@@ -199,6 +206,7 @@ _TELLERS = {
     "note": _note,
     "repeat": _repeat,
     "broke": lambda progress, _at_s, fields: replace(progress, broke=str(fields["what"])),
+    "device_reconnected": lambda progress, _at_s, _fields: replace(progress, broke="", force_off=True),
     "session_resumed": _resumed,
     "session_ended": _ended,
 }

@@ -145,19 +145,8 @@ class Rail(Card):
             line.slim(slim)
 
     def show_view(self, view: OperatorView) -> None:
-        """Show where the session is."""
-        self.now.show_view(view)
-        self.tally.show_view(view)
-        self._show_steps(view.steps)
-
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
-        """Keep the present step in sight."""
-        super().resizeEvent(event)
-        for line in self.lines:
-            if line.row.state == "now":
-                self._scroll.ensureWidgetVisible(line, 0, LEAST_ROW_HEIGHT)
-
-    def _show_steps(self, rows: tuple[StepRow, ...]) -> None:
+        """Show the steps; ``now`` and ``tally`` are shown for themselves, since each may fail alone."""
+        rows = view.steps
         while len(self.lines) < len(rows):
             line = StepLine()
             line.wear(self.theme)
@@ -169,3 +158,10 @@ class Rail(Card):
             line.show_row(row, first=index == 0, last=index == len(rows) - 1)
             if arrived:
                 self._scroll.ensureWidgetVisible(line, 0, 2 * LEAST_ROW_HEIGHT)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
+        """Keep the present step in sight."""
+        super().resizeEvent(event)
+        for line in self.lines:
+            if line.row.state == "now":
+                self._scroll.ensureWidgetVisible(line, 0, LEAST_ROW_HEIGHT)

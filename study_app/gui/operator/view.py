@@ -87,7 +87,8 @@ class OperatorView:
     each part, of its main trials left behind and of all. ``trial`` is the number of the trial under way or answered.
     ``waits`` says that the trouble is a disk that takes
     nothing: the session goes on when it does again. ``beyond`` says which recordings were lost, then of each trial out
-    of limits which it broke, the newest first.
+    of limits which it broke, the newest first. ``may_reconnect`` says that the trouble is a device that can be
+    connected again, ``reconnects`` that it is being so, ``reconnection`` how far that is, or why it failed.
     """
 
     study: str
@@ -117,6 +118,9 @@ class OperatorView:
     waits: bool = False
     beyond: tuple[str, ...] = ()
     blinding: Literal["double", "single"] = "double"
+    may_reconnect: bool = False
+    reconnects: bool = False
+    reconnection: str = ""
 
     @property
     def trials_line(self) -> str:
@@ -159,12 +163,14 @@ def operator_view(
     rate_hz: float = 1000.0,
     forces: ForceFigures | None = None,
     lost: Mapping[int, str] | None = None,
+    dropped: int = 0,
 ) -> OperatorView:
     """Return what the operator sees at ``now_s`` on the session's clock.
 
     ``trouble`` is what no journal could say; ``device_ready`` and ``faults`` (how many there were since the program
     was started) are the servo's own, whatever other trouble there is; ``forces`` are shown where a study is
-    single-blind; ``lost`` says of trials why their recordings were lost, also where no journal tells it yet.
+    single-blind; ``lost`` says of trials why their recordings were lost, also where no journal tells it yet;
+    ``dropped`` counts the samples that the recording of the trial under way lacks by now.
     """
     trouble = progress.broke or trouble
     state = _state(progress, force_on=force_on, trouble=trouble)
@@ -202,7 +208,11 @@ def operator_view(
         over=state == "ended",
         trial=None if trial is None else trial.number,
         waits=waits,
-        beyond=(*_lost(session, progress, {**progress.lost, **(lost or {})}), *_beyond(session, progress)),
+        beyond=(
+            *_lost(session, progress, {**progress.lost, **(lost or {})}),
+            *_lacking(session, progress, {trial.number: dropped} if trial is not None and dropped else {}),
+            *_beyond(session, progress),
+        ),
         blinding=session.protocol.study.blinding,
     )
 
@@ -337,6 +347,15 @@ def _lost(session: Session, progress: SessionProgress, lost: Mapping[int, str]) 
     return tuple(
         f"Recording of {trials[number].label(session.protocol, session.language)} lost: {reason}"
         for number, reason in sorted(lost.items(), reverse=True)
+    )
+
+
+def _lacking(session: Session, progress: SessionProgress, now: Mapping[int, int]) -> tuple[str, ...]:
+    """Return a sentence for every trial whose recording lacks samples, the newest first."""
+    labels = {trial.number: trial.label(session.protocol, session.language) for trial in progress.schedule.trials}
+    return tuple(
+        f"Recording of {labels[number]} lacks {grouped(count)} samples: the disk does not keep up"
+        for number, count in sorted({**progress.lacking, **now}.items(), reverse=True)
     )
 
 

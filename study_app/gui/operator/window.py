@@ -5,6 +5,8 @@ It draws an ``OperatorView`` and two plots, and says what the operator asks for;
 
 from __future__ import annotations
 
+from functools import partial
+
 from PySide6.QtCore import QSize, Signal
 from PySide6.QtGui import QCloseEvent, QGuiApplication
 from PySide6.QtWidgets import QMainWindow
@@ -20,6 +22,7 @@ from study_app.gui.operator.forces import Forces
 from study_app.gui.operator.header import Header
 from study_app.gui.operator.health import ServoHealth
 from study_app.gui.operator.notes import NotesCard
+from study_app.gui.operator.panels import Panels
 from study_app.gui.operator.plots import HiddenForceCard, LatenessCard, PositionCard
 from study_app.gui.operator.rail import Rail
 from study_app.gui.operator.stop import StopPanel
@@ -59,6 +62,7 @@ class OperatorWindow(QMainWindow):
     note_written = Signal(str)
     mark_set = Signal()
     diagnose_asked = Signal()
+    reconnect_asked = Signal()
     close_asked = Signal()
     page_asked = Signal()
     theme_changed = Signal(object)
@@ -90,6 +94,19 @@ class OperatorWindow(QMainWindow):
         self.notes = NotesCard()
         self.stop = StopPanel()
         self.buttons = Actions()
+        self.panels = Panels(
+            {
+                self.rail.now: "Now",
+                self.rail.tally: "Counts",
+                self.rail: "Steps",
+                self.tiles: "Servo",
+                self.lateness: "Tick lateness",
+                self.force: "Force",
+                self.position: "Position",
+                self.device: "Device",
+                self.notes: "Notes",
+            }
+        )
         self.question: RepeatQuestion | ExcludeQuestion | EndQuestion | None = None
         self.escape = EscapeAnywhere(self)
         self.arrangement = Arrangement(
@@ -128,19 +145,22 @@ class OperatorWindow(QMainWindow):
         self.notes.note_written.connect(self.note_written)
         self.notes.mark_set.connect(self.mark_set)
         self.device.diagnose_asked.connect(self.diagnose_asked)
+        self.banner.reconnect_asked.connect(self.reconnect_asked)
 
     def show_view(self, view: OperatorView) -> None:
         """Show everything but the plots; trouble first, for it may be that one of the parts cannot be shown."""
         if view == self._view:
             return
-        self.banner.show_trouble(view.trouble, over=view.over, waits=view.waits)
+        self.banner.show_view(view)
         self.may_close = view.over
         asked = self.question
         if isinstance(asked, RepeatQuestion) and not self._asks_about(view, asked):
             asked.reject()  # the trial it was about is over: its answer would hit the next one
-        for part in (self.stop, self.header, self.rail, self.tiles, self.notes, self.buttons):
+        for part in (self.stop, self.header, self.buttons):
             part.show_view(view)
-        self.device.show_device(view.device)
+        for panel in (self.rail.now, self.rail.tally, self.rail, self.tiles, self.notes):
+            self.panels.draw(panel, partial(panel.show_view, view))
+        self.panels.draw(self.device, lambda: self.device.show_device(view.device))
         self._view = view
 
     def show_traces(self, health: ServoHealth, now_s: float) -> None:

@@ -16,7 +16,7 @@ from PySide6.QtWidgets import QApplication
 from study_app.errors import StoreError
 from study_app.gui.dialogs import Notice
 from study_app.session.events import Submitted
-from study_app.session.pages import TroublePage
+from study_app.session.pages import TaskPage, TroublePage
 from tests.gui.bridge.world import begin_trial
 
 
@@ -144,12 +144,7 @@ def hold(bridge):
 @pytest.mark.parametrize(
     ("owner", "method", "do"),
     [
-        ("study_app.gui.operator.notes.NotesCard", "show_view", show_notes),
-        ("study_app.gui.operator.plots.PositionCard", "show_health", show_position),
-        ("study_app.gui.operator.notes.NoteField", "toPlainText", scribble),
         ("study_app.gui.operator.window.OperatorWindow", "_change_theme", choose_theme),
-        ("study_app.gui.operator.rail.Rail", "paintEvent", paint_rail),
-        ("study_app.gui.plots.Plot", "paintEvent", paint_plot),
         ("study_app.gui.scene_view.TankWidget", "paintEvent", paint_tank),
         ("study_app.gui.participant.ParticipantWindow", "keyPressEvent", tap),
         ("study_app.gui.participant.ParticipantWindow", "_pause", hold),
@@ -183,6 +178,57 @@ def test_whatever_window_it_happens_in_a_failure_is_zero_force_and_told(
     assert BROKEN in caplog.text
     breaks_here.clear()
     bridge._hook_before = before
+    caplog.clear()
+
+
+@pytest.mark.qt_log_ignore("QBackingStore::endPaint")
+@pytest.mark.parametrize(
+    ("owner", "method", "do", "name"),
+    [
+        ("study_app.gui.operator.notes.NotesCard", "show_view", show_notes, "Notes"),
+        ("study_app.gui.operator.notes.NoteField", "toPlainText", scribble, "Notes"),
+        ("study_app.gui.operator.plots.PositionCard", "show_health", show_position, "Position"),
+        ("study_app.gui.plots.TracePlot", "show_traces", show_position, "Position"),
+        ("study_app.gui.plots.Plot", "paintEvent", paint_plot, "Position"),
+        ("study_app.gui.operator.rail.Rail", "paintEvent", paint_rail, "Steps"),
+        ("study_app.gui.operator.now.Tally", "show_view", show_notes, "Counts"),
+    ],
+)
+def test_a_panel_that_fails_is_replaced_by_a_line_and_the_session_goes_on(
+    make, world, qtbot, monkeypatch, caplog, owner, method, do, name
+):
+    breaks_here = []
+
+    def broken(self, *arguments, **named):
+        if breaks_here:
+            breaks()
+        return whole(self, *arguments, **named)
+
+    kind = pkgutil.resolve_name(owner)
+    whole = getattr(kind, method)
+    monkeypatch.setattr(kind, method, broken, raising=False)
+    bridge = make()
+    begin_trial(bridge, world)
+    QApplication.processEvents()
+    breaks_here.append(True)
+    QTimer.singleShot(0, lambda: do(bridge))  # from Qt's loop, as it is in the program
+    panels = bridge.operator.panels
+    qtbot.waitUntil(lambda: None not in panels.covers.values() and bool(panels.covers))
+    for _ in range(3):
+        do(bridge)
+        bridge._tiles()
+        QApplication.processEvents()
+    cover = next(cover for panel, cover in panels.covers.items() if panels._names[panel] == name)
+    assert cover.isVisible()
+    assert cover.line.text() == f"{name}: this panel failed. The session goes on."
+    assert world.force_is_on
+    assert not bridge.trouble
+    assert isinstance(bridge.participant.page, TaskPage)
+    assert "broke" not in world.events()
+    told = [entry[1]["text"] for entry in world.done if entry[0] == "note" and entry[1]["kind"] == "note"]
+    assert len([text for text in told if f"panel {name!r} failed" in text and BROKEN in text]) == 1
+    assert f"the panel {name!r} failed" in caplog.text
+    breaks_here.clear()
     caplog.clear()
 
 
@@ -228,6 +274,7 @@ def test_a_thread_that_ends_by_an_exception_is_told_noted_and_ends_no_session(br
 def test_the_recorders_losses_reach_the_cockpit_without_an_event(make, world, qtbot):
     class Losing:
         lost = (SimpleNamespace(trial=1, reason="No space left on device"),)
+        dropped = 0
 
         def start(self, *_arguments):
             pass

@@ -1,0 +1,230 @@
+"""A session in real windows that a device, a panel and the recorder fail in, one after the other: run as a program.
+
+With the emulated Falcon, driven by keys and clicks. It prints one JSON object: what was seen and measured at each
+step. With a folder for pictures, a picture of the screens is kept at each step.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import threading
+from pathlib import Path
+from typing import Any
+
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtGui import QGuiApplication, QPainter
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QLabel
+
+from study_app import app
+from study_app.app import live_session
+from study_app.gui import beginning
+from study_app.gui.application import application_here
+from study_app.gui.dialogs import Notice
+from study_app.gui.machine import Machine
+from study_app.gui.operator import OperatorWindow
+from study_app.gui.operator.rail import StepLine
+from study_app.gui.participant import ParticipantWindow
+from study_app.gui.plots import TracePlot
+from study_app.session.pages import PausePage, TaskPage, TroublePage
+from study_app.store.recorder import Recorder
+from tests.faults import short
+from tests.faults.windows import Person
+
+LEFT = Qt.MouseButton.LeftButton
+
+
+class Scene:
+    """What happens to the session, step by step; ``told`` is what was seen."""
+
+    def __init__(self, machines: list[Machine], pictures: Path | None) -> None:
+        self.machines, self.pictures = machines, pictures
+        self.told: dict[str, Any] = {"errors": []}
+        self.step = self.unplug
+
+    def __call__(self, participant: ParticipantWindow, operator: OperatorWindow) -> bool:
+        try:
+            return self.mend(participant, operator) or bool(self.step(participant, operator))
+        except Exception as error:
+            self.told["errors"].append(f"{self.step.__name__}: {error!r}")
+            operator.may_close = True
+            raise
+
+    def mend(self, participant: ParticipantWindow, operator: OperatorWindow) -> bool:
+        """Reconnect a device that failed by itself: a machine under load is too slow for the emulated one."""
+        expected = self.step in (self.try_while_unplugged, self.plug_in)
+        if expected or (self.step == self.resume and isinstance(participant.page, PausePage)):
+            return False
+        if isinstance(participant.page, TroublePage) and operator.banner.reconnect.isEnabled():
+            self.told["failed by itself"] = self.told.get("failed by itself", 0) + 1
+            QTest.mouseClick(operator.banner.reconnect, LEFT)
+        elif isinstance(participant.page, PausePage):
+            QTest.mouseClick(operator.buttons.pause, LEFT)
+        return isinstance(participant.page, TroublePage | PausePage)
+
+    @property
+    def machine(self) -> Machine:
+        return self.machines[0]
+
+    def picture(self, name: str) -> None:
+        if self.pictures is not None:
+            for number, screen in enumerate(QGuiApplication.screens(), start=1):
+                screen.grabWindow(0).save(str(self.pictures / f"{name}-{number}.png"))
+
+    # The device.
+
+    def unplug(self, participant: ParticipantWindow, _operator: OperatorWindow) -> bool:
+        if isinstance(participant.page, TaskPage) and participant.tank is not None and participant.tank.isVisible():
+            self.machine.device.hand.faults.on("unplugged")
+            self.step = self.try_while_unplugged
+        return isinstance(participant.page, TaskPage)
+
+    def try_while_unplugged(self, participant: ParticipantWindow, operator: OperatorWindow) -> bool:
+        if isinstance(participant.page, TroublePage) and operator.banner.reconnect.isVisible():
+            if not operator.isActiveWindow():  # then it hears no keys
+                operator.come_forward()
+                return True
+            self.told["lost"] = {
+                "force": self.machine.servo.force_is_on,
+                "banner": operator.banner.what.text(),
+                "advice": operator.banner.then.text(),
+                "page": participant.page.paragraph,
+                "banner_in_window": operator.rect().contains(
+                    operator.banner.reconnect.mapTo(operator, QPoint(5, operator.banner.reconnect.height() - 5))
+                ),
+            }
+            self.picture("lost")
+            QTest.keyClick(operator, Qt.Key.Key_C)
+            self.step = self.plug_in
+        return True
+
+    def plug_in(self, _participant: ParticipantWindow, operator: OperatorWindow) -> bool:
+        said = operator.banner.then.text()
+        if said.startswith("Not connected"):
+            self.told["still unplugged"] = said
+            self.picture("not-connected")
+            self.machine.device.hand.faults.off("unplugged")
+            QTest.mouseClick(operator.banner.reconnect, LEFT)
+            self.told["button while connecting"] = operator.banner.reconnect.isEnabled()
+            self.step = self.resume
+        return True
+
+    def resume(self, participant: ParticipantWindow, operator: OperatorWindow) -> bool:
+        if isinstance(participant.page, PausePage):
+            self.told["reconnected"] = {
+                "force": self.machine.servo.force_is_on,
+                "fault": self.machine.servo.fault,
+                "held": participant.page.held,
+                "banner": operator.banner.isVisible(),
+                "resume": operator.buttons.pause.text(),
+            }
+            QTest.keyClick(participant, Qt.Key.Key_Return)  # the participant cannot resume
+            self.told["resumed by the participant"] = not isinstance(participant.page, PausePage)
+            self.picture("reconnected")
+            QTest.mouseClick(operator.buttons.pause, LEFT)
+            self.step = self.break_panels
+        return True
+
+    # A plot and a panel, in the same trial, presented again.
+
+    def break_panels(self, participant: ParticipantWindow, operator: OperatorWindow) -> bool:
+        if isinstance(participant.page, TaskPage):
+            self.told["force in the next attempt"] = self.machine.servo.force_is_on
+            self.painted, StepLine.paintEvent = StepLine.paintEvent, _paints_badly
+            self.drawn, TracePlot.show_traces = TracePlot.show_traces, _fails
+            operator.update()
+            self.step = self.see_lines
+        return True
+
+    def see_lines(self, participant: ParticipantWindow, operator: OperatorWindow) -> bool:
+        covers = operator.panels.covers
+        if len(covers) == 2 and all(cover is not None and cover.isVisible() for cover in covers.values()):
+            self.told["panels"] = sorted(cover.toolTip() for cover in covers.values())
+            self.told["force with failed panels"] = self.machine.servo.force_is_on
+            self.told["trouble with failed panels"] = operator.banner.isVisible()
+            operator.come_forward()
+            self.step = self.see_lines_in_front
+        return len(covers) < 2
+
+    def see_lines_in_front(self, participant: ParticipantWindow, operator: OperatorWindow) -> bool:
+        QGuiApplication.processEvents()
+        self.picture("panels")
+        participant.come_forward()
+        StepLine.paintEvent, TracePlot.show_traces = self.painted, self.drawn
+        self.record, Recorder._record = Recorder._record, _ends
+        self.trial = participant.page.trial if isinstance(participant.page, TaskPage) else None
+        self.step = self.lose_recording
+        return False
+
+    # The recorder, in the next trial.
+
+    def lose_recording(self, participant: ParticipantWindow, operator: OperatorWindow) -> bool:
+        lost = operator.rail.tally.beyond.text()
+        if "lost" in lost:
+            Recorder._record = self.record
+            self.told["recording"] = lost
+            self.told["page at the loss"] = type(participant.page).__name__
+            self.told["force without a recording"] = self.machine.servo.force_is_on
+            self.told["notices"] = [one.text() for one in operator.findChildren(QLabel) if "recorder" in one.text()]
+            operator.come_forward()
+            self.step = self.see_loss
+        return False
+
+    def see_loss(self, participant: ParticipantWindow, operator: OperatorWindow) -> bool:
+        QGuiApplication.processEvents()
+        self.picture("recorder")
+        for notice in operator.findChildren(Notice):
+            notice.accept()
+        participant.come_forward()
+        self.step = self.go_on
+        return False
+
+    def go_on(self, _participant: ParticipantWindow, _operator: OperatorWindow) -> bool:
+        return False
+
+
+def _paints_badly(self: StepLine, _event: object) -> None:
+    painter = QPainter(self)
+    painter.drawLine(0, 0, 10, 10)
+    raise ValueError("no such colour")
+
+
+def _fails(*_arguments: object) -> None:
+    raise ValueError("no such curve")
+
+
+class Ended(BaseException):
+    """What no guard for exceptions holds back."""
+
+
+def _ends(*_arguments: object) -> None:
+    raise Ended("pulled")
+
+
+def main(folder: str, pictures: str = "") -> None:
+    beginning.MEASURED_S = 0.1
+    machines: list[Machine] = []
+    open_machine = live_session.open_machine
+    live_session.open_machine = lambda *a, **k: machines.append(open_machine(*a, **k)) or machines[-1]
+    scene = Scene(machines, Path(pictures) if pictures else None)
+    application_here()
+    person = Person(scene)
+    code = app.run(
+        str(short.write(Path(folder))),
+        participant="P001",
+        device="falcon-emulated",
+        seed=3,
+        results=Path(folder) / "results",
+    )
+    person.leave()
+    scene.told |= {
+        "code": code,
+        "step": scene.step.__name__,
+        "threads": [thread.name for thread in threading.enumerate() if thread.name == "reconnecting"],
+    }
+    sys.stdout.write(json.dumps(scene.told))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
