@@ -7,6 +7,7 @@ Each command imports what it needs when it runs, so that ``--help`` loads neithe
 from __future__ import annotations
 
 import io
+import logging
 import sys
 
 import click
@@ -76,7 +77,10 @@ commands.add_command(devices)  # with commands of its own
 
 
 def main() -> None:
-    """Run a command; turn what the user can mend into one line and exit code 2."""
+    """Run a command; turn what the user can mend into one line and exit code 2, and log what else fails."""
+    from study_app.store.program_log import keep_log
+
+    keep_log()
     if isinstance(sys.stdout, io.TextIOWrapper):  # a pipe or an old console may lack a letter of a study's title
         sys.stdout.reconfigure(errors="backslashreplace")
     try:
@@ -90,4 +94,7 @@ def main() -> None:
     except StudyError as error:
         click.echo(f"liquid-study: {error}", err=True)
         sys.exit(EXIT_USER_ERROR)
+    except Exception:
+        logging.getLogger(__name__).critical("a bug ended the program", exc_info=True)
+        raise
     sys.exit(code if isinstance(code, int) else 0)

@@ -53,10 +53,12 @@ def list_devices() -> None:
 @DEVICE
 @FIRMWARE
 @click.option("--fault", "faults", multiple=True, metavar="NAME", help="Of falcon-emulated: frozen, drop=0.01 …")
-def doctor(name: str, firmware: Path | None, faults: tuple[str, ...]) -> None:
+@click.option("--to", type=click.Path(path_type=Path), metavar="FILE", help="Write a zip file for whoever helps.")
+def doctor(name: str, firmware: Path | None, faults: tuple[str, ...], to: Path | None) -> None:
     """Look a Falcon over: find, open, load, home and turn it, without force; say what is wrong, why, and the cure.
 
-    NAME is falcon, falcon:SERIAL, falcon-emulated or falcon-socket:PATH. Exit code 3 where something is wrong.
+    NAME is falcon, falcon:SERIAL, falcon-emulated or falcon-socket:PATH. Exit code 3 where something is wrong. The zip
+    file holds this report, versions, settings, log and last error; no participant's id, no answer, no liquid's value.
     """
     click.echo(_PREPARING)  # what is imported and compiled next takes long the first time
     from study_app.devices.falcon.doctor import examine
@@ -65,6 +67,11 @@ def doctor(name: str, firmware: Path | None, faults: tuple[str, ...]) -> None:
     found = report(examine(name, firmware=firmware, faults=faults, tell=click.echo))
     for line in lines(found):
         click.echo(line)
+    if to is not None:
+        from study_app.store.support import write_support
+
+        write_support(to, "\n".join(lines(found)).strip() + "\n")
+        click.echo(f"Written: {to}")
     if not found.well:
         click.get_current_context().exit(EXIT_FOUND)
 

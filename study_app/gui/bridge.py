@@ -48,6 +48,7 @@ from study_app.session.events import (
 from study_app.session.pages import Page, TaskPage
 from study_app.session.ports import Ports
 from study_app.session.runner import Runner
+from study_app.store.program_log import DEVICE_FAILED
 
 TRACES_S = 0.030  # every second frame of 60 a second, every fifth of 144
 TILES_S = 0.5
@@ -122,6 +123,7 @@ class SessionBridge(QObject):
         self._hand: Hand | None = None
         self._gone = False
         self._stalled: str | None = None
+        self._lost = False
         self._hook_before = sys.excepthook
         self._thread_hook_before = threading.excepthook
         self._thread_broke.connect(self._tell_of_thread, Qt.ConnectionType.QueuedConnection)
@@ -215,7 +217,7 @@ class SessionBridge(QObject):
         if not first:
             return
         self.trouble, self.failure = what, error
-        log.error("the session broke: %s", what, exc_info=_trace_of(error))
+        log.error("the session broke: %s", error if isinstance(error, StudyError) else what, exc_info=_trace_of(error))
         traceback.clear_frames(error.__traceback__)  # they may hold a painter, and Qt would paint no window any more
         try:
             if not self.runner.finished:
@@ -297,6 +299,10 @@ class SessionBridge(QObject):
         if (stalled := self.runner.stalled) != self._stalled:
             self._stalled = stalled
             log.warning("the disk takes data again" if stalled is None else f"the session waits: {stalled}")
+        lost, before = self.runner.state.lost_device, self._lost
+        self._lost = lost
+        if lost and not before:
+            log.info(DEVICE_FAILED, ServoFault(self.parts.journal.progress.broke))
         self._show()
         if self.runner.finished and self._leaves:
             QTimer.singleShot(0, self, self._leave)

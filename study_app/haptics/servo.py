@@ -21,13 +21,13 @@ from study_app.haptics.thread import LoopThread
 ELEMENTS = 10_000
 
 _FAULTS = {
-    STATUS_DEVICE_LOST: "stopped answering or lost its guard; switch it off if it pushes, plug it in again, start anew",
-    STATUS_STALE_FAULT: "sent nothing usable for 50 ms; check its cable and start anew",
+    STATUS_DEVICE_LOST: "stopped answering or lost its guard; switch it off if it pushes, and plug it in again",
+    STATUS_STALE_FAULT: "sent nothing usable for 50 ms; check its cable",
     STATUS_NON_FINITE: "was to be sent a force that is not a finite number; check the scene's parameters",
 }
 
 
-_STUCK = "holds the last turn up, or the computer does: no turn for 75 ms; switch it off if it pushes, start anew"
+_STUCK = "holds the last turn up, or the computer does: no turn for 75 ms; switch it off if it pushes"
 
 
 class Servo:

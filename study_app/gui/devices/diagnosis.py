@@ -9,11 +9,12 @@ from typing import Protocol, TypeAlias
 
 from PySide6.QtCore import QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QGuiApplication
-from PySide6.QtWidgets import QDialog, QHBoxLayout, QProgressBar, QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QDialog, QFileDialog, QHBoxLayout, QProgressBar, QScrollArea, QVBoxLayout, QWidget
 
 from study_app.devices.falcon.diagnosis import Facts
 from study_app.devices.falcon.examination import Examination, Said
 from study_app.devices.falcon.findings import Report, findings_of, lines
+from study_app.errors import StoreError
 from study_app.gui.cards import Card, Icon, Rule
 from study_app.gui.controls import ActionButton
 from study_app.gui.devices.findings import FindingRow
@@ -21,6 +22,7 @@ from study_app.gui.devices.view import TITLES
 from study_app.gui.labels import label, set_ink
 from study_app.gui.theme import Theme, font
 from study_app.gui.themed import wear
+from study_app.store.support import NAME, write_support
 
 LOOK_MS = 100
 PREPARING = "Preparing … The first time the driver is compiled, which takes about a minute."
@@ -90,10 +92,11 @@ class DiagnosisDialog(QDialog):
         self.sign = Icon("pulse", "accent", 26)
         self.again = ActionButton("repeat", "Examine again")
         self.copy = ActionButton("copy", "Copy report")
+        self.support = ActionButton("save", "Save for support …")
         self.close_button = ActionButton("", "Cancel")
         self._lay_out(title)
         self._connect()
-        self.setMinimumSize(600, 420)
+        self.setMinimumSize(680, 420)
         room = self.screen().availableSize()
         self.resize(SIZE.boundedTo(QSize(room.width() - 40, room.height() - 60)))
         wear(self, theme)
@@ -128,6 +131,7 @@ class DiagnosisDialog(QDialog):
         foot.setSpacing(12)
         foot.addWidget(self.close_button)
         foot.addStretch()
+        foot.addWidget(self.support)
         foot.addWidget(self.copy)
         foot.addWidget(self.again)
         column = QVBoxLayout(self)
@@ -145,7 +149,8 @@ class DiagnosisDialog(QDialog):
         self.close_button.clicked.connect(self.reject)
         self.again.clicked.connect(self.examine)
         self.copy.clicked.connect(self._copy)
-        for button in (self.again, self.copy):
+        self.support.clicked.connect(self._ask_where)
+        for button in (self.again, self.copy, self.support):
             button.setAutoDefault(False)
         self.close_button.setDefault(True)
 
@@ -158,6 +163,7 @@ class DiagnosisDialog(QDialog):
         self.bar.show()
         self.again.setEnabled(False)
         self.copy.setEnabled(False)
+        self.support.setEnabled(False)
         self.close_button.show_action("", "Cancel")
         self._show_waiting()
         self._wanted = True
@@ -180,6 +186,7 @@ class DiagnosisDialog(QDialog):
         self._timer.stop()
         self.bar.hide()
         self.again.setEnabled(True)
+        self.support.setEnabled(True)
         self.close_button.show_action("", "Close")
         self._let_go()
         if not isinstance(said, Report):
@@ -229,6 +236,26 @@ class DiagnosisDialog(QDialog):
         if self.report is not None:
             QGuiApplication.clipboard().setText("\n".join(lines(self.report)).strip() + "\n")
             self.copy.show_action("check", "Copied")
+
+    def _ask_where(self) -> None:
+        """Ask for a file, in a dialog that nothing waits for."""
+        dialog = QFileDialog(self, "Save a zip file for whoever helps", NAME, "Zip files (*.zip)")
+        dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
+        dialog.setDefaultSuffix("zip")
+        dialog.fileSelected.connect(lambda path: self.save_support(Path(path)))
+        dialog.finished.connect(dialog.deleteLater)
+        dialog.open()
+
+    def save_support(self, path: Path) -> None:
+        """Write versions, settings, log, last error and the report to ``path``; say so, or why not."""
+        report = "" if self.report is None else "\n".join(lines(self.report)).strip() + "\n"
+        try:
+            write_support(path, report)
+        except StoreError as error:
+            self.seen.setText(_sentence(str(error)))
+        else:
+            self.seen.setText(f"Saved as {path}. No participant's id, answer or liquid's value is in it.")
+        self.seen.show()
 
     def _let_go(self) -> None:
         """Have what goes on end, in a thread: the process closes the Falcon first, and nothing waits for that here."""

@@ -14,9 +14,9 @@ from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QGraphicsItem, QHBoxLayout, QWidget
 
-from study_app.gui.cards import Icon
+from study_app.gui.cards import SHADOW, Icon
 from study_app.gui.labels import label
-from study_app.gui.theme import LIGHT
+from study_app.gui.theme import LIGHT, RADIUS_CARD
 from study_app.gui.themed import Themed, dress
 
 LEAST_WIDTH = 140  # of a panel that has room for the line; the sign alone has a tip that says it
@@ -49,8 +49,13 @@ class FailedPanel(Themed, QWidget):
         self.raise_()
 
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint the ground."""
-        QPainter(self).fillRect(self.rect(), QColor(self.theme.bad_bg))
+        """Paint all of it, since nothing is painted below: the window's ground and a rounded surface."""
+        painter = QPainter(self)
+        painter.fillRect(self.rect(), QColor(self.theme.window))
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QColor(self.theme.bad_bg))
+        painter.drawRoundedRect(self.rect().adjusted(SHADOW, SHADOW, -SHADOW, -SHADOW), RADIUS_CARD, RADIUS_CARD)
 
 
 class Panels(QObject):

@@ -105,14 +105,14 @@ class Rail(Card):
         self._steps_column = QVBoxLayout(self._steps)
         self._steps_column.setSpacing(0)
         self._steps_column.addStretch(1)
-        self._scroll = QScrollArea()
-        self._scroll.setWidgetResizable(True)
-        self._scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self._scroll.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self._scroll.setWidget(self._steps)
+        self.steps_area = QScrollArea()
+        self.steps_area.setWidgetResizable(True)
+        self.steps_area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.steps_area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.steps_area.setWidget(self._steps)
         self._rules = Rule(), Rule()
         self.column.addWidget(self._rules[0])
-        self.column.addWidget(self._scroll, 1)
+        self.column.addWidget(self.steps_area, 1)
         self.column.addWidget(self._rules[1])
         self.take_back()
 
@@ -140,7 +140,7 @@ class Rail(Card):
             part.setVisible(not slim)
         self._steps_column.setContentsMargins(0, 0, 0 if slim else 8, 0)
         bars = Qt.ScrollBarPolicy
-        self._scroll.setVerticalScrollBarPolicy(bars.ScrollBarAlwaysOff if slim else bars.ScrollBarAsNeeded)
+        self.steps_area.setVerticalScrollBarPolicy(bars.ScrollBarAlwaysOff if slim else bars.ScrollBarAsNeeded)
         for line in self.lines:
             line.slim(slim)
 
@@ -157,11 +157,11 @@ class Rail(Card):
             arrived = row.state == "now" != line.row.state
             line.show_row(row, first=index == 0, last=index == len(rows) - 1)
             if arrived:
-                self._scroll.ensureWidgetVisible(line, 0, 2 * LEAST_ROW_HEIGHT)
+                self.steps_area.ensureWidgetVisible(line, 0, 2 * LEAST_ROW_HEIGHT)
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
         """Keep the present step in sight."""
         super().resizeEvent(event)
         for line in self.lines:
             if line.row.state == "now":
-                self._scroll.ensureWidgetVisible(line, 0, LEAST_ROW_HEIGHT)
+                self.steps_area.ensureWidgetVisible(line, 0, LEAST_ROW_HEIGHT)

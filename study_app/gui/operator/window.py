@@ -98,7 +98,8 @@ class OperatorWindow(QMainWindow):
             {
                 self.rail.now: "Now",
                 self.rail.tally: "Counts",
-                self.rail: "Steps",
+                self.rail.steps_area: "Steps",
+                self.rail: "Session",
                 self.tiles: "Servo",
                 self.lateness: "Tick lateness",
                 self.force: "Force",
@@ -158,8 +159,9 @@ class OperatorWindow(QMainWindow):
             asked.reject()  # the trial it was about is over: its answer would hit the next one
         for part in (self.stop, self.header, self.buttons):
             part.show_view(view)
-        for panel in (self.rail.now, self.rail.tally, self.rail, self.tiles, self.notes):
+        for panel in (self.rail.now, self.rail.tally, self.tiles, self.notes):
             self.panels.draw(panel, partial(panel.show_view, view))
+        self.panels.draw(self.rail.steps_area, lambda: self.rail.show_view(view))
         self.panels.draw(self.device, lambda: self.device.show_device(view.device))
         self._view = view
 

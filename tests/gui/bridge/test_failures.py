@@ -190,7 +190,7 @@ def test_whatever_window_it_happens_in_a_failure_is_zero_force_and_told(
         ("study_app.gui.operator.plots.PositionCard", "show_health", show_position, "Position"),
         ("study_app.gui.plots.TracePlot", "show_traces", show_position, "Position"),
         ("study_app.gui.plots.Plot", "paintEvent", paint_plot, "Position"),
-        ("study_app.gui.operator.rail.Rail", "paintEvent", paint_rail, "Steps"),
+        ("study_app.gui.operator.rail.Rail", "paintEvent", paint_rail, "Session"),
         ("study_app.gui.operator.now.Tally", "show_view", show_notes, "Counts"),
     ],
 )

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import zipfile
+
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication
-from PySide6.QtWidgets import QLabel
+from PySide6.QtWidgets import QFileDialog, QLabel
 
 from study_app.devices.falcon.diagnosis import MODES, OPEN, UDEV_RULE, Facts
 from study_app.devices.falcon.examination import Examination
@@ -166,3 +168,19 @@ def test_a_fault_of_an_emulated_falcon_is_found_by_the_real_examination(qtbot, f
     made.close()
     made._leaving.join(20)
     assert not made._leaving.is_alive()
+
+
+def test_a_zip_for_whoever_helps_is_saved_with_the_report_and_a_failure_is_a_sentence(dialog, begun, qtbot, tmp_path):
+    assert not dialog.support.isEnabled()
+    begun[0].told = [REFUSED]
+    qtbot.waitUntil(dialog.support.isEnabled)
+    dialog.save_support(tmp_path / "missing" / "help.zip")
+    assert "cannot be written" in dialog.seen.text()
+    qtbot.mouseClick(dialog.support, Qt.MouseButton.LeftButton)
+    asked = dialog.findChild(QFileDialog)
+    assert asked.isVisible()
+    asked.fileSelected.emit(str(tmp_path / "help.zip"))
+    asked.close()
+    with zipfile.ZipFile(tmp_path / "help.zip") as packed:
+        assert "this account may not open it" in packed.read("diagnosis.txt").decode()
+    assert str(tmp_path / "help.zip") in dialog.seen.text()

@@ -1,0 +1,115 @@
+"""The program's log: a file in the user's folder that tells where something failed, and nothing of a study.
+
+A message's words are in the source; what is put into them may be anything: an id, an answer, a liquid's value. So a
+record is written with the words alone, and of what stands in them only the sentence of a device's failure. An exception
+is written as its type and the places in the source that it left, without its own sentence.
+"""
+
+from __future__ import annotations
+
+import logging
+import re
+import traceback
+from contextlib import suppress
+from logging.handlers import RotatingFileHandler
+from pathlib import Path
+from typing import Any, Final
+
+from study_app.errors import DeviceError, ServoFault
+from study_app.user_folder import user_folder
+
+MOST_BYTES: Final = 250_000
+KEPT: Final = 2  # files beside the newest
+OMITTED: Final = "…"
+DEVICE_FAILED: Final = "the device failed: %s"  # an error to whoever helps; the session says it itself, and goes on
+_ERROR: Final = re.compile(rf"\S+ \S+ (ERROR|CRITICAL|\S+ \S+ {DEVICE_FAILED.partition('%')[0]})")
+
+
+class PlainFormatter(logging.Formatter):
+    """Writes a record without what is put into its words."""
+
+    def __init__(self) -> None:
+        super().__init__("%(asctime)s %(levelname)s %(name)s: %(message)s")
+
+    def format(self, record: logging.LogRecord) -> str:
+        """Return the record as lines; those after the first are indented."""
+        record = logging.makeLogRecord(record.__dict__)
+        given = record.args if isinstance(record.args, tuple) else ()
+        record.args = tuple(map(_shown, given))
+        record.msg = str(record.msg).replace("%r", "%s").replace("%d", "%s") if given else _words(record.msg)
+        record.exc_text = record.stack_info = None
+        return super().format(record)
+
+    def formatException(self, ei: Any) -> str:  # noqa: N802 - logging's name
+        """Return the type of an exception and the places that it left, outermost first."""
+        kind, _, trace = ei
+        places = [
+            f"    {source_place(frame.filename)}:{frame.lineno} in {frame.name}"
+            for frame in traceback.extract_tb(trace)
+        ]
+        return "\n".join((*places, f"    {getattr(kind, '__name__', kind)}"))
+
+
+class _Quiet(RotatingFileHandler):
+    """A log that cannot be written is no reason to disturb a session."""
+
+    def handleError(self, record: logging.LogRecord) -> None:  # noqa: N802 - logging's name
+        """Do nothing."""
+
+
+def log_file() -> Path:
+    """Return where the log is, or would be."""
+    return user_folder() / "log.txt"
+
+
+def keep_log() -> None:
+    """Write what the program logs into `log_file` from now on, and warnings to the terminal as before."""
+    logger = logging.getLogger("study_app")
+    if any(isinstance(handler, _Quiet) for handler in logger.handlers):
+        return
+    with suppress(OSError):
+        log_file().parent.mkdir(parents=True, exist_ok=True)
+        handler = _Quiet(log_file(), maxBytes=MOST_BYTES, backupCount=KEPT, encoding="utf-8", delay=True)
+        handler.setFormatter(PlainFormatter())
+        logger.addHandler(handler)
+        if logging.lastResort is not None:
+            logger.addHandler(logging.lastResort)
+        logger.setLevel(logging.INFO)
+
+
+def kept_log() -> str:
+    """Return the log, the oldest line first; what cannot be read is left out."""
+    newest = log_file()
+    files = [newest.with_name(f"{newest.name}.{number}") for number in range(KEPT, 0, -1)]
+    return "".join(map(_read, (*files, newest)))
+
+
+def last_error(log: str) -> str:
+    """Return the last error in a log, a device's failure included, with the lines that belong to it; "" without one."""
+    records = re.split(r"\n(?! )", log.strip("\n"))
+    return next((one for one in reversed(records) if _ERROR.match(one)), "")
+
+
+def source_place(path: str) -> str:
+    """Return a source file by its place in its package: where a program is installed may name its user."""
+    parts = Path(path).parts
+    for root in ("study_app", "site-packages"):
+        if root in parts:
+            return "/".join(parts[parts.index(root) :])
+    return parts[-1]
+
+
+def _read(path: Path) -> str:
+    with suppress(OSError):
+        return path.read_text(encoding="utf-8", errors="replace")
+    return ""
+
+
+def _shown(given: object) -> str:
+    if isinstance(given, DeviceError | ServoFault):
+        return str(given)
+    return type(given).__name__ if isinstance(given, BaseException) else OMITTED
+
+
+def _words(message: object) -> str:
+    return message if isinstance(message, str) else OMITTED

@@ -1,0 +1,99 @@
+"""One zip file for whoever helps: versions, settings, log, last error, and what was found of a device.
+
+It holds no participant's id, no answer, no value of a liquid and nothing of a key. Of a study it reads nothing but the
+traces of crashes, and of these the places in the source.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+import zipfile
+from collections.abc import Iterator
+from importlib import metadata
+from pathlib import Path
+from typing import Final
+
+from study_app.store import machine, receipt
+from study_app.store.atomic import write_file
+from study_app.store.program_log import kept_log, last_error, source_place
+
+NAME: Final = "liquid-study-support.zip"
+CRASHES: Final = 3
+_DRIVERS: Final = ("pyusb", "libusb-package", "hidapi")
+_PRIVATE: Final = frozenset({"operator", "firmware", "results"})  # initials, and folders that may name a person
+_PLACE: Final = re.compile(r'^ *(File "[^"]*", line \d+ in \S+|<no Python frame>)$')
+_HEADING: Final = re.compile(
+    r"^(Fatal Python error: [\w \-]+|(Current thread|Thread) 0x[0-9a-f]+ \(most recent call first\):)$"
+)
+ABOUT: Final = """What liquid-study knows of itself on this machine, for whoever helps with it.
+
+versions.json    the program, Python, the system and libraries
+settings.json    the settings of this machine, without initials and folders
+log.txt          the program's log: words of the source, places in it, failures of devices
+last-error.txt   the last error in the log
+diagnosis.txt    what was found of the device, where it was examined
+crash-N.txt      places in the source at a crash, the newest first
+
+No participant's id, no answer, no value of a liquid and no key is in here.
+"""
+
+
+def write_support(path: Path, diagnosis: str = "") -> None:
+    """Write the zip to ``path``, whole or not at all; ``diagnosis`` is the report on a device.
+
+    Raises
+    ------
+    StoreError
+        It cannot be written.
+    """
+    made = io.BytesIO()
+    with zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as packed:
+        for name, text in _parts(diagnosis):
+            packed.writestr(name, text.replace(str(Path.home()), "~"))
+    write_file(path, made.getvalue())
+
+
+def _parts(diagnosis: str) -> Iterator[tuple[str, str]]:
+    settings, trouble = machine.load_or_default()
+    log = kept_log()
+    yield "README.txt", ABOUT
+    yield "versions.json", _json(receipt.versions() | {name: _version(name) for name in _DRIVERS})
+    yield "settings.json", _json(_settings(settings) | ({"problem": "the file cannot be used"} if trouble else {}))
+    yield "log.txt", log
+    yield "last-error.txt", last_error(log)
+    if diagnosis:
+        yield "diagnosis.txt", diagnosis
+    for number, trace in enumerate(_crashes(settings.results_folder), start=1):
+        yield f"crash-{number}.txt", trace
+
+
+def _settings(settings: machine.MachineSettings) -> dict[str, object]:
+    """Return the settings; of private ones whether they are set."""
+    held = settings.model_dump(mode="json")
+    return {name: bool(value) if name in _PRIVATE else value for name, value in held.items()}
+
+
+def _crashes(results: Path) -> Iterator[str]:
+    """Yield the newest traces of crashes of the sessions in ``results``, line by line what is a place in the source."""
+    found = []
+    for path in results.glob("*/data/sub-*/ses-*/crash.txt"):
+        try:
+            found.append((path.stat().st_mtime_ns, path.read_text(encoding="utf-8", errors="replace")))
+        except OSError:
+            continue
+    for _, trace in sorted(found, reverse=True)[:CRASHES]:
+        lines = [line for line in trace.splitlines() if _PLACE.match(line) or _HEADING.match(line)]
+        yield re.sub(r'(?<=File ")[^"]*', lambda path: source_place(path[0]), "\n".join(lines))
+
+
+def _version(library: str) -> str:
+    try:
+        return metadata.version(library)
+    except metadata.PackageNotFoundError:
+        return "not installed"
+
+
+def _json(value: object) -> str:
+    return json.dumps(value, indent=2, ensure_ascii=False) + "\n"

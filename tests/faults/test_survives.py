@@ -1,0 +1,96 @@
+"""A session in real windows on one small screen survives its device, a panel and its recorder."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from study_app.evaluation.replay import replay
+from study_app.store.layout import StudyFolder
+from study_app.store.verify import verify
+from tests.compiled import needs_servo
+from tests.real_windows import COMPILED_S, needs_display, virtual_display
+
+pytestmark = [needs_servo, needs_display, pytest.mark.xvfb, pytest.mark.timeout(300)]
+
+
+@pytest.fixture(scope="module")
+def session(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], Path]:
+    """What was told of the session, and its study's folder."""
+    folder = tmp_path_factory.mktemp("survives")
+    with virtual_display("-screen", "0", "1366x768x24") as display:
+        here = {"DISPLAY": display, "QT_QPA_PLATFORM": "xcb", "LIQUID_STUDY_CONFIG": str(folder / "settings")}
+        ran = subprocess.run(
+            [sys.executable, "-m", "tests.faults.survivor", str(folder)],
+            env=os.environ | here,
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=COMPILED_S,
+        )
+    assert ran.returncode == 0, ran.stderr
+    told = json.loads(ran.stdout)
+    assert (told["errors"], told["code"], told["step"]) == ([], 0, "go_on"), ran.stderr
+    return told, folder / "results"
+
+
+def rows(results: Path) -> list[dict[str, str]]:
+    (table,) = results.glob("data/sub-P001/ses-01/*_description-trials_data.csv")
+    with table.open(encoding="utf-8", newline="") as opened:
+        return list(csv.DictReader(opened))
+
+
+def test_an_unplugged_device_is_reconnected_and_its_trial_presented_again(session: tuple[dict[str, Any], Path]) -> None:
+    told, results = session
+    assert not told["lost"]["force"]
+    assert "stopped answering" in told["lost"]["banner"]
+    assert "Plug the device in" in told["lost"]["advice"]
+    assert told["lost"]["banner_in_window"]
+    assert "device" not in told["lost"]["page"]
+    assert "none is connected" in told["still unplugged"]
+    assert not told["button while connecting"]
+    assert (told["reconnected"]["force"], told["reconnected"]["held"]) == (False, "force")
+    assert not told["resumed by the participant"]
+    assert told["force in the next attempt"]
+    first, *again = [row for row in rows(results) if row["trial"] == "1"]
+    assert (first["outcome"], again[-1]["outcome"]) == ("interrupted", "complete")
+    assert int(again[-1]["attempt"]) == 1 + len(again)
+    assert first["notes"].startswith("the device failed and was connected again")
+    assert again[0]["notes"].startswith("presented again: the device failed and was connected again")
+
+
+def test_panels_that_fail_are_lines_and_the_session_goes_on(session: tuple[dict[str, Any], Path]) -> None:
+    told, results = session
+    assert told["panels"] == [f"{name}: this panel failed. The session goes on." for name in ("Position", "Steps")]
+    assert told["force with failed panels"]
+    assert not told["trouble with failed panels"]
+    last = [row for row in rows(results) if row["trial"] == "1"][-1]
+    assert "the cockpit's panel 'Position' failed: ValueError: no such curve" in last["notes"]
+    assert "the cockpit's panel 'Steps' failed: ValueError: no such colour" in last["notes"]
+
+
+def test_a_recorder_that_dies_is_told_at_once_and_records_the_next_trial(session: tuple[dict[str, Any], Path]) -> None:
+    told, results = session
+    assert told["page at the loss"] == "TaskPage"
+    assert told["recording"] == "Recording of Liquid setting 2 lost: its thread ended: Ended: pulled."
+    assert any("recorder" in notice for notice in told["notices"])
+    assert told["force without a recording"]
+    by_trial = {row["trial"]: row for row in rows(results)}
+    assert (by_trial["2"]["recording"], by_trial["2"]["recording_lost"]) == ("n/a", "its thread ended: Ended: pulled")
+    assert (by_trial["3"]["recording"], by_trial["3"]["recording_lost"]) == ("recordings/trial-003.parquet", "n/a")
+
+
+def test_what_it_leaves_is_sound_and_its_forces_are_computed_again(session: tuple[dict[str, Any], Path]) -> None:
+    _, results = session
+    assert verify(results).errors == ()
+    (folder,) = StudyFolder(results).sessions()
+    again = replay(folder.path)
+    assert again.recordings >= 2
+    assert (again.differences, again.missing) == ((), ())

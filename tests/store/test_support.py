@@ -1,0 +1,148 @@
+"""The zip for whoever helps says what failed and where, and nothing of a study."""
+
+from __future__ import annotations
+
+import json
+import logging
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from study_app import cli
+from study_app.errors import DeviceLost, StoreError, StudyError
+from study_app.store import machine
+from study_app.store.machine import MachineSettings
+from study_app.store.program_log import DEVICE_FAILED, keep_log, kept_log, last_error, log_file
+from study_app.store.support import write_support
+
+ID, ANSWER, DENSITY, NONCE, INITIALS = "P9047", "responded6of7", "1013.7", "c0ffee5eed", "ZQX"
+PLANTED = (ID, ANSWER, DENSITY, NONCE, INITIALS, "sub-", "tester-home")
+log = logging.getLogger("study_app.tests.support")
+
+
+@pytest.fixture
+def logged() -> Iterator[logging.Logger]:
+    """The program's logger, written to the file of this test's user folder, and as it was afterwards."""
+    logger = logging.getLogger("study_app")
+    before, level = list(logger.handlers), logger.level
+    keep_log()
+    yield logger
+    for handler in set(logger.handlers) - set(before):
+        logger.removeHandler(handler)
+        handler.close()
+    logger.setLevel(level)
+
+
+def members(path: Path) -> dict[str, str]:
+    with zipfile.ZipFile(path) as packed:
+        return {name: packed.read(name).decode() for name in packed.namelist()}
+
+
+def fails() -> None:
+    density = float(DENSITY)
+    raise ValueError(f"{ID} gave {ANSWER} in a liquid of {density} kg/m³ under {NONCE}")
+
+
+def plant(caplog: pytest.LogCaptureFixture) -> None:
+    """Log what a session may log when it breaks, with ids, answers, values and folders in it."""
+    try:
+        fails()
+    except ValueError as error:
+        log.exception("the session broke: %s", error)  # noqa: TRY401 - as the program does
+        log.exception("the panel %r failed: %d times", ID, 6)
+    log.warning("the session waits: %s", StoreError(f"/home/tester-home/results/data/sub-{ID}/journal.jsonl: no space"))
+    log.warning("%(answer)s of %(who)s", {"answer": ANSWER, "who": ID})
+    log.warning(StudyError(f"{ID} has {DENSITY}"))  # an object in place of words
+    caplog.clear()
+
+
+def test_nothing_of_a_study_is_in_it(logged: logging.Logger, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    results = tmp_path / "tester-home" / "results"
+    session = results / "rek2024" / "data" / f"sub-{ID}" / "ses-01"
+    session.mkdir(parents=True)
+    (results / "rek2024" / "blinding").mkdir()
+    (results / "rek2024" / "blinding" / "key.sealed").write_text(NONCE)
+    (session / "journal.jsonl").write_text(f'{{"participant": "{ID}", "value": "{ANSWER}"}}\n')
+    (session / "crash.txt").write_text(
+        "Fatal Python error: Segmentation fault\n\nCurrent thread 0x00007f (most recent call first):\n"
+        f'  File "/opt/tester-home/study_app/gui/bridge.py", line 12 in start\n{ID} {DENSITY}\n'
+    )
+    machine.save(MachineSettings(results=str(results), operator=INITIALS, firmware="/x/tester-home/falcon.bin"))
+    plant(caplog)
+    write_support(tmp_path / "help.zip", "1  FOUND  no reply\n")
+    found = members(tmp_path / "help.zip")
+    everything = "\n".join((*found, *found.values()))
+    assert [word for word in PLANTED if word in everything] == []
+    assert set(found) == {
+        *("README.txt", "versions.json", "settings.json", "log.txt", "last-error.txt", "diagnosis.txt", "crash-1.txt")
+    }
+    assert "tests/store/test_support.py" not in everything  # outside the package: the file's name alone
+    assert "the session broke: ValueError" in found["log.txt"]
+    assert "the panel … failed: … times" in found["last-error.txt"]
+    assert "test_support.py:" in found["last-error.txt"]
+    assert "in fails" in found["last-error.txt"]
+    assert found["diagnosis.txt"] == "1  FOUND  no reply\n"
+    assert "gui/bridge.py" in found["crash-1.txt"]
+    settings = json.loads(found["settings.json"])
+    assert (settings["operator"], settings["results"], settings["device"]) == (True, True, "mouse")
+    assert json.loads(found["versions.json"]).keys() >= {"liquid-study", "python", "system", "numba", "pyusb"}
+
+
+def test_a_failure_of_the_device_is_told_in_full_and_is_the_last_error(
+    logged: logging.Logger, caplog: pytest.LogCaptureFixture
+) -> None:
+    log.error("a bug")
+    log.info(DEVICE_FAILED, DeviceLost("the device 'falcon' stopped answering"))
+    log.info("the device was connected again")
+    caplog.clear()
+    assert last_error(kept_log()).endswith("the device failed: the device 'falcon' stopped answering")
+
+
+def test_the_log_is_kept_within_bounds_and_one_that_cannot_be_written_disturbs_nobody(
+    logged: logging.Logger, capfd: pytest.CaptureFixture[str]
+) -> None:
+    for _ in range(12_000):
+        log.info("the same words, again and again, until the file is as large as it may be")
+    files = sorted(log_file().parent.glob("log.txt*"))
+    assert [path.name for path in files] == ["log.txt", "log.txt.1", "log.txt.2"]
+    assert sum(path.stat().st_size for path in files) < 800_000
+    for path in files:
+        path.unlink()
+    log_file().mkdir()
+    for handler in logged.handlers:
+        handler.close()
+    log.info("nowhere to go")
+    assert "Traceback" not in capfd.readouterr().err
+
+
+def test_without_log_and_settings_there_is_a_zip_all_the_same(tmp_path: Path) -> None:
+    write_support(tmp_path / "help.zip")
+    found = members(tmp_path / "help.zip")
+    assert (found["log.txt"], found["last-error.txt"]) == ("", "")
+    assert "diagnosis.txt" not in found
+
+
+def test_a_zip_that_cannot_be_written_is_a_sentence(tmp_path: Path) -> None:
+    with pytest.raises(StoreError, match=r"help\.zip"):
+        write_support(tmp_path / "missing" / "help.zip")
+
+
+def test_the_doctor_writes_one(tmp_path: Path) -> None:
+    pytest.importorskip("numba")
+    words = [
+        "devices",
+        "doctor",
+        "--device",
+        "falcon-emulated",
+        "--fault",
+        "unplugged",
+        "--to",
+        str(tmp_path / "a.zip"),
+    ]
+    ran = CliRunner().invoke(cli.commands, words)
+    assert ran.exit_code == 3, ran.output
+    assert f"Written: {tmp_path / 'a.zip'}" in ran.output
+    assert "FOUND" in members(tmp_path / "a.zip")["diagnosis.txt"]
