@@ -14,7 +14,7 @@ from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QGraphicsItem, QHBoxLayout, QWidget
 
-from study_app.gui.cards import SHADOW, Icon
+from study_app.gui.cards import SHADOW, Card, Icon
 from study_app.gui.labels import label
 from study_app.gui.theme import LIGHT, RADIUS_CARD
 from study_app.gui.themed import Themed, dress
@@ -49,8 +49,11 @@ class FailedPanel(Themed, QWidget):
         self.raise_()
 
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
-        """Paint all of it, since nothing is painted below: the window's ground and a rounded surface."""
+        """Paint all of it, since nothing is painted below: in place of a card the window's ground shows at corners."""
         painter = QPainter(self)
+        if not isinstance(self.parentWidget(), Card):
+            painter.fillRect(self.rect(), QColor(self.theme.bad_bg))
+            return
         painter.fillRect(self.rect(), QColor(self.theme.window))
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.setPen(Qt.PenStyle.NoPen)
