@@ -299,7 +299,9 @@ def _setting_line(session: Session, progress: SessionProgress, *, answering: boo
     block = session.protocol.blocks[trial.block]
     task = session.protocol.tasks[block.task]
     doing = "free exploration" if isinstance(task, Explore) else "reaching targets"
-    if progress.paused:
+    if progress.broke:
+        doing = "stopped by a fault"
+    elif progress.paused:
         doing = "paused"
     elif answering:
         doing = "answering"

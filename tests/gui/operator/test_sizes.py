@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -124,6 +125,9 @@ def filled(window: OperatorWindow, told: Any, health: Any, state: Callable[[Any]
         | {"protocol": told.session.protocol.model_copy(update={"study": study})}
     )
     view = told.view(health, forces=forces.figures() if blinding == "single" else None, **said)
+    if state is trouble:
+        line = "Not connected: the Falcon was not homed: no arm found its index: push the grip all the way in once."
+        view = replace(view, may_reconnect=True, reconnection=line)
     for _ in range(2):
         window.show_view(view)
         window.show_traces(health, 4.0)
