@@ -3,4 +3,4 @@
 try:
     import PySide6.QtWidgets  # noqa: F401
 except ImportError:
-    collect_ignore = ["test_windows.py", "test_leaks.py"]
+    collect_ignore = ["test_windows.py", "test_leaks.py", "test_survives.py"]

@@ -18,6 +18,8 @@ from study_app.store.verify import verify
 from tests.compiled import needs_servo
 from tests.real_windows import COMPILED_S, needs_display, virtual_display
 
+ROOT = Path(__file__).resolve().parents[2]
+
 pytestmark = [needs_servo, needs_display, pytest.mark.xvfb, pytest.mark.timeout(300)]
 
 
@@ -29,6 +31,7 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], P
         here = {"DISPLAY": display, "QT_QPA_PLATFORM": "xcb", "LIQUID_STUDY_CONFIG": str(folder / "settings")}
         ran = subprocess.run(
             [sys.executable, "-m", "tests.faults.survivor", str(folder)],
+            cwd=ROOT,
             env=os.environ | here,
             capture_output=True,
             text=True,
