@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, TypeAlias
 
 from study_app.errors import StoreError
-from study_app.store.columns import MISSING, RESPONSES, TRIALS, Column, columns_held, header, unsealed
+from study_app.store.columns import LATER, MISSING, RESPONSES, TRIALS, Column, columns_held, header, unsealed
 from study_app.store.formulas import guarded, unguarded
 from study_app.store.journal import Line
 
@@ -247,15 +247,17 @@ def _value(column: Column, cell: str) -> Any:
     return unguarded(cell)
 
 
-def in_columns_of(held: bytes, table: bytes, columns: Sequence[Column]) -> tuple[bytes, tuple[Column, ...]]:
+def in_columns_of(
+    held: bytes, table: bytes, columns: Sequence[Column], may_lack: frozenset[str] = LATER
+) -> tuple[bytes, tuple[Column, ...]]:
     """Return ``table``, whose columns are ``columns``, with those that the table ``held`` must have; and these columns.
 
-    ``held`` may lack columns that its version did not write, and ``table`` those that are sealed. Where ``held`` has
-    the same texts without apostrophes, as earlier versions wrote them, it is returned itself.
+    ``held`` may lack ``may_lack``, columns that its version did not write, and ``table`` those that are sealed. Where
+    ``held`` has the same texts without apostrophes, as earlier versions wrote them, it is returned itself.
     """
     names, ours = (one.partition(b"\n")[0].decode("utf-8", "replace").split(",") for one in (held, table))
     there = tuple(column for column in columns if column.name in ours)
-    kept = columns_held(names, there)
+    kept = columns_held(names, there, may_lack)
     table = table if kept == there else csv_bytes(kept, read_table(table, kept))
     return (held if b"'" in table and held == _without_guards(table) else table), kept
 

@@ -15,12 +15,14 @@ from study_app.store import journal, receipt
 from study_app.store.atomic import is_there, write_file
 from study_app.store.blinding import Codes, Key, read_key, reveal
 from study_app.store.checksums import replace_checksums
+from study_app.store.columns import LATER, SEALED, TABLES
 from study_app.store.description import described_study, write_description
 from study_app.store.journal import Line
 from study_app.store.layout import SessionFolder, StudyFolder
 from study_app.store.open_session import Place, table_files
 from study_app.store.opening import open_alone
 from study_app.store.participants import write_participants
+from study_app.store.tables import in_columns_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,12 +73,14 @@ def _open_tables(study: StudyFolder, session: SessionFolder, key: Key) -> list[s
 
 
 def _rewrite(place: Place, lines: list[Line], key: Key) -> list[str]:
+    """Write the sealed columns; a table of an earlier version goes on without columns that it did not know."""
     left: list[str] = []
-    ours: list[Path] = []
+    ours: dict[str, tuple[bytes, bytes]] = {}
     before, after = (dict(table_files(place, lines, one)) for one in (None, key))
-    for path, content in after.items():
+    for path, columns in zip(after, (TABLES["responses"], TABLES["trials"]), strict=True):
         held = path.read_bytes() if is_there(path) else b""
-        if held not in (before[path], content):
+        sealed, content = (in_columns_of(held, whole[path], columns, LATER - SEALED)[0] for whole in (before, after))
+        if held not in (sealed, content):
             left.append(
                 f"{path} is not what the journal gives, so it was left as it is: "
                 f"liquid-study rebuild {place.folder.path} makes it again"
@@ -84,9 +88,9 @@ def _rewrite(place: Place, lines: list[Line], key: Key) -> list[str]:
             continue
         if held != content:
             write_file(path, content)
-        ours.append(path)
+        ours[path.name] = sealed, content
     if is_there(place.folder.checksums):
-        replace_checksums(place.folder, {path.name: (before[path], after[path]) for path in ours})
+        replace_checksums(place.folder, ours)
     return left
 
 

@@ -152,7 +152,7 @@ def test_leaving_out_changes_foot_figures_and_list(shown: Opened, results: Path)
 
 
 def test_an_exclusion_is_taken_back_from_its_row(shown: Opened, results: Path) -> None:
-    shown.click(shown.place.sessions.rows.lines[1])
+    shown.place.sessions.rows.table.selectRow(1)
     shown.decide(shown.place.exclusions.leave_out, "AK", "fell asleep")
     back = shown.place.exclusions.lines[0].findChild(ActionButton)
     assert back is not None

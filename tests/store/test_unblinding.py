@@ -17,6 +17,7 @@ from study_app.protocol.model import Protocol, StudyHead
 from study_app.store import journal, receipt
 from study_app.store import unblinding as module
 from study_app.store.blinding import open_or_draw_key, reveal
+from study_app.store.checksums import replace_checksums
 from study_app.store.columns import SEALED, TRIALS, header, unsealed
 from study_app.store.description import description_bytes
 from study_app.store.layout import REBUILT, StudyFolder
@@ -24,6 +25,7 @@ from study_app.store.rebuild import rebuild
 from study_app.store.resume import reopen
 from study_app.store.sealing import opened
 from study_app.store.session import SessionStore
+from study_app.store.tables import only
 from study_app.store.unblinding import unblind
 from study_app.store.verify import verify
 from tests.store.conftest import SOURCE
@@ -252,3 +254,20 @@ def test_without_a_reason_nothing_is_opened(tmp_path: Path, start: Start, attend
         unblind(tmp_path / "study", "AB", " ")
     assert tables_in(tmp_path / "study") == held
     assert receipt.read(store.folder.receipt)["status"] == "completed"
+
+
+def test_a_table_of_an_earlier_version_is_opened_without_the_column_that_it_did_not_know(
+    start: Start, attend: Attend
+) -> None:
+    store = start()
+    attend(store)
+    store.finish("completed")
+    folder, path = store.place.study_folder.path, store.folder.table(store.place.study, "trials")
+    earlier = tuple(column for column in unsealed(TRIALS) if column.name != "recording_lost")
+    sealed = path.read_bytes()
+    path.write_bytes(only(sealed, earlier))
+    replace_checksums(store.folder, {path.name: (sealed, path.read_bytes())})
+    for _ in range(2):
+        assert unblind(folder, by="AB", reason="a test").left == ()
+        assert names(path) == set(header(TRIALS)) - {"recording_lost"}
+    assert verify(folder).errors == ()
