@@ -203,7 +203,7 @@ def _ends(*_arguments: object) -> None:
 
 
 def main(folder: str, pictures: str = "") -> None:
-    beginning.MEASURED_S = 0.1
+    beginning.MEASURED_S = 0.7  # the force has faded in by the first trial, as in a real session
     machines: list[Machine] = []
     open_machine = live_session.open_machine
     live_session.open_machine = lambda *a, **k: machines.append(open_machine(*a, **k)) or machines[-1]
