@@ -18,11 +18,14 @@ from typing import Final
 from study_app.store import machine, receipt
 from study_app.store.atomic import write_file
 from study_app.store.program_log import kept_log, last_error, source_place
+from study_app.workspace import workspace
 
 NAME: Final = "liquid-study-support.zip"
 CRASHES: Final = 3
 _DRIVERS: Final = ("pyusb", "libusb-package", "hidapi")
-_PRIVATE: Final = frozenset({"operator", "firmware", "results"})  # initials, and folders that may name a person
+_PRIVATE: Final = frozenset(
+    {"operator", "firmware", "workspace", "recent"}
+)  # initials; paths may name a person
 _PLACE: Final = re.compile(r'^ *(File "[^"]*", line \d+ in \S+|<no Python frame>)$')
 _HEADING: Final = re.compile(
     r"^(Fatal Python error: [\w \-]+|(Current thread|Thread) 0x[0-9a-f]+ \(most recent call first\):)$"
@@ -65,7 +68,7 @@ def _parts(diagnosis: str) -> Iterator[tuple[str, str]]:
     yield "last-error.txt", last_error(log)
     if diagnosis:
         yield "diagnosis.txt", diagnosis
-    for number, trace in enumerate(_crashes(settings.results_folder), start=1):
+    for number, trace in enumerate(_crashes(workspace().results), start=1):
         yield f"crash-{number}.txt", trace
 
 

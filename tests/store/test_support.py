@@ -17,6 +17,7 @@ from study_app.store import machine
 from study_app.store.machine import MachineSettings
 from study_app.store.program_log import DEVICE_FAILED, keep_log, kept_log, last_error, log_file
 from study_app.store.support import write_support
+from study_app.workspace import WORKSPACE_VARIABLE
 
 ID, ANSWER, DENSITY, NONCE, INITIALS = "P9047", "responded6of7", "1013.7", "c0ffee5eed", "ZQX"
 PLANTED = (ID, ANSWER, DENSITY, NONCE, INITIALS, "sub-", "tester-home")
@@ -59,7 +60,10 @@ def plant(caplog: pytest.LogCaptureFixture) -> None:
     caplog.clear()
 
 
-def test_nothing_of_a_study_is_in_it(logged: logging.Logger, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_nothing_of_a_study_is_in_it(
+    logged: logging.Logger, tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv(WORKSPACE_VARIABLE)
     results = tmp_path / "tester-home" / "results"
     session = results / "rek2024" / "data" / f"sub-{ID}" / "ses-01"
     session.mkdir(parents=True)
@@ -70,7 +74,8 @@ def test_nothing_of_a_study_is_in_it(logged: logging.Logger, tmp_path: Path, cap
         "Fatal Python error: Segmentation fault\n\nCurrent thread 0x00007f (most recent call first):\n"
         f'  File "/opt/tester-home/study_app/gui/bridge.py", line 12 in start\n{ID} {DENSITY}\n'
     )
-    machine.save(MachineSettings(results=str(results), operator=INITIALS, firmware="/x/tester-home/falcon.bin"))
+    firmware, recent = "/x/tester-home/falcon.bin", ("/x/tester-home/own.toml",)
+    machine.save(MachineSettings(workspace=str(results.parent), operator=INITIALS, firmware=firmware, recent=recent))
     plant(caplog)
     write_support(tmp_path / "help.zip", "1  FOUND  no reply\n")
     found = members(tmp_path / "help.zip")
@@ -87,7 +92,8 @@ def test_nothing_of_a_study_is_in_it(logged: logging.Logger, tmp_path: Path, cap
     assert found["diagnosis.txt"] == "1  FOUND  no reply\n"
     assert "gui/bridge.py" in found["crash-1.txt"]
     settings = json.loads(found["settings.json"])
-    assert (settings["operator"], settings["results"], settings["device"]) == (True, True, "mouse")
+    private = [settings[name] for name in ("operator", "workspace", "firmware", "recent")]
+    assert (private, settings["device"]) == ([True] * 4, "mouse")
     assert json.loads(found["versions.json"]).keys() >= {"liquid-study", "python", "system", "numba", "pyusb"}
 
 
