@@ -160,7 +160,7 @@ class _Showing:
 
     def hold(self) -> tuple[Shown, ...]:
         """Hold the session and return what was shown in it."""
-        machine = open_machine(self._chosen, self._protocol)
+        machine = open_machine(self._chosen.device, self._protocol, random=self._chosen.tremor())
         schedule = build_schedule(self._protocol, self._chosen.participant, self._chosen.seed)
         try:
             with open_store(self._chosen, self._protocol, self._source, machine, {}) as store:

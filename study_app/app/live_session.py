@@ -155,7 +155,14 @@ class LiveSession(QObject):
         try:
             load_windows()
             study = self.chosen.read_protocol()
-            machine = open_machine(self.chosen, study, tell=self._said.emit, cancelled=lambda: self._closed)
+            machine = open_machine(
+                self.chosen.device,
+                study,
+                random=self.chosen.tremor(),
+                firmware=self.chosen.firmware,
+                tell=self._said.emit,
+                cancelled=lambda: self._closed,
+            )
             made: object = Ready(machine, measured(machine, self.chosen, sleep=self._ending.wait))
         except Exception as error:  # noqa: BLE001 - handed over, not swallowed: a thread has nobody to raise it to
             made = error
@@ -215,7 +222,7 @@ class LiveSession(QObject):
         protocol = parse(source, chosen.source)
         schedule = build_schedule(protocol, chosen.participant, chosen.seed)
         shown_on, operated_on = self._screens()
-        found = checks(made.facts_with(shown_on), protocol)
+        found = checks(made.facts_with(shown_on.refreshRate(), shown_on.devicePixelRatio()), protocol)
         self._pass_checks(found)
         screens = described(self.settings, shown_on, operated_on)
         self._store = open_store(chosen, protocol, source, machine, screens)

@@ -145,7 +145,11 @@ class Preflight(QObject):
     @property
     def _facts(self) -> Facts:
         found = self._appraisal
-        return replace(self._ready.facts_with(self._screen), tick_s=found.tick_s, withheld=found.withheld)
+        return replace(
+            self._ready.facts_with(self._screen.refreshRate(), self._screen.devicePixelRatio()),
+            tick_s=found.tick_s,
+            withheld=found.withheld,
+        )
 
     def _show(self) -> None:
         facts = self._facts

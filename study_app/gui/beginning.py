@@ -7,8 +7,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from PySide6.QtGui import QScreen
-
 from study_app.devices import is_falcon, is_simulated, kind_of
 from study_app.errors import DeviceError, SessionError
 from study_app.gui.choices import NewSession
@@ -32,9 +30,9 @@ class Ready:
     machine: Machine
     facts: Facts
 
-    def facts_with(self, screen: QScreen) -> Facts:
-        """Return the facts with the participant's screen."""
-        return replace(self.facts, screen=Screen(refresh_hz=screen.refreshRate(), scaling=screen.devicePixelRatio()))
+    def facts_with(self, refresh_hz: float, scaling: float) -> Facts:
+        """Return the facts with those of the participant's screen: its refresh rate and the scaling of its pixels."""
+        return replace(self.facts, screen=Screen(refresh_hz=refresh_hz, scaling=scaling))
 
 
 def check(chosen: NewSession, study: Protocol) -> None:

@@ -7,11 +7,13 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from random import Random
 
 from study_app.devices import is_simulated, kind_of
 from study_app.errors import StoreError
 from study_app.protocol.load import parse, source_bytes
 from study_app.protocol.model import Protocol
+from study_app.protocol.schedule import stream
 from study_app.session.resume import find_protocol, source_to_resume
 from study_app.store.layout import locate, refuse_never_begun, study_folder
 from study_app.store.progress import progress
@@ -50,6 +52,10 @@ class NewSession:
     def read_protocol(self) -> Protocol:
         """Return the protocol of `read_source`."""
         return parse(self.read_source(), self.source)
+
+    def tremor(self) -> Random:
+        """Return the random numbers of a hand that moves by itself."""
+        return stream(self.seed, f"run/{self.participant}/tremor")
 
     @property
     def who(self) -> str:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
+from random import Random
 from typing import TYPE_CHECKING, Any
 
 from study_app.devices import is_falcon, moves_by_itself, open_device
-from study_app.gui.choices import NewSession
 from study_app.protocol.model import Protocol
-from study_app.protocol.schedule import stream
 
 if TYPE_CHECKING:
     from study_app.devices.base import Device
@@ -55,14 +55,17 @@ class Machine:
 
 
 def open_machine(
-    chosen: NewSession,
+    name: str,
     study: Protocol,
     *,
+    random: Random,
+    firmware: Path | None = None,
     tell: Callable[[str], object] | None = None,
     cancelled: Callable[[], bool] | None = None,
 ) -> Machine:
     """Open the device and start the servo at rest; compiling takes a minute the first time.
 
+    ``random`` draws the tremor of a device that moves by itself; ``firmware`` is the file of a Falcon's program.
     ``tell`` is given what a device asks for while it is opened, a line at a time; it gives up when ``cancelled``.
     """
     from study_app.haptics.pack import elements_needed  # noqa: PLC0415 - the compiler: only once it is needed
@@ -70,11 +73,11 @@ def open_machine(
 
     x, y, z = study.device.workspace_m
     options: dict[str, Any] = {"workspace_m": (x / 2, y / 2, z / 2), "force_limit_n": study.device.force_limit_n}
-    if moves_by_itself(chosen.device):
-        options["random"] = stream(chosen.seed, f"run/{chosen.participant}/tremor")
-    if is_falcon(chosen.device):
-        options |= {"firmware": chosen.firmware, "tell": tell, "cancelled": cancelled}
-    device = open_device(chosen.device, **options)
+    if moves_by_itself(name):
+        options["random"] = random
+    if is_falcon(name):
+        options |= {"firmware": firmware, "tell": tell, "cancelled": cancelled}
+    device = open_device(name, **options)
     try:
         elements = max(elements_needed(study.scene_for(condition)) for condition in study.conditions)
         servo = Servo(device, rate_hz=study.device.rate_hz, elements=elements)

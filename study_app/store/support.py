@@ -23,9 +23,7 @@ from study_app.workspace import workspace
 NAME: Final = "liquid-study-support.zip"
 CRASHES: Final = 3
 _DRIVERS: Final = ("pyusb", "libusb-package", "hidapi")
-_PRIVATE: Final = frozenset(
-    {"operator", "firmware", "workspace", "recent"}
-)  # initials; paths may name a person
+_PRIVATE: Final = frozenset({"operator", "firmware", "workspace", "recent"})  # initials; paths may name a person
 _PLACE: Final = re.compile(r'^ *(File "[^"]*", line \d+ in \S+|<no Python frame>)$')
 _HEADING: Final = re.compile(
     r"^(Fatal Python error: [\w \-]+|(Current thread|Thread) 0x[0-9a-f]+ \(most recent call first\):)$"
