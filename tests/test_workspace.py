@@ -73,7 +73,8 @@ def test_windows_show_the_same_sessions_and_suggest_the_same_id_from_two_start_f
         qtbot.addWidget(visit.window)
         home = visit.window.place("home")
         home.show_sessions()
-        shown.append([line.facts.participant for line in home.sessions.lines])
+        qtbot.waitUntil(lambda home=home: not home.reading)
+        shown.append([facts.participant for facts in home.sessions.shown])
         home.ask_for_session(study_facts("demo"))
         ids.append((home.dialog.participant.text(), home.dialog.results.text()))
         assert home.dialog.where.text() == "in the workspace"

@@ -85,7 +85,7 @@ class Room:
 
     # the recorder: keeps the frames of each trial
 
-    lost = ()
+    lost, dropped = (), 0
 
     def start(self, trial, _attempt, _rate_hz):
         self.frames.append((trial, []))

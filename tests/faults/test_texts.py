@@ -13,6 +13,7 @@ from study_app.session.events import EndAsked, Note, RepeatAsked
 from study_app.session.state import Phase
 from study_app.store import journal
 from study_app.store.exclusions import exclude, exclusions
+from study_app.store.formulas import unguarded
 from study_app.store.verify import verify
 from tests.faults.worlds import StoredWorld
 
@@ -43,14 +44,15 @@ def test_a_free_text_survives_journal_tables_and_readers(tmp_path: Path, text: s
     path = world.store.folder.table("small", "trials")
     with path.open(newline="", encoding="utf-8") as file:
         first, _ = list(csv.DictReader(file))
-    assert first["notes"] == f"{text}\nrepeated: again: {text}"
+    assert unguarded(first["notes"]) == f"{text}\nrepeated: again: {text}"
+    assert (first["notes"][0] == "'") == (text[0] in "=+-@")
     assert pd.read_csv(path, keep_default_na=False)["notes"][0] == first["notes"]
     excluded = exclude(tmp_path / "study", "P001", 1, by="AK", reason=text)
     assert exclusions(tmp_path / "study") == (excluded,)
     assert excluded.reason == text.strip()
     assert verify(tmp_path / "study").errors == ()
     study = load_study(tmp_path / "study")
-    assert study.trials["notes"][0] == first["notes"]
+    assert study.trials["notes"][0] == unguarded(first["notes"])
     assert study.exclusions == (excluded,)
     for table in (study.trials, study.participants):
         assert set(table["exclusion_reason"]) == {text.strip()}

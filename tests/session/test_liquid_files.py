@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import base64
 import hashlib
+import json
 from dataclasses import replace
 from itertools import count
 from pathlib import Path
@@ -90,10 +92,17 @@ def test_a_file_without_liquid_files_is_its_own_source(name: str) -> None:
     assert protocol_hash(source) == hashlib.sha256(source).hexdigest()
 
 
-def test_the_key_of_an_earlier_study_is_drawn_and_sealed_to_the_byte(tmp_path: Path) -> None:
+def test_the_key_of_an_earlier_study_is_drawn_again_but_for_smoothing_times_that_were_left_out(tmp_path: Path) -> None:
     protocol = load(EARLIER / "rek2024.toml")
     open_or_draw_key(tmp_path, protocol, stream(1, "blinding").random)
-    assert StudyFolder(tmp_path).key.read_bytes() == StudyFolder(EARLIER / "results").key.read_bytes()
+    drawn, earlier = (
+        json.loads(base64.b64decode(StudyFolder(folder).key.read_bytes())) for folder in (tmp_path, EARLIER / "results")
+    )
+    for key in (drawn, earlier):
+        for liquid in key["tables"]["liquids"].values():
+            liquid["added_mass"].pop("filter_s")
+            liquid["history"].pop("smoothing_s")
+    assert drawn == earlier
 
 
 @pytest.mark.parametrize(

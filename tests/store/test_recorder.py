@@ -307,9 +307,13 @@ def test_a_thread_that_ends_loses_its_trial_at_once_and_the_next_trial_starts_an
 
     with monkeypatch.context() as patched:
         patched.setattr(recorder, "_record", ends)
+        patched.setattr(threading, "excepthook", lambda _arguments: None)
         recorder.start(1, 1, 1000.0)
         with recorder._changed:
             assert recorder._changed.wait_for(lambda: recorder._lost, 10.0)
+        for thread in threading.enumerate():
+            if thread.name == "recorder":
+                thread.join(10.0)
         assert recorder.lost == (Lost(1, 1, "its thread ended: Ended: pulled"),)
         recorder.append(samples_of(10))
         recorder.stop()

@@ -29,11 +29,12 @@ def logged() -> Iterator[logging.Logger]:
     """The program's logger, written to the file of this test's user folder, and as it was afterwards."""
     logger = logging.getLogger("study_app")
     before, level = list(logger.handlers), logger.level
+    logger.handlers.clear()  # a command that another test ran keeps its log there
     keep_log()
     yield logger
-    for handler in set(logger.handlers) - set(before):
-        logger.removeHandler(handler)
+    for handler in logger.handlers:
         handler.close()
+    logger.handlers[:] = before
     logger.setLevel(level)
 
 

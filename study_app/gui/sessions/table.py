@@ -117,7 +117,6 @@ class SessionsTable(QWidget):
         column.setSpacing(0)
         column.addWidget(self.none)
         column.addWidget(self.table, 1)
-        self.setFocusProxy(self.table)
         self.table.opened.connect(lambda index: self.opened.emit(self.model.shown[index.row()]))
         self.table.selectionModel().selectionChanged.connect(lambda *_changes: self.chosen_changed.emit())
         self.model.modelReset.connect(self._tell_rows)

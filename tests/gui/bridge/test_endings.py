@@ -68,7 +68,7 @@ def test_an_end_that_cannot_be_written_still_lets_the_windows_go(bridge, world, 
 
 def test_windows_answer_while_recordings_are_written_and_close_after_it(make, world, qtbot):
     class Slow:
-        lost, on_disk = (), False
+        lost, dropped, on_disk = (), 0, False
 
         def start(self, *_arguments):
             pass
