@@ -19,7 +19,7 @@ from study_app.analysis.questions import Block
 from study_app.analysis.reaches import Reach, Targets, reaches, targets_of
 from study_app.analysis.tables import Study
 from study_app.errors import StoreError
-from study_app.haptics.layout import LIMITER_NAMES
+from study_app.haptics.model.layout import LIMITER_NAMES
 from study_app.store.layout import StudyFolder
 from study_app.store.recording import read_samples
 

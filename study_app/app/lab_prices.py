@@ -8,7 +8,7 @@ from typing import Protocol
 
 from study_app.evaluation.appraised import Costs, Errors
 from study_app.evaluation.appraiser import Told
-from study_app.haptics.scene import Scene
+from study_app.haptics.model.scene import Scene
 
 log = logging.getLogger(__name__)
 

@@ -20,8 +20,8 @@ from study_app.gui.preflight.view import preflight_view, resumed_rows
 from study_app.gui.preflight.window import PreflightWindow
 from study_app.gui.screens import place
 from study_app.gui.theme import Theme
-from study_app.haptics.dynamics import Dynamics
-from study_app.haptics.scene import Scene
+from study_app.haptics.model.device_dynamics import Dynamics
+from study_app.haptics.model.scene import Scene
 from study_app.protocol.model import Protocol
 from study_app.protocol.schedule import build_schedule
 from study_app.protocol.tasks import Stroke, fastest_stroke

@@ -19,8 +19,8 @@ from study_app.gui.operator import OperatorWindow
 from study_app.gui.operator.health import ServoHealth
 from study_app.gui.participant import ParticipantWindow
 from study_app.gui.screens import choose_screens, place
-from study_app.haptics.clock import VirtualClock
-from study_app.haptics.servo import Servo
+from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.load import load, load_scene
 from study_app.protocol.tasks import Explore
 from study_app.protocol.words import words

@@ -10,8 +10,8 @@ import click
 from study_app.cli.words import Target
 
 if TYPE_CHECKING:
-    from study_app.haptics.motion import Motion
-    from study_app.haptics.scene import Scene
+    from study_app.haptics.model.motion import Motion
+    from study_app.haptics.model.scene import Scene
 
 DEFAULT_PATH = "stir"
 
@@ -82,7 +82,7 @@ def _subjects(scene: str | None, liquid: str | None) -> tuple[Scene | None, Scen
 def _motion(path: str, scene: Scene) -> Motion:
     from study_app.evaluation.accuracy.motions import stir
     from study_app.evaluation.identify.measured import at_rate
-    from study_app.haptics import motion, paths
+    from study_app.haptics.model import motion, paths
 
     if path == DEFAULT_PATH:
         return stir(scene.scale, scene.rate_hz)

@@ -35,7 +35,7 @@ def identify(
     from study_app.evaluation.identify import measured as measurements
     from study_app.evaluation.identify import preset as identified
     from study_app.evaluation.identify.fit import fit
-    from study_app.haptics.override import override_all
+    from study_app.haptics.model.overrides import override_all
     from study_app.protocol.load import load_scene
 
     chosen = override_all(load_scene(scene, liquid), dict(assignment(change) for change in changes))

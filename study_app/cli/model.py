@@ -20,8 +20,9 @@ def simulate(scene: str, liquid: str, path: str, to: Path, changes: tuple[str, .
 
     Every row of the motion is one tick: give rows at the scene's rate (1 kHz unless its rate_hz says otherwise).
     """
-    from study_app.haptics import motion, offline, paths
-    from study_app.haptics.override import override_all
+    from study_app.haptics.model import motion, paths
+    from study_app.haptics.model.overrides import override_all
+    from study_app.haptics.runtime import offline
     from study_app.protocol.load import load_scene
 
     chosen = override_all(load_scene(scene, liquid), dict(assignment(change) for change in changes))

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from study_app.haptics.cfunctions import fence, record_at
-from study_app.haptics.compiled import kernel
+from study_app.haptics.kernels.c_functions import fence, record_at
+from study_app.haptics.kernels.compiled import kernel
 
 STAY, POINT, HOLD, REACH, FOLLOW = range(5)
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from study_app.devices.hand import FOLLOW, HOLD, MOTION_ROW, ORDER, REACH, STAY, WAVES, post
 from study_app.errors import DeviceError
-from study_app.haptics.layout import records
+from study_app.haptics.model.layout import records
 
 TREMOR_HZ = (8.0, 12.0)
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from study_app.devices.hand import POINT
 from study_app.devices.simulated import SimulatedDevice
-from study_app.haptics.plant import new_handle
+from study_app.haptics.kernels.plant import new_handle
 
 MASS_KG = 0.2
 STIFFNESS_NPM = 400.0  # 8 N hold the handle back by 20 mm, a fifth of the workspace

@@ -6,7 +6,7 @@ from random import Random
 from typing import Any
 
 from study_app.devices.simulated import SimulatedDevice
-from study_app.haptics.plant import new_handle
+from study_app.haptics.kernels.plant import new_handle
 
 MASS_KG = 0.2
 VISCOUS_NSPM = 0.5

@@ -1,4 +1,4 @@
-"""A device made of ``haptics.plant`` and a hand: all that the mouse and the scripted device share.
+"""A device made of ``haptics.kernels.plant`` and a hand: all that the mouse and the scripted device share.
 
 Its read steps hand and handle to the time given, inside the servo's loop; its write holds the force for the next step.
 """
@@ -14,10 +14,18 @@ import numpy as np
 from study_app.devices.base import Device
 from study_app.devices.hand import HAND, move_hand
 from study_app.devices.hand_orders import HandOrders
-from study_app.haptics.cfunctions import READ, READ_LOST, READ_NEW, READ_NOTHING_NEW, WRITE, c_function, record_at
-from study_app.haptics.dynamics import Dynamics
-from study_app.haptics.layout import COMMAND, READING, records
-from study_app.haptics.plant import HANDLE, let_go, measure, move, push
+from study_app.haptics.kernels.c_functions import (
+    READ,
+    READ_LOST,
+    READ_NEW,
+    READ_NOTHING_NEW,
+    WRITE,
+    c_function,
+    record_at,
+)
+from study_app.haptics.kernels.plant import HANDLE, let_go, measure, move, push
+from study_app.haptics.model.device_dynamics import Dynamics
+from study_app.haptics.model.layout import COMMAND, READING, records
 
 SIMULATED = np.dtype(
     [

@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-from study_app.haptics.layout import BUTTON_STOP
+from study_app.haptics.model.layout import BUTTON_STOP
 
 DISPLACEMENT, ROTATION, BUTTONS, LED = 1, 2, 3, 4
 FULL_DEFLECTION: Final = 350

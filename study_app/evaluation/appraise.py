@@ -9,11 +9,11 @@ import numpy as np
 from study_app.evaluation import references
 from study_app.evaluation.appraised import Costs, EffectCost, Errors
 from study_app.evaluation.cost import measure
-from study_app.haptics.gate import ORDER, calls_for, resolve
-from study_app.haptics.motion import Motion
-from study_app.haptics.offline import simulate
-from study_app.haptics.paths import path
-from study_app.haptics.scene import Effect, Everywhere, Knee, Scene
+from study_app.haptics.model.gate import ORDER, calls_for, resolve
+from study_app.haptics.model.motion import Motion
+from study_app.haptics.model.paths import path
+from study_app.haptics.model.scene import Effect, Everywhere, Knee, Scene
+from study_app.haptics.runtime.offline import simulate
 
 BATCHES: Final = 60
 RAMP_MPS2: Final = 2.0

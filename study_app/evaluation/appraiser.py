@@ -24,8 +24,8 @@ from typing import Any, Final, TextIO, TypeAlias
 from study_app.errors import StudyError
 from study_app.evaluation.appraised import Costs, EffectCost, Errors
 from study_app.evaluation.fastest import withheld_share
-from study_app.haptics.dynamics import UNKNOWN, Dynamics
-from study_app.haptics.scene import Scene
+from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
+from study_app.haptics.model.scene import Scene
 from study_app.protocol.tasks import Stroke
 
 NICEST: Final = 19

@@ -9,15 +9,15 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from study_app.haptics.bounds import bounds
-from study_app.haptics.compiled import kernel
-from study_app.haptics.gate import describe_gate, resolve
-from study_app.haptics.layout import SAMPLE, Record, records
-from study_app.haptics.motion import Floats
-from study_app.haptics.pack import pack
-from study_app.haptics.safety import new_safety
-from study_app.haptics.scene import Effect, Liquid, Scene
-from study_app.haptics.tick import tick
+from study_app.haptics.kernels.compiled import kernel
+from study_app.haptics.kernels.safety import new_safety
+from study_app.haptics.kernels.tick import tick
+from study_app.haptics.model.bounds import bounds
+from study_app.haptics.model.gate import describe_gate, resolve
+from study_app.haptics.model.layout import SAMPLE, Record, records
+from study_app.haptics.model.motion import Floats
+from study_app.haptics.model.scene import Effect, Liquid, Scene
+from study_app.haptics.runtime.pack import pack
 
 BATCH: Final = 1_000
 BATCHES: Final = 200

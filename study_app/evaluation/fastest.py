@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 if TYPE_CHECKING:
-    from study_app.haptics.dynamics import Dynamics
-    from study_app.haptics.scene import Scene
+    from study_app.haptics.model.device_dynamics import Dynamics
+    from study_app.haptics.model.scene import Scene
     from study_app.protocol.tasks import Stroke
 
 LASTS_S: Final = 2.0
@@ -21,8 +21,8 @@ def withheld_share(scene: Scene, stroke: Stroke, dynamics: Dynamics) -> float:
     The stroke is centred on the device's origin, and the loop is that of a device of these ``dynamics``.
     F_a is the force after slope limit and norm clamp, F_b what passivity controller and slew limit leave of it.
     """
-    from study_app.haptics.motion import Motion  # noqa: PLC0415 - the compiler: only where it is computed
-    from study_app.haptics.offline import samples_along  # noqa: PLC0415
+    from study_app.haptics.model.motion import Motion  # noqa: PLC0415 - the compiler: only where it is computed
+    from study_app.haptics.runtime.offline import samples_along  # noqa: PLC0415
 
     t_s = np.arange(round(LASTS_S * scene.rate_hz)) / scene.rate_hz
     along_m = scene.scale * stroke.amplitude_m * np.cos(2.0 * math.pi * stroke.frequency_hz * t_s)

@@ -1,7 +1,7 @@
 """The force model by the letter of its definition: slow, plain, and what the product must equal.
 
 Every element of the wake is kept in a list and decays by itself; segments are summed anew each tick. Written from the
-definition, not from ``haptics.effects``, which it shares no code with. `exact_wakes` says the same without the rounding
+definition, not from ``haptics.kernels.effects``, which it shares no code with. `exact_wakes` says the same without the rounding
 of long sums.
 """
 
@@ -12,9 +12,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from study_app.haptics.compiled import workings
-from study_app.haptics.motion import Floats, Motion
-from study_app.haptics.scene import Ewma, Knee, Scene
+from study_app.haptics.kernels.compiled import workings
+from study_app.haptics.model.motion import Floats, Motion
+from study_app.haptics.model.scene import Ewma, Knee, Scene
 
 
 class Response(NamedTuple):

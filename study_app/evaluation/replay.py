@@ -20,13 +20,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study_app.errors import StoreError
-from study_app.haptics.compiled import kernel
-from study_app.haptics.dynamics import Dynamics, dynamics_from
-from study_app.haptics.layout import LIMITER_FADE, SAMPLE, records
-from study_app.haptics.mirror import take_sample, was_lost_at_read
-from study_app.haptics.pack import pack
-from study_app.haptics.safety import SCENE_FADE_S, START_FADE_S, begin_scene, new_safety
-from study_app.haptics.scene import Scene
+from study_app.haptics.kernels.compiled import kernel
+from study_app.haptics.kernels.safety import SCENE_FADE_S, START_FADE_S, begin_scene, new_safety
+from study_app.haptics.model.device_dynamics import Dynamics, dynamics_from
+from study_app.haptics.model.layout import LIMITER_FADE, SAMPLE, records
+from study_app.haptics.model.scene import Scene
+from study_app.haptics.runtime.pack import pack
+from study_app.haptics.runtime.recompute import take_sample, was_lost_at_read
 from study_app.protocol.model import Protocol
 from study_app.store import blinding, journal, receipt, recording
 from study_app.store.atomic import is_there

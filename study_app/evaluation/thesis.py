@@ -13,10 +13,10 @@ from typing import Any, Final
 
 import numpy as np
 
-from study_app.haptics import paths
-from study_app.haptics.motion import Motion
-from study_app.haptics.offline import Table, simulate
-from study_app.haptics.scene import Given, Liquid, Scene, Wake
+from study_app.haptics.model import paths
+from study_app.haptics.model.motion import Motion
+from study_app.haptics.model.scene import Given, Liquid, Scene, Wake
+from study_app.haptics.runtime.offline import Table, simulate
 
 RATE_HZ: Final = 1000.0
 LENGTH: Final = 5000

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from PySide6.QtCore import Qt, QTimer, SignalInstance
 from PySide6.QtGui import QGuiApplication, QSessionManager
 
-from study_app.haptics.suspension import allow_suspension, refuse_suspension
+from study_app.haptics.runtime.suspension import allow_suspension, refuse_suspension
 
 HEARTBEAT_MS = 100  # how long a signal may wait to be heard
 HANG_UP = 1  # the number of SIGHUP, which a log-off counts as everywhere

@@ -13,7 +13,7 @@ from study_app.protocol.model import Protocol
 
 if TYPE_CHECKING:
     from study_app.devices.base import Device
-    from study_app.haptics.servo import Servo
+    from study_app.haptics.runtime.servo import Servo
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,8 +68,8 @@ def open_machine(
     ``random`` draws the tremor of a device that moves by itself; ``firmware`` is the file of a Falcon's program.
     ``tell`` is given what a device asks for while it is opened, a line at a time; it gives up when ``cancelled``.
     """
-    from study_app.haptics.pack import elements_needed  # noqa: PLC0415 - the compiler: only once it is needed
-    from study_app.haptics.servo import Servo  # noqa: PLC0415
+    from study_app.haptics.runtime.pack import elements_needed  # noqa: PLC0415 - the compiler: only once it is needed
+    from study_app.haptics.runtime.servo import Servo  # noqa: PLC0415
 
     x, y, z = study.device.workspace_m
     options: dict[str, Any] = {"workspace_m": (x / 2, y / 2, z / 2), "force_limit_n": study.device.force_limit_n}

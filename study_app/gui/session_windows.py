@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from study_app.gui.choices import NewSession
     from study_app.gui.machine import Machine
     from study_app.gui.theme import Theme
-    from study_app.haptics.servo import Servo
+    from study_app.haptics.runtime.servo import Servo
     from study_app.store.open_session import SessionStore
 
 

@@ -12,7 +12,7 @@ import sys
 import threading
 from typing import Final
 
-from study_app.haptics.clock_rtkit import make_high_priority
+from study_app.haptics.runtime.clocks.rtkit import make_high_priority
 
 NICE: Final = -10
 ABOVE_NORMAL, NORMAL = 1, 0  # of Windows' threads

@@ -1,4 +1,4 @@
 """The force model: what a body feels in a liquid, and the servo that renders it.
 
-Imports nothing, so that reading a scene (``haptics.scene``) never loads the compiler.
+Imports nothing, so that reading a scene (``haptics.model.scene``) never loads the compiler.
 """

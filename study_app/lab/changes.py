@@ -1,6 +1,6 @@
 """One parameter of a scene set by its name: a new scene, or one line that says why not.
 
-Beyond ``haptics.override`` it knows components of vectors, effects one by one, and what a table begins with that is
+Beyond ``haptics.model.overrides`` it knows components of vectors, effects one by one, and what a table begins with that is
 called for and does not stand in the liquid yet.
 """
 
@@ -10,9 +10,9 @@ import math
 from typing import Any, Final
 
 from study_app.errors import StudyError
-from study_app.haptics.gate import ORDER, resolve
-from study_app.haptics.override import override_all
-from study_app.haptics.scene import Scene
+from study_app.haptics.model.gate import ORDER, resolve
+from study_app.haptics.model.overrides import override_all
+from study_app.haptics.model.scene import Scene
 from study_app.lab.parameters import (
     AUTO,
     AXES,

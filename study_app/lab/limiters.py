@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from study_app.haptics.layout import (
+from study_app.haptics.model.layout import (
     LIMITER_ENERGY,
     LIMITER_ESTIMATOR,
     LIMITER_FADE,

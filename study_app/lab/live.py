@@ -16,10 +16,10 @@ import numpy as np
 
 from study_app.devices import is_falcon, moves_by_itself, open_device
 from study_app.devices.hand_orders import hand_of
-from study_app.haptics.layout import SAMPLE, records
-from study_app.haptics.limits import slew_limit_n
-from study_app.haptics.scene import Scene
-from study_app.haptics.servo import Servo
+from study_app.haptics.model.layout import SAMPLE, records
+from study_app.haptics.model.limits import slew_limit_n
+from study_app.haptics.model.scene import Scene
+from study_app.haptics.runtime.servo import Servo
 from study_app.lab.limiters import Limiter, LimiterCounts
 from study_app.lab.programmes import led_to, programme
 from study_app.lab.shadow import Shadow, Trace
@@ -29,7 +29,7 @@ from study_app.protocol.streams import stream
 
 if TYPE_CHECKING:
     from study_app.devices.base import Device
-    from study_app.haptics.motion import Motion
+    from study_app.haptics.model.motion import Motion
 
 Vector = tuple[float, float, float]
 

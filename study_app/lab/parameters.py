@@ -2,7 +2,7 @@
 
 Ranges are those of the scene's own models; where those have no bound, or one far from anything that is felt, the rows
 below state the range that the lab offers [choice]. A value of a preset beyond it widens it. Names are ``table.field``,
-as ``haptics.override`` takes them; ``.x``, ``.y``, ``.z`` behind one mean a component, ``effects.NAME`` one effect.
+as ``haptics.model.overrides`` takes them; ``.x``, ``.y``, ``.z`` behind one mean a component, ``effects.NAME`` one effect.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from typing import Any, Final, TypeAlias
 from pydantic import BaseModel
 
 from study_app.errors import StudyError
-from study_app.haptics.gate import ORDER, resolve
-from study_app.haptics.liquid import AddedMass, History, Liquid
-from study_app.haptics.scene import Given, Scene
+from study_app.haptics.model.gate import ORDER, resolve
+from study_app.haptics.model.liquid import AddedMass, History, Liquid
+from study_app.haptics.model.scene import Given, Scene
 from study_app.protocol.model import MAX_FORCE_N
 
 Value: TypeAlias = "float | str | None"

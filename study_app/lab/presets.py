@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from study_app.errors import ProtocolError
-from study_app.haptics.scene import Scene
+from study_app.haptics.model.scene import Scene
 from study_app.lab.workbench import Setting
 from study_app.protocol.load import load_scene, load_scenes, shipped
 from study_app.protocol.scene_text import for_new_file, scene_text

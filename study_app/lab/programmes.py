@@ -1,4 +1,4 @@
-"""Programmed paths for a hand: those of the figures (``haptics.paths``), as large as the workspace lets them be."""
+"""Programmed paths for a hand: those of the figures (``haptics.model.paths``), as large as the workspace lets them be."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from typing import Any, Final
 import numpy as np
 
 from study_app.errors import StudyError
-from study_app.haptics.motion import Motion
-from study_app.haptics.paths import RADIUS_M, path
-from study_app.haptics.scene import Scene
+from study_app.haptics.model.motion import Motion
+from study_app.haptics.model.paths import RADIUS_M, path
+from study_app.haptics.model.scene import Scene
 
 Vector = tuple[float, float, float]
 

@@ -1,6 +1,6 @@
 """What was felt, computed again beside the servo, and what the other setting would have been on the same motion.
 
-Telemetry comes in batches; the servo's own tick (``haptics.mirror``) answers for A and for B, each with a state of its
+Telemetry comes in batches; the servo's own tick (``haptics.runtime.recompute``) answers for A and for B, each with a state of its
 own. The felt side shares what survives a change of scene with the servo's safety layer, so that its forces are the
 servo's to the last bit; the other side goes on with a copy of it. The velocity filters of both know the force that was
 sent: it moved the hand. Nothing here can hold the servo up.
@@ -14,14 +14,14 @@ from typing import Any, Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from study_app.haptics.dynamics import UNKNOWN, Dynamics
-from study_app.haptics.effects.fill import scaled_length
-from study_app.haptics.gate import resolve
-from study_app.haptics.layout import SAMPLE, records
-from study_app.haptics.mirror import new_trail, take_again
-from study_app.haptics.pack import adjust_into, pack, pack_into
-from study_app.haptics.safety import begin_scene, new_safety
-from study_app.haptics.scene import Scene
+from study_app.haptics.kernels.safety import begin_scene, new_safety
+from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
+from study_app.haptics.model.gate import resolve
+from study_app.haptics.model.layout import SAMPLE, records
+from study_app.haptics.model.scene import Scene
+from study_app.haptics.runtime.pack import adjust_into, pack, pack_into
+from study_app.haptics.runtime.recompute import new_trail, take_again
+from study_app.haptics.runtime.scene_records import scaled_length
 from study_app.lab.tail import Tail, tail_of
 from study_app.lab.workbench import Side, other
 

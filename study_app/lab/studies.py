@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from study_app.errors import ProtocolError, StoreError
-from study_app.haptics.liquid import MAX_ID
-from study_app.haptics.scene import Scene
+from study_app.haptics.model.liquid import MAX_ID
+from study_app.haptics.model.scene import Scene
 from study_app.lab.presets import preset_text, save
 from study_app.lab.workbench import Setting
 from study_app.protocol.load import load

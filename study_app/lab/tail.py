@@ -31,7 +31,7 @@ class Tail:
 
 
 def tail_of(trail: Any, places: Any, elements: int) -> Tail:
-    """Return the tail of a trail (``haptics.mirror``) of at most ``elements`` elements."""
+    """Return the tail of a trail (``haptics.runtime.recompute``) of at most ``elements`` elements."""
     left, held = int(trail.left), int(trail.held)
     numbers = np.arange(left - held, left)
     found = places[numbers % len(places)]

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Final, Literal, Protocol, TypeAlias
 
 from study_app.errors import StudyError
-from study_app.haptics.scene import Scene
+from study_app.haptics.model.scene import Scene
 from study_app.lab.changes import changed
 from study_app.lab.parameters import Value, sections, the_liquid, value_of
 

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from study_app.haptics.ranges import within
+from study_app.haptics.model.ranges import within
 from study_app.protocol.document import Path, entries
 from study_app.protocol.problems import Fault, did_you_mean
 from study_app.protocol.table import Table

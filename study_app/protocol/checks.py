@@ -11,7 +11,7 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict
 
-from study_app.haptics.scene import MAX_LIQUIDS, Scene
+from study_app.haptics.model.scene import MAX_LIQUIDS, Scene
 from study_app.protocol.analysis import decisions
 from study_app.protocol.document import Path, names
 from study_app.protocol.felt import LEAST_N, force_n, numbers, within_tank

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-from study_app.haptics.gate import describe_gate, resolve
-from study_app.haptics.scene import Scene
+from study_app.haptics.model.gate import describe_gate, resolve
+from study_app.haptics.model.scene import Scene
 from study_app.protocol import feeling
 from study_app.protocol.model import Block, Explore, Protocol, Questionnaire
 from study_app.protocol.schedule import block_codes

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import combinations
 
-from study_app.haptics.gate import describe_gate
-from study_app.haptics.steady import HAND_MPS, Steady, steady
+from study_app.haptics.model.gate import describe_gate
+from study_app.haptics.model.steady_state import HAND_MPS, Steady, steady
 from study_app.protocol.model import Protocol
 
 TELLING = 0.39

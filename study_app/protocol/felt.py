@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 from typing import Any, Final
 
-from study_app.haptics.bounds import bounds, fastest_mps, lowered_mps, resistance_n
-from study_app.haptics.gate import resolve
-from study_app.haptics.scene import Box, Everywhere, Liquid, MotionBox, Scene
+from study_app.haptics.model.bounds import bounds, fastest_mps, lowered_mps, resistance_n
+from study_app.haptics.model.gate import resolve
+from study_app.haptics.model.scene import Box, Everywhere, Liquid, MotionBox, Scene
 from study_app.protocol.model import DeviceNeeds, SceneDefaults
 from study_app.protocol.tasks import Stroke
 

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, Field, ValidationError
 
 from study_app.errors import Problem, ProtocolError
-from study_app.haptics.scene import Liquid, RateHz, Scene
+from study_app.haptics.model.scene import Liquid, RateHz, Scene
 from study_app.protocol.checks import check
 from study_app.protocol.document import entries
 from study_app.protocol.files import at_hand, protocol_hash, shipped, source_bytes

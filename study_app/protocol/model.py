@@ -21,8 +21,8 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
-from study_app.haptics.ranges import DensityKgM3, DiameterM, DragCoefficient, Metres, within
-from study_app.haptics.scene import Accuracy, Body, Estimator, Ewma, Knee, Liquid, MotionBox, Scene, SceneScale
+from study_app.haptics.model.ranges import DensityKgM3, DiameterM, DragCoefficient, Metres, within
+from study_app.haptics.model.scene import Accuracy, Body, Estimator, Ewma, Knee, Liquid, MotionBox, Scene, SceneScale
 from study_app.protocol.analysis import Analysis
 from study_app.protocol.blocks import Block, Compared
 from study_app.protocol.questionnaires import Item, Questionnaire, Scale

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from study_app.errors import Problem
-from study_app.haptics.ranges import REASON
+from study_app.haptics.model.ranges import REASON
 from study_app.protocol.document import Path, has
 from study_app.protocol.places import Places
 

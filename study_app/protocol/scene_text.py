@@ -7,7 +7,7 @@ import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final, TypeAlias
 
-from study_app.haptics.scene import Ewma, Given, Kalman, Liquid, Scene
+from study_app.haptics.model.scene import Ewma, Given, Kalman, Liquid, Scene
 
 Place: TypeAlias = tuple[str, ...]
 

@@ -9,7 +9,7 @@ from typing import Annotated, Final, Literal, NamedTuple, Self, TypeAlias
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from study_app.haptics.ranges import within
+from study_app.haptics.model.ranges import within
 from study_app.protocol.table import Table
 from study_app.protocol.texts import Localised
 

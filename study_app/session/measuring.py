@@ -10,9 +10,9 @@ from typing import Protocol
 import numpy as np
 
 from study_app.errors import StoreError
-from study_app.haptics.clock_grants import Grant
-from study_app.haptics.dynamics import Dynamics
-from study_app.haptics.telemetry import timing
+from study_app.haptics.model.device_dynamics import Dynamics
+from study_app.haptics.runtime.clocks.grants import Grant
+from study_app.haptics.runtime.telemetry import timing
 from study_app.session.ports import ServoPort
 from study_app.session.preflight import Facts, Screen
 from study_app.store.atomic import probe

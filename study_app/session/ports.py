@@ -6,14 +6,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from study_app.haptics.scene import Scene
+from study_app.haptics.model.scene import Scene
 from study_app.session.pages import Page
 from study_app.store.blinding import Key
 from study_app.store.clock import SessionClock
 
 
 class ServoPort(Protocol):
-    """What is asked of the servo (``haptics.servo.Servo``)."""
+    """What is asked of the servo (``haptics.runtime.servo.Servo``)."""
 
     rate_hz: float
     telemetry: Any

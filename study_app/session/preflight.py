@@ -12,15 +12,15 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from study_app.haptics.clock_grants import NO_THREAD, Grant
-from study_app.haptics.dynamics import BELIEVED_TICKS, UNKNOWN, Dynamics
-from study_app.haptics.limits import refuses
+from study_app.haptics.model.device_dynamics import BELIEVED_TICKS, UNKNOWN, Dynamics
+from study_app.haptics.model.limits import refuses
+from study_app.haptics.runtime.clocks.grants import NO_THREAD, Grant
 from study_app.protocol.describe import expected_duration_s
 from study_app.protocol.model import Protocol
 from study_app.protocol.squares import enrolment
 
 if TYPE_CHECKING:
-    from study_app.haptics.telemetry import Timing  # the compiler: whoever measures has loaded it
+    from study_app.haptics.runtime.telemetry import Timing  # the compiler: whoever measures has loaded it
 
 Verdict: TypeAlias = Literal["ok", "warning", "failure"]
 

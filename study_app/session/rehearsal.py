@@ -23,9 +23,9 @@ import numpy as np
 from study_app.devices import moves_by_itself, open_device
 from study_app.devices.hand_orders import hand_of
 from study_app.errors import SessionError, StoreError
-from study_app.haptics.clock import VirtualClock
-from study_app.haptics.pack import elements_needed
-from study_app.haptics.servo import Servo
+from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.pack import elements_needed
+from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.answers import Felt, rater
 from study_app.protocol.load import parse, source_bytes
 from study_app.protocol.model import Protocol, Reach

@@ -23,7 +23,7 @@ from typing import Any, Literal
 import numpy as np
 
 from study_app.errors import SessionError, StoreError, StudyError
-from study_app.haptics.layout import BUTTON_STOP
+from study_app.haptics.model.layout import BUTTON_STOP
 from study_app.protocol.model import Protocol as Study
 from study_app.protocol.schedule import Schedule
 from study_app.session import compose

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from study_app.haptics.layout import LIMITER_GLITCH, LIMITER_NAMES, SAMPLE
-from study_app.haptics.telemetry import timing
+from study_app.haptics.model.layout import LIMITER_GLITCH, LIMITER_NAMES, SAMPLE
+from study_app.haptics.runtime.telemetry import timing
 
 _TIMES = np.dtype([(name, SAMPLE[name]) for name in ("tick", "time_ns", "lateness_ns")])
 

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from study_app.haptics.layout import LIMITER_GLITCH
-from study_app.haptics.scene import Scene
+from study_app.haptics.model.layout import LIMITER_GLITCH
+from study_app.haptics.model.scene import Scene
 from study_app.session.commands import StartTrial
 from study_app.session.ports import ServoPort
 from study_app.session.recording import Recording

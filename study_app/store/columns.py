@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal, TypeAlias
 
-from study_app.haptics.layout import LIMITER_NAMES
+from study_app.haptics.model.layout import LIMITER_NAMES
 
 Kind: TypeAlias = Literal["text", "integer", "number", "flag", "time"]
 

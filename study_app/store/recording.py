@@ -4,7 +4,7 @@ Times and positions are kept to the last bit, so that the trial can be computed 
 which then come out again, are rounded to steps far below what a device or a hand can tell, so that half an hour at
 1 kHz takes 30 to 56 MB. What was computed is proved by the CRC-32 of its exact numbers, one of every second.
 
-Positions, velocities and forces are in the frames of ``haptics.layout.SAMPLE``. Readers need no code of ours: any
+Positions, velocities and forces are in the frames of ``haptics.model.layout.SAMPLE``. Readers need no code of ours: any
 Parquet reader gives the columns, with unit and meaning in each column's metadata.
 """
 
@@ -25,8 +25,8 @@ from numpy.typing import NDArray
 from pyarrow import parquet
 
 from study_app.errors import StoreError
-from study_app.haptics.dynamics import BELIEVED_TICKS
-from study_app.haptics.layout import SAMPLE, records
+from study_app.haptics.model.device_dynamics import BELIEVED_TICKS
+from study_app.haptics.model.layout import SAMPLE, records
 from study_app.store.atomic import beside, cannot_read, sync_folder
 from study_app.store.columns import Column
 from study_app.store.journal import plain

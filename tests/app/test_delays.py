@@ -18,8 +18,8 @@ from study_app.gui.operator.view import Session
 from study_app.gui.operator.watch import WatchedJournal
 from study_app.gui.participant import ParticipantWindow
 from study_app.gui.session_parts import Parts
-from study_app.haptics.clock import VirtualClock
-from study_app.haptics.servo import Servo
+from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.load import parse
 from study_app.protocol.schedule import Trial, build_schedule, draw_key, stream
 from study_app.protocol.words import words

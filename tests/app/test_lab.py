@@ -20,7 +20,7 @@ from study_app.errors import DeviceNotFound, ServoFault
 from study_app.evaluation.appraised import Costs, EffectCost, Errors
 from study_app.evaluation.appraiser import Told
 from study_app.gui.lab.place import LabPlace
-from study_app.haptics.scene import Scene
+from study_app.haptics.model.scene import Scene
 from study_app.lab.presets import Choice, save
 from study_app.protocol.load import load, load_scene, source_bytes
 from tests.compiled import needs_servo

@@ -19,8 +19,8 @@ from study_app.evaluation.appraised import Costs, Errors
 from study_app.gui.beginning import Ready
 from study_app.gui.choices import NewSession
 from study_app.gui.theme import LIGHT
-from study_app.haptics.dynamics import UNKNOWN, Dynamics
-from study_app.haptics.telemetry import Timing
+from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
+from study_app.haptics.runtime.telemetry import Timing
 from study_app.protocol.load import load
 from study_app.protocol.tasks import Stroke
 from study_app.session.preflight import Facts, Screen

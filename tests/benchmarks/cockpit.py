@@ -24,8 +24,8 @@ from study_app.gui.operator import OperatorWindow
 from study_app.gui.operator.force_plots import ForceCard
 from study_app.gui.operator.forces import Forces
 from study_app.gui.operator.health import ServoHealth
-from study_app.haptics.layout import SAMPLE, records
-from study_app.haptics.servo import Servo
+from study_app.haptics.model.layout import SAMPLE, records
+from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.load import load
 
 LIMIT_N = 8.0

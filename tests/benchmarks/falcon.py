@@ -21,9 +21,9 @@ from study_app.devices.falcon.kinematics import angles, forward, inverse, new_me
 from study_app.devices.falcon.packets import FLAGS_AT, PARSER, STATUS, feed, pack, strip
 from study_app.devices.falcon.sending import push
 from study_app.devices.falcon.wire import ENDPOINT_IN, PACKET, ZERO
-from study_app.haptics.cfunctions import READ, WRITE, c_function, call_at, record_at
-from study_app.haptics.compiled import kernel
-from study_app.haptics.layout import new_command, new_reading, records
+from study_app.haptics.kernels.c_functions import READ, WRITE, c_function, call_at, record_at
+from study_app.haptics.kernels.compiled import kernel
+from study_app.haptics.model.layout import new_command, new_reading, records
 
 BATCH = 1_000
 BATCHES = 400

@@ -14,10 +14,10 @@ from random import Random
 import numpy as np
 
 from study_app.devices.scripted import QUANTUM_M, ScriptedDevice
-from study_app.haptics.clock import VirtualClock
-from study_app.haptics.layout import SAMPLE
-from study_app.haptics.pack import elements_needed
-from study_app.haptics.servo import Servo
+from study_app.haptics.model.layout import SAMPLE
+from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.pack import elements_needed
+from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.load import load
 from study_app.store.recorder import Recorded, Recorder
 from study_app.store.recording import read_samples

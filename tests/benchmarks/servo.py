@@ -14,12 +14,12 @@ import time
 import numpy as np
 
 from study_app.devices.mouse import MouseDevice
-from study_app.haptics.cfunctions import NOW, SLEEP, call_at
-from study_app.haptics.clock import SystemClock, VirtualClock, raise_priority
-from study_app.haptics.compiled import kernel
-from study_app.haptics.scene import Liquid, Scene, Wake
-from study_app.haptics.servo import Servo
-from study_app.haptics.telemetry import timing
+from study_app.haptics.kernels.c_functions import NOW, SLEEP, call_at
+from study_app.haptics.kernels.compiled import kernel
+from study_app.haptics.model.scene import Liquid, Scene, Wake
+from study_app.haptics.runtime.clocks.clock import SystemClock, VirtualClock, raise_priority
+from study_app.haptics.runtime.servo import Servo
+from study_app.haptics.runtime.telemetry import timing
 
 _now, _sleep = call_at(NOW), call_at(SLEEP)
 
@@ -39,7 +39,7 @@ WARM_START = """
 import time
 begin = time.perf_counter()
 from study_app.devices.mouse import MouseDevice
-from study_app.haptics.servo import Servo
+from study_app.haptics.runtime.servo import Servo
 imported = time.perf_counter()
 Servo(MouseDevice()).prepare()
 print(imported - begin, time.perf_counter() - imported)

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from study_app.haptics.layout import LIMITER_NAMES, SAMPLE
+from study_app.haptics.model.layout import LIMITER_NAMES, SAMPLE
 from study_app.protocol.load import load, source_bytes
 from study_app.protocol.schedule import build_schedule
 from study_app.store.rebuild import rebuild

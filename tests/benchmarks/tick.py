@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 
 from study_app.evaluation.cost import hand
-from study_app.haptics.compiled import kernel
-from study_app.haptics.gate import resolve
-from study_app.haptics.layout import SAMPLE, records
-from study_app.haptics.pack import pack
-from study_app.haptics.safety import new_safety
-from study_app.haptics.scene import Box, Drag, Effect, Liquid, LocalWake, Scene, Uniform, Vortex, Wake
-from study_app.haptics.tick import tick
+from study_app.haptics.kernels.compiled import kernel
+from study_app.haptics.kernels.safety import new_safety
+from study_app.haptics.kernels.tick import tick
+from study_app.haptics.model.gate import resolve
+from study_app.haptics.model.layout import SAMPLE, records
+from study_app.haptics.model.scene import Box, Drag, Effect, Liquid, LocalWake, Scene, Uniform, Vortex, Wake
+from study_app.haptics.runtime.pack import pack
 from study_app.protocol.load import load_scenes, shipped
 
 BATCH = 1_000

@@ -15,9 +15,9 @@ import numpy as np
 
 from study_app.evaluation.cost import measure
 from study_app.evaluation.stability.boundary import boundary_nspm
-from study_app.haptics.motion import Motion
-from study_app.haptics.offline import simulate
-from study_app.haptics.scene import Ewma, Foaw, Knee, Line, Raw, Scene
+from study_app.haptics.model.motion import Motion
+from study_app.haptics.model.scene import Ewma, Foaw, Knee, Line, Raw, Scene
+from study_app.haptics.runtime.offline import simulate
 
 COUNT_M = 38e-6
 AMPLITUDE_M = 0.03

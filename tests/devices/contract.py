@@ -1,6 +1,6 @@
 """What a servo exchanges with a device, for tests that write to one themselves."""
 
-from study_app.haptics.layout import new_command
+from study_app.haptics.model.layout import new_command
 
 
 def write(device, force_n=(0.0, 0.0, 0.0)):

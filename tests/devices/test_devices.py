@@ -10,8 +10,8 @@ if numba.config.DISABLE_JIT:
 
 from study_app.devices import is_falcon, is_simulated, kind_of, list_devices, moves_by_itself, open_device
 from study_app.errors import DeviceNotFound
-from study_app.haptics.cfunctions import READ_LOST, READ_NEW, READ_NOTHING_NEW
-from study_app.haptics.layout import new_reading
+from study_app.haptics.kernels.c_functions import READ_LOST, READ_NEW, READ_NOTHING_NEW
+from study_app.haptics.model.layout import new_reading
 from tests.devices.contract import write
 
 MS = 1_000_000

@@ -8,9 +8,9 @@ if numba.config.DISABLE_JIT:
     pytest.skip("devices are C functions", allow_module_level=True)
 
 from study_app.devices.mouse import MouseDevice
-from study_app.haptics.clock import VirtualClock
-from study_app.haptics.scene import Liquid, Scene, Wake
-from study_app.haptics.servo import Servo
+from study_app.haptics.model.scene import Liquid, Scene, Wake
+from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.servo import Servo
 
 THESIS = {
     "water": Liquid(

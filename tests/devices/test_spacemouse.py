@@ -22,9 +22,9 @@ from study_app.devices.spacemouse_reports import (
     velocity_mps,
 )
 from study_app.errors import DeviceError, DeviceLost, DeviceNotFound
-from study_app.haptics.clock import VirtualClock
-from study_app.haptics.layout import BUTTON_STOP
-from study_app.haptics.servo import Servo
+from study_app.haptics.model.layout import BUTTON_STOP
+from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.servo import Servo
 
 MODEL = {model.name: model for model in MODELS}
 RIGHT = bytes([1, 0x5E, 0x01, 0, 0, 0, 0])  # 350 to the right

@@ -5,10 +5,10 @@ import math
 
 import numpy as np
 
-from study_app.haptics import paths
-from study_app.haptics.motion import Motion
-from study_app.haptics.offline import simulate
-from study_app.haptics.scene import Body, Drag, Liquid, Scene, Wake
+from study_app.haptics.model import paths
+from study_app.haptics.model.motion import Motion
+from study_app.haptics.model.scene import Body, Drag, Liquid, Scene, Wake
+from study_app.haptics.runtime.offline import simulate
 
 TANK = Scene(
     liquids=(Liquid(id="tank", density_kg_m3=1000, effects=("drag", "wake"), wake=Wake(length=300, scaling=400)),),

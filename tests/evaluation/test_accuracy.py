@@ -35,8 +35,8 @@ from study_app.evaluation.accuracy.race import (
 )
 from study_app.evaluation.accuracy.rungs import LinearRung, ListRung, TickRung
 from study_app.evaluation.accuracy.truths import Case, Truth
-from study_app.haptics.motion import Motion
-from study_app.haptics.scene import Drag, Given, Liquid, LocalWake, MotionBox, Scene, Wake
+from study_app.haptics.model.motion import Motion
+from study_app.haptics.model.scene import Drag, Given, Liquid, LocalWake, MotionBox, Scene, Wake
 from study_app.protocol.load import load_scene
 from tests.haptics.scenes import COMPILED
 

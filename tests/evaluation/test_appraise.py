@@ -20,11 +20,11 @@ from study_app.evaluation import appraise
 from study_app.evaluation.appraised import Costs
 from study_app.evaluation.appraiser import Appraiser, serve
 from study_app.evaluation.fastest import withheld_share
-from study_app.haptics.dynamics import UNKNOWN, Dynamics
-from study_app.haptics.liquid import Box
-from study_app.haptics.motion import Motion
-from study_app.haptics.offline import samples_along
-from study_app.haptics.scene import Ewma, Line, Raw
+from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
+from study_app.haptics.model.liquid import Box
+from study_app.haptics.model.motion import Motion
+from study_app.haptics.model.scene import Ewma, Line, Raw
+from study_app.haptics.runtime.offline import samples_along
 from study_app.protocol.load import load, load_scenes
 from study_app.protocol.tasks import Explore, Reach, Stroke, fastest_stroke
 

@@ -10,7 +10,7 @@ if numba.config.DISABLE_JIT:
     pytest.skip("the servo exists compiled only", allow_module_level=True)
 
 from study_app.evaluation.soak.audit import Audit
-from study_app.haptics.layout import LIMITER_ENERGY, LIMITER_STOP, SAMPLE, STATUS_DEVICE_LOST, records
+from study_app.haptics.model.layout import LIMITER_ENERGY, LIMITER_STOP, SAMPLE, STATUS_DEVICE_LOST, records
 
 PERIOD_NS = 1_000_000
 

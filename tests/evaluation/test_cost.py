@@ -6,7 +6,7 @@ import pytest
 
 from study_app.evaluation import cost
 from study_app.evaluation.cost import hand, measure, report
-from study_app.haptics.scene import Box, Liquid, Scene, Uniform, Wake
+from study_app.haptics.model.scene import Box, Liquid, Scene, Uniform, Wake
 from tests.haptics.scenes import COMPILED
 
 pytestmark = pytest.mark.skipif(not COMPILED, reason="measures compiled code")

@@ -13,10 +13,10 @@ if numba.config.DISABLE_JIT:
 from study_app.evaluation.soak import faults as faulty
 from study_app.evaluation.soak.faults import KINDS, FaultyDevice
 from study_app.evaluation.soak.restless import REACH_M, RestlessHand
-from study_app.haptics.clock import SystemClock, VirtualClock
-from study_app.haptics.layout import LIMITER_GLITCH, LIMITER_STOP, STATUS_DEVICE_LOST
-from study_app.haptics.scene import Liquid, Scene
-from study_app.haptics.servo import Servo
+from study_app.haptics.model.layout import LIMITER_GLITCH, LIMITER_STOP, STATUS_DEVICE_LOST
+from study_app.haptics.model.scene import Liquid, Scene
+from study_app.haptics.runtime.clocks.clock import SystemClock, VirtualClock
+from study_app.haptics.runtime.servo import Servo
 from tests.haptics.probe import Probe
 
 

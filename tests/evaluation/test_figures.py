@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from study_app.errors import StoreError
 from study_app.evaluation import figures, thesis
 from study_app.evaluation.thesis import EXPONENTS, FIGURES, LENGTH, figure_3, figure_4, figure_5, figure_6
-from study_app.haptics.scene import Wake
+from study_app.haptics.model.scene import Wake
 from tests.haptics.scenes import COMPILED, WATER_FACTOR, vectors
 
 pytestmark = pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")

@@ -7,9 +7,9 @@ from click.testing import CliRunner
 from study_app.cli import commands
 from study_app.evaluation.identify import figure, measured, preset
 from study_app.evaluation.identify.fit import fit
-from study_app.haptics import paths
-from study_app.haptics.override import override_all
-from study_app.haptics.scene import Box, Kalman, Liquid, Scene, Uniform
+from study_app.haptics.model import paths
+from study_app.haptics.model.overrides import override_all
+from study_app.haptics.model.scene import Box, Kalman, Liquid, Scene, Uniform
 from study_app.protocol.load import load_scene
 from tests.evaluation.measurements import OIL, REACH, REVERSE, TANK, force_of, noisy, write_csv
 from tests.haptics.scenes import COMPILED

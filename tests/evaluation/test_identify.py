@@ -10,10 +10,10 @@ from scipy.stats import t as student
 from study_app.errors import StudyError
 from study_app.evaluation.identify import measured, parameters, search
 from study_app.evaluation.identify.fit import fit
-from study_app.haptics import paths
-from study_app.haptics.motion import Motion
-from study_app.haptics.override import override_all
-from study_app.haptics.scene import Box, Liquid, LocalWake, Scene
+from study_app.haptics.model import paths
+from study_app.haptics.model.motion import Motion
+from study_app.haptics.model.overrides import override_all
+from study_app.haptics.model.scene import Box, Liquid, LocalWake, Scene
 from tests.evaluation.measurements import BALL, OIL, REACH, REVERSE, SEED, TANK, force_of, noisy, slowed, write_csv
 from tests.haptics.scenes import COMPILED
 

@@ -12,8 +12,8 @@ if numba.config.DISABLE_JIT:
 from study_app.evaluation.references import wakes
 from study_app.evaluation.soak.drift import Drift
 from study_app.evaluation.soak.ledger import Ledger, wake_of
-from study_app.haptics.layout import LIMITER_GLITCH, SAMPLE, records
-from study_app.haptics.scene import Box, Liquid, Scene, Uniform, Wake
+from study_app.haptics.model.layout import LIMITER_GLITCH, SAMPLE, records
+from study_app.haptics.model.scene import Box, Liquid, Scene, Uniform, Wake
 
 PERIOD_NS = 1_000_000
 

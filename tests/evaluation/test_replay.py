@@ -15,9 +15,9 @@ from pyarrow import parquet
 from study_app.devices.scripted import ScriptedDevice
 from study_app.errors import StoreError
 from study_app.evaluation.replay import replay
-from study_app.haptics.clock import VirtualClock
-from study_app.haptics.dynamics import Dynamics
-from study_app.haptics.servo import Servo
+from study_app.haptics.model.device_dynamics import Dynamics
+from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.schedule import build_schedule
 from study_app.session.events import Begin, Continue, EndAsked, ForceStopped, PauseAsked, RepeatAsked, ResumeAsked
 from study_app.session.pages import Page, TaskPage

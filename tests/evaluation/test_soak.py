@@ -20,7 +20,7 @@ from study_app.cli import main
 from study_app.errors import ServoFault, StudyError
 from study_app.evaluation.soak.drift import Drift
 from study_app.evaluation.soak.run import Soak, soak
-from study_app.haptics.scene import Kalman
+from study_app.haptics.model.scene import Kalman
 from study_app.protocol.load import load_scenes
 
 SHORT_H = 2 / 60

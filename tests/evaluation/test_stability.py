@@ -18,7 +18,7 @@ from study_app.evaluation.stability.fidelity import LIMITED, STUDY_LOOPS, fideli
 from study_app.evaluation.stability.groups import Group, groups, some, sweep
 from study_app.evaluation.stability.measures import fast_part, smooth
 from study_app.evaluation.stability.verdict import judge
-from study_app.haptics.layout import LIMITER_NAMES
+from study_app.haptics.model.layout import LIMITER_NAMES
 from study_app.protocol.load import load, shipped
 from tests.haptics.scenes import COMPILED
 
@@ -264,7 +264,7 @@ def test_a_line_that_is_none_is_refused():
 
 @compiled
 def test_the_table_of_limits_is_written_as_it_ships(monkeypatch, tmp_path):
-    from study_app.haptics.limits import table
+    from study_app.haptics.model.limits import table
 
     monkeypatch.setattr(stability, "measure_limits", lambda: iter(table()))
     ran = command("--table", str(tmp_path / "limits.csv"))

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from study_app.evaluation.stability.arm import FIRM, MIDDLE, Arm, advance, new_arm, write_force
-from study_app.haptics.plant import move, new_handle, push
+from study_app.haptics.kernels.plant import move, new_handle, push
 
 STILL = np.zeros(3)
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from study_app.evaluation.stability.boundary import boundary_nspm, measure_limits, passive_nspm
-from study_app.haptics.limits import bearable, table
-from study_app.haptics.scene import Ewma, Kalman, Line
+from study_app.haptics.model.limits import bearable, table
+from study_app.haptics.model.scene import Ewma, Kalman, Line
 from tests.haptics.scenes import COMPILED
 
 pytestmark = pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")

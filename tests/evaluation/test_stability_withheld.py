@@ -13,7 +13,7 @@ from study_app.evaluation.stability.bench import new_bench
 from study_app.evaluation.stability.cases import Case
 from study_app.evaluation.stability.loop import TRACE, follow
 from study_app.evaluation.stability.withheld import MODES, QUICK, SECONDS, STROKES, Withheld, measure, report
-from study_app.haptics.layout import records
+from study_app.haptics.model.layout import records
 from tests.haptics.scenes import COMPILED
 
 compiled = pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")

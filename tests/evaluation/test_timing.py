@@ -24,13 +24,13 @@ from study_app.evaluation.timing.load import busy_cores
 from study_app.evaluation.timing.loops import LEAD_IN, PERIOD_NS, BareLoop, ServoLoop, ThreadLoop, granted, taken
 from study_app.evaluation.timing.race import timing
 from study_app.evaluation.timing.scene import FULL, PlayedHand
-from study_app.haptics.cfunctions import SLEEP, c_function, record_at
-from study_app.haptics.clock import VIRTUAL, VirtualClock
-from study_app.haptics.clock_grants import Grant
-from study_app.haptics.layout import LIMITER_NON_FINITE
-from study_app.haptics.pack import elements_needed
-from study_app.haptics.scene import Effect
-from study_app.haptics.servo import Servo
+from study_app.haptics.kernels.c_functions import SLEEP, c_function, record_at
+from study_app.haptics.model.layout import LIMITER_NON_FINITE
+from study_app.haptics.model.scene import Effect
+from study_app.haptics.runtime.clocks.clock import VIRTUAL, VirtualClock
+from study_app.haptics.runtime.clocks.grants import Grant
+from study_app.haptics.runtime.pack import elements_needed
+from study_app.haptics.runtime.servo import Servo
 
 _virtual_at = record_at(VIRTUAL)
 NORMAL, REAL_TIME = Grant("normal", "no more was asked for"), Grant("real-time", "SCHED_FIFO 60")

@@ -11,8 +11,8 @@ from study_app.errors import StudyError
 from study_app.evaluation.accuracy import truths
 from study_app.evaluation.accuracy.motions import stir, with_velocity
 from study_app.evaluation.references import exact_wakes, respond, wakes
-from study_app.haptics.motion import Motion
-from study_app.haptics.scene import Drag, Given, Liquid, MotionBox, Scene, Wake
+from study_app.haptics.model.motion import Motion
+from study_app.haptics.model.scene import Drag, Given, Liquid, MotionBox, Scene, Wake
 from tests.haptics.scenes import COMPILED
 
 HONEY = Liquid(id="honey", density_kg_m3=1420, viscosity_pa_s=10)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from study_app.haptics.cfunctions import (
+from study_app.haptics.kernels.c_functions import (
     READ,
     READ_LOST,
     READ_NEW,
@@ -12,8 +12,8 @@ from study_app.haptics.cfunctions import (
     fence,
     record_at,
 )
-from study_app.haptics.dynamics import UNKNOWN
-from study_app.haptics.layout import COMMAND, READING, records
+from study_app.haptics.model.device_dynamics import UNKNOWN
+from study_app.haptics.model.layout import COMMAND, READING, records
 
 WRITES = 8192
 

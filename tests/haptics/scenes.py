@@ -5,13 +5,13 @@ from typing import Any
 import numba
 import numpy as np
 
-from study_app.haptics.dynamics import UNKNOWN, Dynamics
-from study_app.haptics.layout import SAMPLE, records
-from study_app.haptics.motion import Motion
-from study_app.haptics.pack import pack
-from study_app.haptics.safety import new_safety
-from study_app.haptics.scene import Box, Cylinder, Drag, Knee, Liquid, LocalWake, Scene, Vortex, Wake
-from study_app.haptics.tick import tick
+from study_app.haptics.kernels.safety import new_safety
+from study_app.haptics.kernels.tick import tick
+from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
+from study_app.haptics.model.layout import SAMPLE, records
+from study_app.haptics.model.motion import Motion
+from study_app.haptics.model.scene import Box, Cylinder, Drag, Knee, Liquid, LocalWake, Scene, Vortex, Wake
+from study_app.haptics.runtime.pack import pack
 
 COMPILED = not numba.config.DISABLE_JIT
 TICK_NS = 1_000_000

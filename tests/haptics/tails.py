@@ -6,11 +6,11 @@ import numpy as np
 from hypothesis import strategies as st
 
 from study_app.evaluation.references import respond
-from study_app.haptics.compiled import kernel
-from study_app.haptics.motion import Motion
-from study_app.haptics.offline import simulate
-from study_app.haptics.scene import Scene
-from study_app.haptics.tick import tick
+from study_app.haptics.kernels.compiled import kernel
+from study_app.haptics.kernels.tick import tick
+from study_app.haptics.model.motion import Motion
+from study_app.haptics.model.scene import Scene
+from study_app.haptics.runtime.offline import simulate
 from tests.haptics.scenes import COMPILED, TICK_NS, UNBENT, Hand, liquid, moving, scene, vectors
 
 LONGEST = 500 if COMPILED else 12

@@ -5,8 +5,8 @@ from __future__ import annotations
 from random import Random
 
 from study_app.devices.scripted import ScriptedDevice
-from study_app.haptics.clock import VirtualClock
-from study_app.haptics.servo import Servo
+from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.servo import Servo
 from study_app.lab.live import Live
 from study_app.lab.workbench import Setting, Workbench
 from study_app.protocol.load import load_scenes

@@ -11,10 +11,10 @@ if numba.config.DISABLE_JIT:
 
 from study_app.devices.mouse import MouseDevice
 from study_app.errors import ServoFault, StudyError
-from study_app.haptics.clock import VirtualClock
-from study_app.haptics.layout import LIMITER_ENERGY, LIMITER_FADE, LIMITER_NAMES, LIMITER_SLEW, LIMITER_STOP
-from study_app.haptics.scene import Kalman
-from study_app.haptics.servo import Servo
+from study_app.haptics.model.layout import LIMITER_ENERGY, LIMITER_FADE, LIMITER_NAMES, LIMITER_SLEW, LIMITER_STOP
+from study_app.haptics.model.scene import Kalman
+from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.servo import Servo
 from study_app.lab.live import Live, open_live
 from study_app.lab.programmes import REACHED, TITLES, led_to, programme
 from study_app.lab.workbench import Setting, Workbench

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from study_app.errors import StudyError
-from study_app.haptics.scene import Channel, Given, Liquid, Scene
+from study_app.haptics.model.scene import Channel, Given, Liquid, Scene
 from study_app.lab.changes import changed
 from study_app.lab.parameters import Parameter, parameter, sections, value_of
 from study_app.protocol.load import load_scenes, shipped

@@ -9,7 +9,7 @@ from click.testing import CliRunner
 
 from study_app.cli import commands
 from study_app.errors import StoreError
-from study_app.haptics.scene import Ewma, Kalman, Scene
+from study_app.haptics.model.scene import Ewma, Kalman, Scene
 from study_app.lab.changes import changed
 from study_app.lab.presets import Choice, liquids_at_hand, preset_text, save
 from study_app.lab.workbench import Setting

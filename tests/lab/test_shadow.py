@@ -9,8 +9,8 @@ import pytest
 if numba.config.DISABLE_JIT:
     pytest.skip("the servo exists compiled only", allow_module_level=True)
 
-from study_app.haptics.layout import SAMPLE, records
-from study_app.haptics.scene import Kalman, Scene
+from study_app.haptics.model.layout import SAMPLE, records
+from study_app.haptics.model.scene import Kalman, Scene
 from study_app.lab.changes import changed
 from study_app.lab.shadow import SPAN_S, Shadow
 from study_app.lab.tail import MOST_POINTS

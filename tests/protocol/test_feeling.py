@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from study_app.haptics.limits import slope_limit
+from study_app.haptics.model.limits import slope_limit
 from study_app.protocol.describe import describe
 from study_app.protocol.feeling import effects, warnings
 from study_app.protocol.load import load, load_scene, load_scenes, parse

@@ -9,7 +9,7 @@ import pytest
 
 from study_app.cli import main
 from study_app.errors import ProtocolError
-from study_app.haptics.motion import Motion
+from study_app.haptics.model.motion import Motion
 from study_app.protocol.felt import LEAST_N, force_n
 from study_app.protocol.load import load, parse, shipped
 from study_app.protocol.tasks import Explore, Stroke, fastest_stroke
@@ -209,7 +209,7 @@ def test_a_title_in_any_script_is_a_title(text: str) -> None:
 @pytest.mark.parametrize("name", shipped())
 def test_the_estimated_force_is_near_that_of_the_model(name: str) -> None:
     """The estimate decides whether anything is felt; the compiled model says what is."""
-    from study_app.haptics.offline import simulate
+    from study_app.haptics.runtime.offline import simulate
 
     protocol = load(name)
     stroke = fastest_stroke(Explore(kind="explore", min_s=1, max_s=2, instruction="x"), protocol.device.workspace_m)

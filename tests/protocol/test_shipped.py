@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from study_app.haptics.scene import Body, Ewma, Knee
+from study_app.haptics.model.scene import Body, Ewma, Knee
 from study_app.protocol.load import load
 from study_app.protocol.model import Explore, Reach
 from study_app.protocol.schedule import build_schedule

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from study_app.errors import StoreError
-from study_app.haptics.scene import Scene
+from study_app.haptics.model.scene import Scene
 from study_app.session.events import Begin, Chosen, Continue, Submitted
 from study_app.session.pages import TaskPage
 from study_app.session.ports import Ports

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from study_app.haptics.layout import SAMPLE
+from study_app.haptics.model.layout import SAMPLE
 from study_app.protocol.model import Protocol
 from study_app.protocol.schedule import build_schedule, draw_key, stream
 from study_app.session.events import Begin, Chosen, Continue, ItemShown, Submitted, TaskDone

@@ -10,11 +10,11 @@ import pytest
 
 from study_app.devices.scripted import ScriptedDevice
 from study_app.errors import StoreError
-from study_app.haptics.clock import VirtualClock
-from study_app.haptics.clock_grants import Grant
-from study_app.haptics.dynamics import Dynamics
-from study_app.haptics.servo import Servo
-from study_app.haptics.telemetry import Timing
+from study_app.haptics.model.device_dynamics import Dynamics
+from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.clocks.grants import Grant
+from study_app.haptics.runtime.servo import Servo
+from study_app.haptics.runtime.telemetry import Timing
 from study_app.protocol.model import Protocol
 from study_app.session import measuring
 from study_app.session.measuring import measure

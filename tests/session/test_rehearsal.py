@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from study_app.errors import SessionError, StoreError
-from study_app.haptics.servo import Servo
+from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.model import Reach
 from study_app.protocol.schedule import stream
 from study_app.session import rehearsal

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from study_app.haptics.layout import LIMITER_GLITCH
+from study_app.haptics.model.layout import LIMITER_GLITCH
 from study_app.session.events import (
     Begin,
     PauseAsked,

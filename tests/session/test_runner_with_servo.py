@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from study_app.devices.scripted import ScriptedDevice
-from study_app.haptics.clock import VirtualClock
-from study_app.haptics.servo import Servo
+from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.model import Protocol
 from study_app.protocol.schedule import build_schedule, draw_key, stream
 from study_app.session.events import Begin, Continue, EndAsked, ForceStopped, PauseAsked, RepeatAsked, ResumeAsked

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from study_app.devices.scripted import ScriptedDevice
-from study_app.haptics.clock import VirtualClock
-from study_app.haptics.layout import STATUS_OK
-from study_app.haptics.servo import Servo
+from study_app.haptics.model.layout import STATUS_OK
+from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.servo import Servo
 from study_app.session.pages import TroublePage
 from study_app.session.state import Phase
 from tests.compiled import needs_servo

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from study_app.haptics.layout import LIMITER_NAMES, SAMPLE
+from study_app.haptics.model.layout import LIMITER_NAMES, SAMPLE
 from study_app.protocol.model import Protocol
 from study_app.protocol.schedule import build_schedule
 from study_app.store.clock import SessionClock

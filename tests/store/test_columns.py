@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from study_app.haptics.layout import LIMITER_NAMES
+from study_app.haptics.model.layout import LIMITER_NAMES
 from study_app.store.columns import TABLES, Column, every_column, header, variable
 
 

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from pyarrow import parquet
 
 from study_app.errors import StoreError
-from study_app.haptics.layout import SAMPLE
+from study_app.haptics.model.layout import SAMPLE
 from study_app.store import recording
 from study_app.store.recorded_columns import FRAMES, SAMPLES
 from study_app.store.recording import SamplesFile, Written, read_checks, read_facts, read_frames, read_samples
@@ -227,7 +227,7 @@ RECORDING = """
 import sys
 from pathlib import Path
 import numpy as np
-from study_app.haptics.layout import SAMPLE
+from study_app.haptics.model.layout import SAMPLE
 from study_app.store import recording
 path = Path(sys.argv[1])
 file = recording.SamplesFile(path, {}, 1000.0)

@@ -541,7 +541,7 @@ KILLED = """
 import sys
 from pathlib import Path
 import numpy as np
-from study_app.haptics.layout import SAMPLE
+from study_app.haptics.model.layout import SAMPLE
 from study_app.protocol.load import load, source_bytes
 from study_app.store.session import begin
 store = begin(

@@ -18,7 +18,7 @@ from study_app.devices.falcon.failures import FalconFailure, UsbFailure
 from study_app.devices.falcon.firmware import Firmware, check
 from study_app.devices.falcon.packets import PARSER, STATUS, feed, strip
 from study_app.devices.falcon.transport import Transport
-from study_app.haptics.layout import records
+from study_app.haptics.model.layout import records
 
 ATTEMPTS: Final = 10
 PINGS: Final = 20

@@ -24,8 +24,8 @@ from study_app.devices.falcon.kinematics import REACHED, count_at, inverse, new_
 from study_app.devices.falcon.transport import Transport, open_transport
 from study_app.devices.falcon.wire import ERROR_NO_DEVICE
 from study_app.errors import DeviceError, DeviceLost
-from study_app.haptics.dynamics import Dynamics
-from study_app.haptics.layout import new_command, new_reading
+from study_app.haptics.model.device_dynamics import Dynamics
+from study_app.haptics.model.layout import new_command, new_reading
 
 FORCE_LIMIT_N: Final = 8.0
 

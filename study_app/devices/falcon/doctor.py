@@ -25,9 +25,9 @@ from study_app.devices.falcon.geometry import WORKSPACE_M
 from study_app.devices.falcon.transport import find_falcons
 from study_app.devices.falcon.transport_ftdi import FtdiTransport, load_d2xx
 from study_app.errors import DeviceError, DeviceLost, ServoFault
-from study_app.haptics.clock import VirtualClock
-from study_app.haptics.servo import Servo
-from study_app.haptics.telemetry import timing
+from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.servo import Servo
+from study_app.haptics.runtime.telemetry import timing
 
 SECONDS: Final = 3.0
 EMULATED_PATIENCE_S: Final = 5.0

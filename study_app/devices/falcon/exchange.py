@@ -34,7 +34,7 @@ from study_app.devices.falcon.wire import (
     SUCCESS,
     USB_PACKET,
 )
-from study_app.haptics.cfunctions import (
+from study_app.haptics.kernels.c_functions import (
     READ,
     READ_LOST,
     READ_NEW,
@@ -45,11 +45,11 @@ from study_app.haptics.cfunctions import (
     fence,
     record_at,
 )
-from study_app.haptics.compiled import kernel
-from study_app.haptics.dynamics import Dynamics
-from study_app.haptics.layout import COMMAND, READING, records
-from study_app.haptics.limits import SLEW_S, slew_limit_n
-from study_app.haptics.vector import copy
+from study_app.haptics.kernels.compiled import kernel
+from study_app.haptics.kernels.vector import copy
+from study_app.haptics.model.device_dynamics import Dynamics
+from study_app.haptics.model.layout import COMMAND, READING, records
+from study_app.haptics.model.limits import SLEW_S, slew_limit_n
 
 LEAST_MASS_KG: Final = 0.1
 """The least mass at the grip in any direction [kg]: arms and platform of a device of this size weigh about as much.

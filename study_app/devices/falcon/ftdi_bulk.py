@@ -11,9 +11,9 @@ from numba import types
 
 from study_app.devices.falcon import wire
 from study_app.devices.falcon.bulk import BULK
-from study_app.haptics.cfunctions import c_function, call_at, record_at
-from study_app.haptics.compiled import kernel
-from study_app.haptics.layout import records
+from study_app.haptics.kernels.c_functions import c_function, call_at, record_at
+from study_app.haptics.kernels.compiled import kernel
+from study_app.haptics.model.layout import records
 
 BRIDGE = np.dtype(
     [

@@ -21,7 +21,7 @@ from typing import IO, Final, Self
 from study_app.devices.falcon.transport import Transport, open_transport
 from study_app.devices.falcon.wire import FLAG_HOMING, quiet_packet
 from study_app.errors import DeviceError
-from study_app.haptics.suspension import allow_suspension, refuse_suspension
+from study_app.haptics.runtime.suspension import allow_suspension, refuse_suspension
 
 WORD: Final = b"done\n"
 READY: Final = b"ready\n"

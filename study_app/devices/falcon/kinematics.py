@@ -19,8 +19,8 @@ import numpy as np
 
 from study_app.devices.falcon.geometry import Geometry
 from study_app.devices.falcon.wire import MOST_TORQUE
-from study_app.haptics.compiled import kernel
-from study_app.haptics.layout import records
+from study_app.haptics.kernels.compiled import kernel
+from study_app.haptics.model.layout import records
 
 MECHANISM = np.dtype(
     [

@@ -22,7 +22,7 @@ from study_app.devices.falcon.wire import (
     USB_PACKET,
     ZERO,
 )
-from study_app.haptics.compiled import kernel
+from study_app.haptics.kernels.compiled import kernel
 
 NIBBLES = 4
 FLAGS_AT = 13  # flags to the device, status from it; numbers stand at 1, 5 and 9

@@ -17,8 +17,8 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from study_app.haptics.compiled import kernel
-from study_app.haptics.dynamics import MOST_DELAY
+from study_app.haptics.kernels.compiled import kernel
+from study_app.haptics.model.device_dynamics import MOST_DELAY
 
 MOST_OWED: Final = 4
 SLOWER_READS: Final = 8

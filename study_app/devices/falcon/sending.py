@@ -12,9 +12,9 @@ import math
 from typing import Any, Final
 
 from study_app.devices.falcon.kinematics import jacobian, motor_units, torques
-from study_app.haptics.compiled import kernel
-from study_app.haptics.energy import SURE_MPS
-from study_app.haptics.vector import dot, square, square_distance
+from study_app.haptics.kernels.compiled import kernel
+from study_app.haptics.kernels.passivity import SURE_MPS
+from study_app.haptics.kernels.vector import dot, square, square_distance
 
 MOST_WAITING_N: Final = 0.5
 """A measurement of the delay may hold back a force that differs by no more from what the motors give."""

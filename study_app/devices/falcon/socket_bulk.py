@@ -12,9 +12,9 @@ from numba import types
 from study_app.devices.falcon import wire
 from study_app.devices.falcon.bulk import BULK
 from study_app.devices.falcon.framing import ANSWER, BULK_IN, BULK_OUT, REQUEST
-from study_app.haptics.cfunctions import c_function, external, record_at
-from study_app.haptics.compiled import kernel
-from study_app.haptics.layout import records
+from study_app.haptics.kernels.c_functions import c_function, external, record_at
+from study_app.haptics.kernels.compiled import kernel
+from study_app.haptics.model.layout import records
 
 _REQUEST = np.dtype(
     [("kind", "u1"), ("endpoint", "u1"), ("value", "<u2"), ("length", "<u2"), ("timeout_ms", "<u2")]

@@ -17,8 +17,8 @@ from study_app.devices.falcon.device import FalconDevice
 from study_app.devices.falcon.failures import usb_failure
 from study_app.devices.falcon.wire import ERROR_NO_DEVICE
 from study_app.errors import DeviceError
-from study_app.haptics.cfunctions import READ_LOST, READ_NEW
-from study_app.haptics.layout import new_command, new_reading
+from study_app.haptics.kernels.c_functions import READ_LOST, READ_NEW
+from study_app.haptics.model.layout import new_command, new_reading
 
 PLACES_M: Final = (
     (0.0, 0.0, 0.0),

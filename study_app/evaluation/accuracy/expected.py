@@ -19,11 +19,11 @@ from study_app.evaluation.accuracy.rungs import COUNT_M
 from study_app.evaluation.accuracy.truths import CYCLES, Case, Truth
 from study_app.evaluation.cost import measure
 from study_app.evaluation.references import local_wakes, lowered, resistance_nspm, respond
-from study_app.haptics.bounds import GRAVITY_MPS2
-from study_app.haptics.gate import resolve
-from study_app.haptics.motion import Floats, Motion
-from study_app.haptics.offline import simulate
-from study_app.haptics.scene import Effect, Everywhere, LocalWake, Scene
+from study_app.haptics.model.bounds import GRAVITY_MPS2
+from study_app.haptics.model.gate import resolve
+from study_app.haptics.model.motion import Floats, Motion
+from study_app.haptics.model.scene import Effect, Everywhere, LocalWake, Scene
+from study_app.haptics.runtime.offline import simulate
 
 SETTLED: Final = 2 / 3
 """After this share of the strokes the flow has forgotten how they began."""

@@ -8,10 +8,10 @@ import numpy as np
 
 from study_app.evaluation.accuracy.literal import NumpyTail, PlainTail
 from study_app.evaluation.accuracy.rungs import InterpretedRung, LinearRung, ListRung, Rung, TickRung, given
-from study_app.haptics.bounds import REFERENCE
-from study_app.haptics.gate import resolve
-from study_app.haptics.laws import Law
-from study_app.haptics.scene import Drag, Effect, Estimator, Everywhere, Ewma, Foaw, Given, Line, Raw, Scene
+from study_app.haptics.model.bounds import REFERENCE
+from study_app.haptics.model.gate import resolve
+from study_app.haptics.model.laws import Law
+from study_app.haptics.model.scene import Drag, Effect, Estimator, Everywhere, Ewma, Foaw, Given, Line, Raw, Scene
 
 SLOWER = (2, 4, 10)
 RESOLUTIONS_M = (0.005, 0.02)

@@ -1,6 +1,6 @@
 """The wake as a list that is gone through every tick, as one would first write it: compiled, numpy, Python.
 
-These are what the program could be instead of what it is (``haptics.effects.wake``): they cost more the longer the
+These are what the program could be instead of what it is (``haptics.kernels.effects.wake``): they cost more the longer the
 list. Each keeps the elements in a ring and answers two questions a tick: `wake` and, after the force, `follow`.
 """
 
@@ -12,10 +12,10 @@ from typing import Any, Final
 
 import numpy as np
 
-from study_app.haptics.compiled import kernel
-from study_app.haptics.effects.wake import REST_MPS, response
-from study_app.haptics.layout import Record, records
-from study_app.haptics.motion import Floats
+from study_app.haptics.kernels.compiled import kernel
+from study_app.haptics.kernels.effects.wake import REST_MPS, response
+from study_app.haptics.model.layout import Record, records
+from study_app.haptics.model.motion import Floats
 
 TAIL: Final = np.dtype(
     [

@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from study_app.haptics.motion import Floats, Motion
+from study_app.haptics.model.motion import Floats, Motion
 
 RADIUS_M: Final = 0.03
 TURNS: Final = 1.5

@@ -20,8 +20,8 @@ from study_app.evaluation.accuracy import ladders, truths
 from study_app.evaluation.accuracy.motions import with_velocity
 from study_app.evaluation.accuracy.rungs import Rung, given
 from study_app.evaluation.accuracy.truths import Truth
-from study_app.haptics.motion import Floats, Motion
-from study_app.haptics.scene import Scene
+from study_app.haptics.model.motion import Floats, Motion
+from study_app.haptics.model.scene import Scene
 
 Kind: TypeAlias = Literal["numerical", "physical"]
 

@@ -16,17 +16,17 @@ import numpy as np
 
 from study_app.evaluation.accuracy.literal import NumpyTail, PlainTail, list_follow, list_wake, new_list
 from study_app.evaluation.references import lowered
-from study_app.haptics.bounds import resistance_n
-from study_app.haptics.compiled import kernel
-from study_app.haptics.effects.drag import resistance
-from study_app.haptics.layout import ESTIMATOR_GIVEN, SAMPLE, Record, records
-from study_app.haptics.limits import Bearable
-from study_app.haptics.motion import Floats, Motion
-from study_app.haptics.pack import Model, pack
-from study_app.haptics.safety import new_safety
-from study_app.haptics.scene import Given, Scene
-from study_app.haptics.tick import tick
-from study_app.haptics.vector import norm, subtract
+from study_app.haptics.kernels.compiled import kernel
+from study_app.haptics.kernels.effects.drag import resistance
+from study_app.haptics.kernels.safety import new_safety
+from study_app.haptics.kernels.tick import tick
+from study_app.haptics.kernels.vector import norm, subtract
+from study_app.haptics.model.bounds import resistance_n
+from study_app.haptics.model.layout import ESTIMATOR_GIVEN, SAMPLE, Record, records
+from study_app.haptics.model.limits import Bearable
+from study_app.haptics.model.motion import Floats, Motion
+from study_app.haptics.model.scene import Given, Scene
+from study_app.haptics.runtime.pack import Model, pack
 
 UNLIMITED: Final = Bearable(1e9, 1e9)
 """Forces are compared as the model gives them: no slope limit, which no table has for the slowest rungs."""

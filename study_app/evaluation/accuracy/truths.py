@@ -2,7 +2,7 @@
 
 Two kinds, kept apart. *Numerical*: the definition of the model itself, summed without rounding errors. *Physical*: what
 a real sphere meets, as far as that is known: measured steady drag, the exact forces of creeping flow, and tables that a
-fluid solver left in the package (``evaluation/cfd/*.csv``). None of it shares code with ``haptics.effects``.
+fluid solver left in the package (``evaluation/cfd/*.csv``). None of it shares code with ``haptics.kernels.effects``.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from scipy.interpolate import PchipInterpolator
 from study_app.errors import StudyError
 from study_app.evaluation.accuracy.motions import along_x, stroke, vectors_x
 from study_app.evaluation.references import respond
-from study_app.haptics.motion import Floats, Motion
-from study_app.haptics.scene import Liquid, Scene
+from study_app.haptics.model.motion import Floats, Motion
+from study_app.haptics.model.scene import Liquid, Scene
 
 DRAG_POINTS: Final = (
     (0.1585, 169.8),

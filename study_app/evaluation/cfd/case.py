@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from study_app.errors import StudyError
-from study_app.haptics.motion import Floats
+from study_app.haptics.model.motion import Floats
 from study_app.protocol.load import load_scene
 
 PROTOCOL: Final = "physical_liquids"

@@ -19,8 +19,8 @@ from study_app.evaluation.cfd.fitted import MODELS, Fitted, judge, scene_of
 from study_app.evaluation.cfd.tables import Table
 from study_app.evaluation.identify.parameters import find
 from study_app.evaluation.style import file_bytes
-from study_app.haptics.laws import LAWS
-from study_app.haptics.scene import Liquid
+from study_app.haptics.model.laws import LAWS
+from study_app.haptics.model.scene import Liquid
 from study_app.store.atomic import write_file
 
 FITS_FILE: Final = "fits.csv"

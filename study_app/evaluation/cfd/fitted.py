@@ -17,10 +17,10 @@ from study_app.evaluation.cfd.case import RAMP, STOP, Case
 from study_app.evaluation.cfd.tables import Table
 from study_app.evaluation.identify.fit import fit
 from study_app.evaluation.identify.measured import along_a_line
-from study_app.haptics.motion import Floats, Motion
-from study_app.haptics.offline import simulate
-from study_app.haptics.override import override_all
-from study_app.haptics.scene import Effect, Given, Liquid, LocalWake, Scene, Wake
+from study_app.haptics.model.motion import Floats, Motion
+from study_app.haptics.model.overrides import override_all
+from study_app.haptics.model.scene import Effect, Given, Liquid, LocalWake, Scene, Wake
+from study_app.haptics.runtime.offline import simulate
 
 RATE_HZ: Final = 1000.0
 LAW: Final = "brown-lawler"

@@ -23,7 +23,7 @@ from typing import Any, Final
 import numpy as np
 
 from study_app.errors import StudyError
-from study_app.haptics.motion import Floats
+from study_app.haptics.model.motion import Floats
 
 ORDER: Final = 3
 _ROUNDS: Final = 20

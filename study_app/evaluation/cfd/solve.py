@@ -20,7 +20,7 @@ from study_app.evaluation.cfd.case import END, RAMP, STOP, Case, cases, linear_d
 from study_app.evaluation.cfd.flow import ORDER, Flow, Grid, library
 from study_app.evaluation.cfd.tables import MOTION, STEADY, STEADY_FILE, notes_of, text
 from study_app.evaluation.output import make_folder
-from study_app.haptics.motion import Floats
+from study_app.haptics.model.motion import Floats
 from study_app.store.atomic import write_file
 
 COMMAND: Final = "liquid-study cfd --solve"

@@ -14,7 +14,7 @@ import numpy as np
 
 from study_app.errors import StudyError
 from study_app.evaluation.cfd.case import Case
-from study_app.haptics.motion import Floats
+from study_app.haptics.model.motion import Floats
 
 MOTION: Final = ("t_s", "velocity_mps", "force_n")
 """Along one axis; the force on the ball, so against the motion at first."""

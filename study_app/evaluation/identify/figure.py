@@ -12,7 +12,7 @@ from matplotlib.ticker import MaxNLocator
 
 from study_app.evaluation import style
 from study_app.evaluation.identify.fit import Fit
-from study_app.haptics.motion import Floats
+from study_app.haptics.model.motion import Floats
 
 MEASURED: Final = "#b4bec7"
 TOP_PT: Final = 40.0

@@ -20,9 +20,9 @@ from scipy.stats import t as student
 from study_app.evaluation.identify.measured import Measured, along_x
 from study_app.evaluation.identify.parameters import Parameter, find
 from study_app.evaluation.identify.search import Problem, coordinate, solve, u_range
-from study_app.haptics.gate import resolve
-from study_app.haptics.motion import Floats, Motion
-from study_app.haptics.scene import Scene
+from study_app.haptics.model.gate import resolve
+from study_app.haptics.model.motion import Floats, Motion
+from study_app.haptics.model.scene import Scene
 
 CONFIDENCE: Final = 0.95
 ALIKE: Final = 0.95

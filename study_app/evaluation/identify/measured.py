@@ -13,7 +13,7 @@ from scipy.interpolate import CubicHermiteSpline, CubicSpline
 from scipy.signal import savgol_filter
 
 from study_app.errors import StudyError
-from study_app.haptics.motion import PLACES, VELOCITIES, Floats, Motion
+from study_app.haptics.model.motion import PLACES, VELOCITIES, Floats, Motion
 
 FORCES: Final = ("fx_n", "fy_n", "fz_n")
 ALONG_A_LINE: Final = ("t_s", "velocity_mps", "force_n")

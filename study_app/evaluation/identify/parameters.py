@@ -11,7 +11,7 @@ from typing import Any, Final
 from pydantic import BaseModel, ValidationError
 
 from study_app.errors import StudyError
-from study_app.haptics.scene import AddedMass, History, Liquid, Scene
+from study_app.haptics.model.scene import AddedMass, History, Liquid, Scene
 
 THRESHOLDS: Final = ("breaking_angle_deg", "breaking_span_m", "resolution_m")
 """These decide for or against: the force does not change with them, or jumps."""

@@ -13,8 +13,8 @@ from study_app.evaluation.identify import figure
 from study_app.evaluation.identify.fit import CONFIDENCE, Fit
 from study_app.evaluation.identify.parameters import Parameter
 from study_app.evaluation.output import make_folder
-from study_app.haptics import motion
-from study_app.haptics.offline import Table
+from study_app.haptics.model import motion
+from study_app.haptics.runtime.offline import Table
 from study_app.protocol.scene_text import for_new_file, scene_text
 from study_app.store.atomic import write_file
 

@@ -19,9 +19,9 @@ from scipy.optimize import least_squares
 from study_app.errors import StudyError
 from study_app.evaluation.identify.measured import Measured, at_rate
 from study_app.evaluation.identify.parameters import Parameter, replace
-from study_app.haptics.motion import Floats
-from study_app.haptics.offline import simulate
-from study_app.haptics.scene import Scene
+from study_app.haptics.model.motion import Floats
+from study_app.haptics.model.scene import Scene
+from study_app.haptics.runtime.offline import simulate
 
 _LEAST_POSITIVE: Final = 1e-12
 _HIGHEST_EXPONENT: Final = 700.0

@@ -13,8 +13,8 @@ from typing import Any, Final
 import numpy as np
 
 from study_app.evaluation.soak.faults import GLITCH_M
-from study_app.haptics.compiled import kernel
-from study_app.haptics.layout import (
+from study_app.haptics.kernels.compiled import kernel
+from study_app.haptics.model.layout import (
     BUTTON_STOP,
     LIMITER_ENERGY,
     LIMITER_GLITCH,

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from study_app.evaluation.soak.ledger import Ledger, wake_of
-from study_app.haptics.scene import Scene
+from study_app.haptics.model.scene import Scene
 
 
 @dataclass(slots=True)

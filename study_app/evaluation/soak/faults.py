@@ -13,7 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from study_app.haptics.cfunctions import (
+from study_app.haptics.kernels.c_functions import (
     READ,
     READ_LOST,
     READ_NOTHING_NEW,
@@ -23,11 +23,11 @@ from study_app.haptics.cfunctions import (
     call_at,
     record_at,
 )
-from study_app.haptics.clock import VIRTUAL, Clock
-from study_app.haptics.compiled import kernel
-from study_app.haptics.layout import BUTTON_STOP, COMMAND, READING, records
-from study_app.haptics.pace import random
-from study_app.haptics.vector import copy, norm
+from study_app.haptics.kernels.compiled import kernel
+from study_app.haptics.kernels.tick_schedule import random
+from study_app.haptics.kernels.vector import copy, norm
+from study_app.haptics.model.layout import BUTTON_STOP, COMMAND, READING, records
+from study_app.haptics.runtime.clocks.clock import VIRTUAL, Clock
 
 NON_FINITE, GLITCH, SILENCE, JUMP, BUTTON, LOST, LOST_AT_WRITE = range(7)
 KINDS: Final = ("non_finite", "glitch", "silence", "clock_jump", "stop_button", "lost", "lost_at_write")

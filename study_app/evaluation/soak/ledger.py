@@ -2,7 +2,7 @@
 
 The servo keeps sums and takes from them what falls off. Here nothing is ever summed in passing: from the samples in
 telemetry alone, by the definition, each stored velocity is kept as it was, with its segment and the time it was stored;
-when asked, the whole list is decayed and summed with ``math.fsum``. It shares no code with ``haptics.effects``.
+when asked, the whole list is decayed and summed with ``math.fsum``. It shares no code with ``haptics.kernels.effects``.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ from typing import Any, Final
 
 import numpy as np
 
-from study_app.haptics.compiled import kernel
-from study_app.haptics.layout import LIMITER_GLITCH, SAMPLE, records
-from study_app.haptics.motion import Floats
-from study_app.haptics.scene import Everywhere, Liquid, Scene, Wake
+from study_app.haptics.kernels.compiled import kernel
+from study_app.haptics.model.layout import LIMITER_GLITCH, SAMPLE, records
+from study_app.haptics.model.motion import Floats
+from study_app.haptics.model.scene import Everywhere, Liquid, Scene, Wake
 
 REST_MPS: Final = 1e-3
 REFUSALS_IN_A_ROW: Final = 5

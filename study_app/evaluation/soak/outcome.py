@@ -11,7 +11,7 @@ from typing import Any, Final
 from study_app.evaluation.soak.audit import TOLERANCE_N
 from study_app.evaluation.soak.drift import Drift
 from study_app.evaluation.soak.faults import BUTTON, GLITCH, JUMP, KINDS, LOST, LOST_AT_WRITE, NON_FINITE, SILENCE
-from study_app.haptics.layout import LIMITER_NAMES
+from study_app.haptics.model.layout import LIMITER_NAMES
 from study_app.store.atomic import write_file
 
 MOST_DRIFT: Final = 1e-9  # of the wake, in units of Σ|e|/S

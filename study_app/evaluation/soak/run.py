@@ -40,15 +40,15 @@ from study_app.evaluation.soak.ledger import wake_of
 from study_app.evaluation.soak.memory import resident_bytes
 from study_app.evaluation.soak.outcome import FELT_N, Rests, Soaked
 from study_app.evaluation.soak.restless import RestlessHand
-from study_app.haptics.clock import SystemClock, VirtualClock
-from study_app.haptics.gate import resolve
-from study_app.haptics.layout import SAMPLE, records
-from study_app.haptics.limits import slew_limit_n
-from study_app.haptics.motion import Floats
-from study_app.haptics.pack import elements_needed
-from study_app.haptics.scene import Scene
-from study_app.haptics.servo import Servo
-from study_app.haptics.telemetry import HISTORY
+from study_app.haptics.model.gate import resolve
+from study_app.haptics.model.layout import SAMPLE, records
+from study_app.haptics.model.limits import slew_limit_n
+from study_app.haptics.model.motion import Floats
+from study_app.haptics.model.scene import Scene
+from study_app.haptics.runtime.clocks.clock import SystemClock, VirtualClock
+from study_app.haptics.runtime.pack import elements_needed
+from study_app.haptics.runtime.servo import Servo
+from study_app.haptics.runtime.telemetry import HISTORY
 
 MOST_HOURS: Final = 10_000.0
 FEWEST_TICKS: Final = 1_000

@@ -1,4 +1,4 @@
-"""A second plant beside ``haptics.plant``: an arm that holds the handle through the tissue of its fingers.
+"""A second plant beside ``haptics.kernels.plant``: an arm that holds the handle through the tissue of its fingers.
 
 ::
 
@@ -26,9 +26,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from study_app.haptics.compiled import kernel
-from study_app.haptics.dynamics import MOST_DELAY
-from study_app.haptics.layout import records
+from study_app.haptics.kernels.compiled import kernel
+from study_app.haptics.model.device_dynamics import MOST_DELAY
+from study_app.haptics.model.layout import records
 
 ARM = np.dtype(
     [

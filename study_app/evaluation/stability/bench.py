@@ -9,13 +9,13 @@ from typing import Any, Final
 from study_app.evaluation.stability.arm import ARMS, new_arm
 from study_app.evaluation.stability.cases import GRIPS, LETS_GO, MOTIONS, SECOND, THROWN, Case, scene_of
 from study_app.evaluation.stability.loop import LOOP, TRACE, begin, run
-from study_app.haptics.dynamics import Dynamics
-from study_app.haptics.layout import SAMPLE, records
-from study_app.haptics.limits import Bearable
-from study_app.haptics.pace import new_pace
-from study_app.haptics.pack import Model, pack
-from study_app.haptics.plant import new_handle
-from study_app.haptics.safety import new_safety
+from study_app.haptics.kernels.plant import new_handle
+from study_app.haptics.kernels.safety import new_safety
+from study_app.haptics.kernels.tick_schedule import new_pace
+from study_app.haptics.model.device_dynamics import Dynamics
+from study_app.haptics.model.layout import SAMPLE, records
+from study_app.haptics.model.limits import Bearable
+from study_app.haptics.runtime.pack import Model, pack
 
 MOVING_S: Final = 1.2
 LASTS_S: Final = 1.8

@@ -10,14 +10,14 @@ import numpy as np
 
 from study_app.evaluation.stability.cases import ESTIMATORS
 from study_app.evaluation.stability.loop import LOOP, STROKE, TRACE, begin, run
-from study_app.haptics.dynamics import MOST_DELAY, Dynamics
-from study_app.haptics.layout import SAMPLE, records
-from study_app.haptics.limits import INERTIA_SHARE, Bearable, Entry
-from study_app.haptics.pace import new_pace
-from study_app.haptics.pack import pack
-from study_app.haptics.plant import new_handle
-from study_app.haptics.safety import new_safety
-from study_app.haptics.scene import Body, Drag, Ewma, Kalman, Knee, Liquid, Raw, Scene, Velocity
+from study_app.haptics.kernels.plant import new_handle
+from study_app.haptics.kernels.safety import new_safety
+from study_app.haptics.kernels.tick_schedule import new_pace
+from study_app.haptics.model.device_dynamics import MOST_DELAY, Dynamics
+from study_app.haptics.model.layout import SAMPLE, records
+from study_app.haptics.model.limits import INERTIA_SHARE, Bearable, Entry
+from study_app.haptics.model.scene import Body, Drag, Ewma, Kalman, Knee, Liquid, Raw, Scene, Velocity
+from study_app.haptics.runtime.pack import pack
 
 PERIODS_S: Final = (0.5e-3, 1e-3, 2e-3, 4e-3)
 DELAYS: Final = (0, 1, 2, 3, 4)

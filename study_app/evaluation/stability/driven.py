@@ -38,16 +38,16 @@ from study_app.evaluation.stability.verdict import (
     swing,
     windows,
 )
-from study_app.haptics.cfunctions import Driver
-from study_app.haptics.clock import VirtualClock
-from study_app.haptics.compiled import kernel
-from study_app.haptics.dynamics import Dynamics
-from study_app.haptics.layout import new_command, new_reading, records
-from study_app.haptics.loop import CONTROL, ClockCalls, DeviceCalls, Output, Records, run
-from study_app.haptics.pack import pack
-from study_app.haptics.safety import new_safety
-from study_app.haptics.telemetry import Telemetry
-from study_app.haptics.vector import copy
+from study_app.haptics.kernels.c_functions import Driver
+from study_app.haptics.kernels.compiled import kernel
+from study_app.haptics.kernels.loop import CONTROL, ClockCalls, DeviceCalls, Output, Records, run
+from study_app.haptics.kernels.safety import new_safety
+from study_app.haptics.kernels.vector import copy
+from study_app.haptics.model.device_dynamics import Dynamics
+from study_app.haptics.model.layout import new_command, new_reading, records
+from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.pack import pack
+from study_app.haptics.runtime.telemetry import Telemetry
 
 DELAY: Final = 1
 """Ticks that a Falcon's force is late."""

@@ -1,6 +1,6 @@
 """A closed loop, compiled: the hand moves the handle, the servo's own tick answers, the motors act on the handle.
 
-The handle is that of ``haptics.plant``, or of the second plant, `arm`. The same motion can be played to the tick again
+The handle is that of ``haptics.kernels.plant``, or of the second plant, `arm`. The same motion can be played to the tick again
 without the force acting on anything. All sizes are at the hand.
 """
 
@@ -12,15 +12,15 @@ from typing import Any, Final
 import numpy as np
 
 from study_app.evaluation.stability.arm import ARM, advance, write_force
-from study_app.haptics.compiled import kernel
-from study_app.haptics.door import admit, watch
-from study_app.haptics.energy import log_acted, log_command, observe
-from study_app.haptics.kalman import take_force
-from study_app.haptics.loop import follow_delay
-from study_app.haptics.pace import next_turn, random
-from study_app.haptics.plant import measure, move, push
-from study_app.haptics.tick import report, respond, tick
-from study_app.haptics.vector import clear, copy, is_finite
+from study_app.haptics.kernels.compiled import kernel
+from study_app.haptics.kernels.estimators.kalman import take_force
+from study_app.haptics.kernels.loop import follow_delay
+from study_app.haptics.kernels.passivity import log_acted, log_command, observe
+from study_app.haptics.kernels.plant import measure, move, push
+from study_app.haptics.kernels.sample_validation import admit, watch
+from study_app.haptics.kernels.tick import report, respond, tick
+from study_app.haptics.kernels.tick_schedule import next_turn, random
+from study_app.haptics.kernels.vector import clear, copy, is_finite
 
 REACHES, CIRCLES, STROKE, SINE = range(4)
 

@@ -22,8 +22,8 @@ from study_app.evaluation.stability.boundary import (
     passive_nspm,
 )
 from study_app.evaluation.stability.verdict import Verdict
-from study_app.haptics.limits import slope_limit
-from study_app.haptics.scene import Ewma
+from study_app.haptics.model.limits import slope_limit
+from study_app.haptics.model.scene import Ewma
 
 FORMATS: Final = ("png", "svg")
 HEIGHT_PT: Final = 246.0

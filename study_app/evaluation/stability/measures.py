@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from study_app.haptics.compiled import kernel
+from study_app.haptics.kernels.compiled import kernel
 
 
 @kernel

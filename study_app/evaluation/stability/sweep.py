@@ -27,7 +27,7 @@ from study_app.evaluation.stability.fidelity import LOOPS, Fidelity, by_liquid
 from study_app.evaluation.stability.groups import Group
 from study_app.evaluation.stability.map import draw_map
 from study_app.evaluation.stability.verdict import REASONS, Verdict, judge
-from study_app.haptics.layout import LIMITER_NAMES
+from study_app.haptics.model.layout import LIMITER_NAMES
 from study_app.store.atomic import write_file
 
 Tell = Callable[[int, int], None]
@@ -182,7 +182,7 @@ def write(to: Path, swept: Swept, fidelities: Sequence[Fidelity]) -> tuple[Path,
 
 
 def write_limits(file: Path, tell: Tell | None = None) -> None:
-    """Measure the table of limits that `haptics.limits` reads, and write it.
+    """Measure the table of limits that `haptics.model.limits` reads, and write it.
 
     Raises
     ------

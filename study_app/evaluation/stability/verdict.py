@@ -34,8 +34,8 @@ from study_app.evaluation.stability.bench import FORCE_LIMIT_N, MOVING_S, Bench,
 from study_app.evaluation.stability.cases import LETS_GO, THROWN, Case
 from study_app.evaluation.stability.loop import begin, play
 from study_app.evaluation.stability.measures import fast_part, lowest_balance, smooth
-from study_app.haptics.layout import LIMITER_NAMES
-from study_app.haptics.limits import Bearable
+from study_app.haptics.model.layout import LIMITER_NAMES
+from study_app.haptics.model.limits import Bearable
 
 REASONS: Final = ("not finite", "limit", "energy", "oscillation", "force")
 

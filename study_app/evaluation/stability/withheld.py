@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from study_app.evaluation.stability.bench import new_bench
 from study_app.evaluation.stability.cases import Case, liquids
 from study_app.evaluation.stability.loop import TRACE, follow
-from study_app.haptics.layout import records
+from study_app.haptics.model.layout import records
 
 
 class Stroke(NamedTuple):

@@ -17,7 +17,7 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter
 from study_app.evaluation import style
 from study_app.evaluation.timing.found import LATE_NS, Lane, Timed
 from study_app.evaluation.timing.loops import NAMES, Kind
-from study_app.haptics.clock_grants import Level
+from study_app.haptics.runtime.clocks.grants import Level
 
 HEIGHT_PT: Final = 224.0
 TOP_PT: Final = 36.0

@@ -10,7 +10,7 @@ import numpy as np
 
 from study_app.evaluation.timing.load import LoadName
 from study_app.evaluation.timing.loops import NAMES, Kind, Taken, Whole
-from study_app.haptics.clock_grants import Grant, Level
+from study_app.haptics.runtime.clocks.grants import Grant, Level
 
 LATE_NS: Final = 1_000_000
 PERCENTILES: Final = (50.0, 90.0, 99.0, 99.9)

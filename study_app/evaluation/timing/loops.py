@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study_app.evaluation.timing.scene import FULL, PlayedHand
-from study_app.haptics.cfunctions import SLEEP, call_at
-from study_app.haptics.clock import SystemClock, VirtualClock, raise_priority
-from study_app.haptics.clock_grants import Grant
-from study_app.haptics.compiled import kernel
-from study_app.haptics.pack import elements_needed
-from study_app.haptics.servo import Servo
+from study_app.haptics.kernels.c_functions import SLEEP, call_at
+from study_app.haptics.kernels.compiled import kernel
+from study_app.haptics.runtime.clocks.clock import SystemClock, VirtualClock, raise_priority
+from study_app.haptics.runtime.clocks.grants import Grant
+from study_app.haptics.runtime.pack import elements_needed
+from study_app.haptics.runtime.servo import Servo
 
 Kind: TypeAlias = Literal["servo", "bare", "thread", "qt"]
 Whole: TypeAlias = NDArray[np.int64]

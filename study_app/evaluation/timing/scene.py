@@ -8,10 +8,10 @@ from typing import Any, Final
 import numpy as np
 
 from study_app.evaluation.cost import hand
-from study_app.haptics.cfunctions import READ, READ_NEW, WRITE, c_function, record_at
-from study_app.haptics.dynamics import UNKNOWN
-from study_app.haptics.layout import READING, records
-from study_app.haptics.scene import Cylinder, Drag, Liquid, Scene, Vortex, Wake
+from study_app.haptics.kernels.c_functions import READ, READ_NEW, WRITE, c_function, record_at
+from study_app.haptics.model.device_dynamics import UNKNOWN
+from study_app.haptics.model.layout import READING, records
+from study_app.haptics.model.scene import Cylinder, Drag, Liquid, Scene, Vortex, Wake
 
 FULL: Final = Scene(
     liquids=(

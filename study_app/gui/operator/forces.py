@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study_app.gui.operator.health import TRACE_STEP_S, TRACE_WINDOW_S
-from study_app.haptics.layout import LIMITER_FADE, LIMITER_STOP
+from study_app.haptics.model.layout import LIMITER_FADE, LIMITER_STOP
 from study_app.lab.limiters import WORDS
 
 Floats = NDArray[np.float64]

@@ -14,9 +14,9 @@ from study_app.devices.falcon.emulated import EmulatedFalcon
 from study_app.devices.falcon.emulator.face import Emulator
 from study_app.devices.falcon.wire import ENDPOINT_IN, ERROR_TIMEOUT
 from study_app.errors import ServoFault
-from study_app.haptics import thread
-from study_app.haptics.cfunctions import READ_LOST
-from study_app.haptics.servo import Servo
+from study_app.haptics.kernels.c_functions import READ_LOST
+from study_app.haptics.runtime import thread
+from study_app.haptics.runtime.servo import Servo
 from tests.devices.falcon.turns import BULK_CALL, torques_in
 
 

@@ -12,9 +12,9 @@ if numba.config.DISABLE_JIT:
 from study_app.devices.falcon.emulated import EmulatedFalcon
 from study_app.devices.falcon.emulator.face import Emulator
 from study_app.devices.falcon.replies import FASTER_READS, GIVEN_UP_READS, RETEST_TURNS, SLOWER_READS
-from study_app.haptics.cfunctions import READ_NEW
-from study_app.haptics.clock import VirtualClock
-from study_app.haptics.servo import Servo
+from study_app.haptics.kernels.c_functions import READ_NEW
+from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.servo import Servo
 from tests.devices.falcon.turns import Turns, reply
 
 

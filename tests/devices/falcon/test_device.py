@@ -22,8 +22,8 @@ from study_app.devices.falcon.homing import PULL_OUT, READY, STROKES, NotHomed
 from study_app.devices.falcon.kinematics import REACHED, inverse, new_mechanism
 from study_app.devices.scripted import STIFFNESS_NPM
 from study_app.errors import DeviceError
-from study_app.haptics.cfunctions import READ_LOST, READ_NEW, READ_NOTHING_NEW
-from study_app.haptics.layout import BUTTON_STOP, new_reading
+from study_app.haptics.kernels.c_functions import READ_LOST, READ_NEW, READ_NOTHING_NEW
+from study_app.haptics.model.layout import BUTTON_STOP, new_reading
 from tests.devices.contract import write
 from tests.devices.falcon.test_firmware import stream
 

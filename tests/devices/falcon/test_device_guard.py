@@ -10,7 +10,7 @@ from study_app.devices.falcon.emulated import EmulatedFalcon
 from study_app.devices.falcon.homing import PULL_OUT
 from study_app.devices.falcon.weighing import Grip
 from study_app.errors import DeviceLost
-from study_app.haptics.cfunctions import READ_LOST, READ_NEW
+from study_app.haptics.kernels.c_functions import READ_LOST, READ_NEW
 from tests.devices.falcon.test_device import Turns, still
 
 

@@ -16,8 +16,8 @@ from study_app.devices.falcon.emulator.faults import CHANCES, SWITCHES
 from study_app.devices.falcon.failures import FalconFailure, UsbFailure
 from study_app.devices.falcon.homing import PULL_OUT, NotHomed
 from study_app.errors import DeviceError, DeviceLost, ServoFault
-from study_app.haptics.clock import VirtualClock
-from study_app.haptics.servo import Servo
+from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.servo import Servo
 from tests.devices.falcon.bridges import D2xx
 from tests.devices.falcon.test_firmware import stream
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from study_app.devices.falcon.emulator.arm import ARMS, bend, count, set_arms, strain
 from study_app.devices.falcon.geometry import GEOMETRIES
 from study_app.devices.falcon.kinematics import REACHED, inverse, jacobian, motor_units, new_mechanism, torques
-from study_app.haptics.layout import records
+from study_app.haptics.model.layout import records
 
 places = st.tuples(st.floats(-0.05, 0.05), st.floats(-0.03, 0.03), st.floats(-0.045, 0.03))
 geometries = st.sampled_from(sorted(GEOMETRIES))

@@ -17,7 +17,7 @@ from study_app.devices.falcon.wire import (
     ZERO,
     quiet_packet,
 )
-from study_app.haptics.cfunctions import READ_NEW, READ_NOTHING_NEW
+from study_app.haptics.kernels.c_functions import READ_NEW, READ_NOTHING_NEW
 from tests.devices.falcon.turns import (
     CENTRE_M,
     GROWTH_N,

@@ -17,8 +17,8 @@ from study_app.devices.falcon.wire import (
     ERROR_OVERFLOW,
     ERROR_TIMEOUT,
 )
-from study_app.haptics.cfunctions import READ_LOST, READ_NEW, READ_NOTHING_NEW
-from study_app.haptics.dynamics import MOST_DELAY
+from study_app.haptics.kernels.c_functions import READ_LOST, READ_NEW, READ_NOTHING_NEW
+from study_app.haptics.model.device_dynamics import MOST_DELAY
 from tests.devices.falcon.turns import (
     CENTRE_M,
     GROWTH_N,

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from study_app.devices.falcon.packets import PARSER, STATUS, feed, number, pack, put_number, strip
 from study_app.devices.falcon.wire import FLAG_BLUE, FLAG_HOMING, MOST_TORQUE, PACKET, quiet_packet
-from study_app.haptics.layout import records
+from study_app.haptics.model.layout import records
 
 # What a packet is, said once more and otherwise: the parser must find what this finds.
 VALID = re.compile(rb"<[\x41-\x50]{12}[\x41-\xc0][\x00-\xff]>", re.DOTALL)

@@ -10,8 +10,8 @@ if numba.config.DISABLE_JIT:
 from study_app.devices.falcon.emulated import EmulatedFalcon
 from study_app.devices.falcon.emulator.face import Emulator
 from study_app.devices.scripted import ScriptedDevice
-from study_app.haptics.clock import VirtualClock
-from study_app.haptics.servo import Servo
+from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.load import load
 
 RESTS_S = 0.6  # until the force has faded in

@@ -15,13 +15,13 @@ from study_app.devices import open_device
 from study_app.devices.falcon.emulator.face import Emulator
 from study_app.devices.falcon.emulator.server import EmulatorServer
 from study_app.devices.falcon.homing import PULL_OUT, READY, STROKES
-from study_app.haptics.clock import VirtualClock
-from study_app.haptics.servo import Servo
+from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.servo import Servo
 
 PUSHES_AND_DIES = """
 import os, signal, sys, time
 from study_app.devices import open_device
-from study_app.haptics.layout import new_command, new_reading
+from study_app.haptics.model.layout import new_command, new_reading
 device, reading, command = open_device(sys.argv[1]), new_reading(), new_command()
 command[0].force_n = (0.0, 0.0, 2.0)
 turns = 0

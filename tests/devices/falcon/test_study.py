@@ -16,10 +16,10 @@ from study_app.devices import scripted
 from study_app.devices.falcon.emulated import EmulatedFalcon
 from study_app.devices.falcon.emulator.face import Emulator
 from study_app.errors import SessionError
-from study_app.haptics.clock import VirtualClock
-from study_app.haptics.layout import STATUS_OK
-from study_app.haptics.limits import slew_limit_n
-from study_app.haptics.servo import Servo
+from study_app.haptics.model.layout import STATUS_OK
+from study_app.haptics.model.limits import slew_limit_n
+from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.load import load
 from study_app.session import rehearsal
 from study_app.session.strokes import exploration

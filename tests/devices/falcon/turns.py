@@ -11,9 +11,9 @@ from study_app.devices.falcon.geometry import GEOMETRIES
 from study_app.devices.falcon.kinematics import REACHED, inverse, new_mechanism
 from study_app.devices.falcon.packets import FLAGS_AT, NIBBLES, number, pack
 from study_app.devices.falcon.wire import ENDPOINT_IN, ERROR_TIMEOUT, HOMED_SHIFT, PACKET, SUCCESS, ZERO
-from study_app.haptics.dynamics import Dynamics
-from study_app.haptics.layout import new_command, new_reading
-from study_app.haptics.limits import SLEW_S, slew_limit_n
+from study_app.haptics.model.device_dynamics import Dynamics
+from study_app.haptics.model.layout import new_command, new_reading
+from study_app.haptics.model.limits import SLEW_S, slew_limit_n
 
 MS = 1_000_000
 GEOMETRY = GEOMETRIES["libnifalcon"]

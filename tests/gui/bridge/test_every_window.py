@@ -189,8 +189,8 @@ class Real(World):
 @pytest.fixture
 def real() -> Iterator[Real]:
     from study_app.devices.scripted import ScriptedDevice
-    from study_app.haptics.clock import VirtualClock
-    from study_app.haptics.servo import Servo
+    from study_app.haptics.runtime.clocks.clock import VirtualClock
+    from study_app.haptics.runtime.servo import Servo
 
     device = ScriptedDevice()
     with device, Servo(device, clock=VirtualClock(), elements=2000) as servo:

@@ -10,7 +10,7 @@ import pytest
 from study_app.gui.bridge import SessionBridge
 from study_app.gui.operator.force_plots import ForceCard
 from study_app.gui.operator.plots import HiddenForceCard
-from study_app.haptics.layout import LIMITER_FADE, LIMITER_NORM, SAMPLE, records
+from study_app.haptics.model.layout import LIMITER_FADE, LIMITER_NORM, SAMPLE, records
 from tests.gui.bridge.world import World, begin_trial
 
 

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from study_app.errors import StoreError
-from study_app.haptics.layout import SAMPLE, records
+from study_app.haptics.model.layout import SAMPLE, records
 from study_app.session.events import Continue
 from study_app.session.pages import TaskPage
 

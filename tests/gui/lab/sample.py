@@ -11,11 +11,11 @@ import numpy as np
 from PySide6.QtWidgets import QApplication
 
 from study_app.gui.lab.view import CostRow, DeviceShown, ErrorRow, LabView, Now
-from study_app.haptics.layout import SAMPLE, records
-from study_app.haptics.mirror import new_trail, take_again
-from study_app.haptics.pack import pack
-from study_app.haptics.safety import begin_scene, new_safety
-from study_app.haptics.scene import Scene
+from study_app.haptics.kernels.safety import begin_scene, new_safety
+from study_app.haptics.model.layout import SAMPLE, records
+from study_app.haptics.model.scene import Scene
+from study_app.haptics.runtime.pack import pack
+from study_app.haptics.runtime.recompute import new_trail, take_again
 from study_app.lab.limiters import LimiterCounts
 from study_app.lab.presets import spoken
 from study_app.lab.shadow import Shadow

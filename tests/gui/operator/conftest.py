@@ -11,7 +11,7 @@ import pytest
 from study_app.gui.operator.health import ServoHealth
 from study_app.gui.operator.progress import SessionProgress, stages
 from study_app.gui.operator.view import OperatorView, Session, operator_view
-from study_app.haptics.layout import SAMPLE, records
+from study_app.haptics.model.layout import SAMPLE, records
 from study_app.protocol.load import load
 from study_app.protocol.model import Protocol
 from study_app.protocol.schedule import Schedule, build_schedule

@@ -16,7 +16,7 @@ from study_app.gui.operator.forces import Forces
 from study_app.gui.plots import STROKE, apart, step_for
 from study_app.gui.theme import DARK, LIGHT
 from study_app.gui.themed import dress
-from study_app.haptics.layout import SAMPLE, records
+from study_app.haptics.model.layout import SAMPLE, records
 
 LIMIT_N = 8.0
 SECONDS = 12.0

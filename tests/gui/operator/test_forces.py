@@ -9,7 +9,7 @@ import pytest
 
 from study_app.gui.operator.forces import ROWS, STEP_NS, Forces
 from study_app.gui.operator.health import TRACE_WINDOW_S
-from study_app.haptics.layout import (
+from study_app.haptics.model.layout import (
     LIMITER_FADE,
     LIMITER_NORM,
     LIMITER_SLEW,

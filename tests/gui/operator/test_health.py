@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from study_app.gui.operator.health import LATENESS_WINDOW_S, TRACE_WINDOW_S, ServoHealth
-from study_app.haptics.layout import SAMPLE, records
+from study_app.haptics.model.layout import SAMPLE, records
 
 
 def samples(count, first=0, lateness_ns=15_000, period_ns=1_000_000):

@@ -18,7 +18,7 @@ from study_app.gui.operator.arrangement import LEAST_BELOW
 from study_app.gui.operator.force_plots import ForceCard
 from study_app.gui.operator.forces import Forces
 from study_app.gui.operator.stop import LEAST_HEIGHT, LEAST_WIDTH
-from study_app.haptics.layout import LIMITER_NORM, SAMPLE, records
+from study_app.haptics.model.layout import LIMITER_NORM, SAMPLE, records
 
 SIZES = (
     (1024, 640),

@@ -14,8 +14,8 @@ from study_app.gui.preflight import PreflightWindow
 from study_app.gui.preflight.view import WAITING, histogram, preflight_view, resumed_rows
 from study_app.gui.preflight.window import LEAST
 from study_app.gui.theme import DARK
-from study_app.haptics.clock_grants import Grant
-from study_app.haptics.telemetry import Timing
+from study_app.haptics.runtime.clocks.grants import Grant
+from study_app.haptics.runtime.telemetry import Timing
 from study_app.protocol.load import load
 from study_app.protocol.schedule import build_schedule
 from study_app.session.preflight import Facts, Screen, checks

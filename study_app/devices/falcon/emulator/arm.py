@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from study_app.devices.falcon.geometry import Geometry
-from study_app.haptics.compiled import kernel
-from study_app.haptics.vector import norm
+from study_app.haptics.kernels.compiled import kernel
+from study_app.haptics.kernels.vector import norm
 
 ARMS = np.dtype(
     [

@@ -14,7 +14,7 @@ import numpy as np
 from study_app.devices.falcon import wire
 from study_app.devices.falcon.emulator.faults import ECHO, ECHO_PREFIX, GLUED, strikes
 from study_app.devices.falcon.emulator.ftdi import answer
-from study_app.haptics.compiled import kernel
+from study_app.haptics.kernels.compiled import kernel
 
 WAITING, RESET, PINGED, LOADING, STUCK, RUNNING = range(6)
 """Has power; was reset by DTR; answered a ping; knows the speed; understood nothing; has its program."""

@@ -35,7 +35,7 @@ from study_app.devices.falcon.emulator.host import (
 from study_app.devices.falcon.geometry import DEFAULT_GEOMETRY, Geometry, geometry_named
 from study_app.devices.hand_orders import HandOrders
 from study_app.devices.scripted import TREMOR_M, new_scripted_handle
-from study_app.haptics.layout import records
+from study_app.haptics.model.layout import records
 
 STOPS_M = (0.055, 0.055, 0.050)
 """Half extents of the housing about the hand's origin: beyond any place a hand is sent to."""

@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 
 from study_app.errors import DeviceError
-from study_app.haptics.compiled import kernel
+from study_app.haptics.kernels.compiled import kernel
 
 CHANCES: Final = ("drop", "truncate", "corrupt", "duplicate", "delay", "stall", "echo", "glued", "echo_prefix")
 """A reply lost, cut to 14 bytes, with a wrong byte, sent twice or late; a device that hears nothing for a while; a byte

@@ -16,8 +16,8 @@ from typing import Any, Final
 import numpy as np
 
 from study_app.devices.falcon import wire
-from study_app.haptics.cfunctions import record_at
-from study_app.haptics.compiled import kernel
+from study_app.haptics.kernels.c_functions import record_at
+from study_app.haptics.kernels.compiled import kernel
 
 OUT_RING: Final = 4096
 BACK_RING: Final = 4096

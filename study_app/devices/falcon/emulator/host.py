@@ -19,9 +19,9 @@ from study_app.devices.falcon.emulator.faults import FAULTS, draw
 from study_app.devices.falcon.emulator.ftdi import BRIDGE, OUT_RING, byte_at
 from study_app.devices.falcon.emulator.run import LONGEST_NS, RUN, live, work
 from study_app.devices.hand import HAND
-from study_app.haptics.cfunctions import c_function, record_at
-from study_app.haptics.compiled import kernel
-from study_app.haptics.plant import HANDLE
+from study_app.haptics.kernels.c_functions import c_function, record_at
+from study_app.haptics.kernels.compiled import kernel
+from study_app.haptics.kernels.plant import HANDLE
 
 EMULATOR = np.dtype(
     [

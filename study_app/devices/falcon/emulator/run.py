@@ -25,8 +25,8 @@ from study_app.devices.falcon.emulator.faults import (
 )
 from study_app.devices.falcon.emulator.ftdi import answer
 from study_app.devices.hand import REACH, move_hand
-from study_app.haptics.compiled import kernel
-from study_app.haptics.plant import move, push
+from study_app.haptics.kernels.compiled import kernel
+from study_app.haptics.kernels.plant import move, push
 
 STROKE_NOW, STROKE_ASKED = 1, 2
 

@@ -1,0 +1,1 @@
+"""The compiled force model and loop."""

@@ -1,0 +1,127 @@
+"""The C functions the servo calls: signatures, how to compile one, and how an address becomes records.
+
+A device and a clock are each a few C functions and the address of their own memory (``context``). The compiled loop
+gets addresses as plain numbers, so that one specialisation serves all of them. Simulated ones are ``numba.cfunc``; a
+driver in C offers its functions as anything that has an ``address``.
+
+==========  ======================================================================================================
+``READ``    ``int32 (intp context, int64 now_ns, intp reading)``: fill the ``layout.READING`` record at the address
+            ``reading``, no further than its ``size_bytes``; return ``READ_NEW``, ``READ_NOTHING_NEW`` or ``READ_LOST``
+``WRITE``   ``int32 (intp context, intp command)``: send the force of the ``layout.COMMAND`` record at the address
+            ``command``; where another force is sent, say so in it; return 0, or ``READ_LOST``
+``NOW``     ``int64 (intp context)``: monotonic time [ns]
+``SLEEP``   ``int64 (intp context, int64 deadline_ns)``: return not before the deadline; gives the time then [ns]
+==========  ======================================================================================================
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Protocol
+
+import numba
+import numpy as np
+from llvmlite import ir
+from numba import from_dtype, types
+from numba.core import cgutils
+from numba.extending import intrinsic
+
+from study_app.haptics.kernels.compiled import CACHE  # decided before the first is made
+from study_app.haptics.model.device_dynamics import Dynamics
+
+READ = types.int32(types.intp, types.int64, types.intp)
+WRITE = types.int32(types.intp, types.intp)
+NOW = types.int64(types.intp)
+SLEEP = types.int64(types.intp, types.int64)
+
+READ_NEW = 0
+READ_NOTHING_NEW = 1
+READ_LOST = -1
+
+
+class Driver(Protocol):
+    """What the servo needs of a device, and no more (``devices.base.Device`` is the whole).
+
+    ``name`` is the word that ``open_device`` takes, ``read`` and ``write`` are C functions (whatever has an
+    ``address``), ``context`` is the address of the device's own memory, handed to both, ``force_limit_n`` the
+    greatest force it may be asked for [N], and ``dynamics`` what it measured of itself when it was opened.
+    """
+
+    name: str
+    read: Any
+    write: Any
+    context: int
+    force_limit_n: float
+
+    @property
+    def dynamics(self) -> Dynamics:
+        """What it measured of itself when it was opened."""
+        ...
+
+
+_alloca_once: Any = cgutils.alloca_once
+_unpack_tuple: Any = cgutils.unpack_tuple
+_StarArgTuple: Any = types.StarArgTuple
+
+
+def c_function(signature: Any, function: Callable[..., Any]) -> Any:
+    """Compile ``function`` as a C function of ``signature``, kept on disk like every kernel."""
+    return numba.cfunc(signature, cache=CACHE is not None, error_model="numpy")(function)
+
+
+def external(symbol: str, signature: Any) -> Any:
+    """Return the system's C function ``symbol`` for compiled code to call."""
+    return types.ExternalFunction(symbol, signature)
+
+
+def call_at(signature: Any) -> Any:
+    """Return a function for compiled code: (address, *arguments) -> what the C function at the address returns."""
+
+    def call(_typing_context: Any, _address: Any, *_arguments: Any) -> Any:
+        def generate(context: Any, builder: Any, _signature: Any, values: Any) -> Any:
+            returned = context.get_value_type(signature.return_type)
+            taken = [context.get_value_type(argument) for argument in signature.args]
+            function = builder.inttoptr(values[0], ir.FunctionType(returned, taken).as_pointer())
+            return builder.call(function, _unpack_tuple(builder, values[1]))
+
+        return signature.return_type(types.intp, _StarArgTuple.from_types(signature.args)), generate
+
+    return intrinsic(call)
+
+
+def record_at(dtype: np.dtype[Any]) -> Any:
+    """Return a function for compiled code: an address (intp) -> the record of ``dtype`` that lives there."""
+    record: Any = from_dtype(dtype)
+
+    def cast(_typing_context: Any, _address: Any) -> Any:
+        def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+            return builder.inttoptr(arguments[0], context.get_value_type(record))
+
+        return record(types.intp), generate
+
+    return intrinsic(cast)
+
+
+def stack_memory(words: int) -> Any:
+    """Return a function for compiled code: -> the address (intp) of ``words`` 8-byte words on its own stack."""
+    block = ir.ArrayType(ir.IntType(64), words)
+
+    def allocate(_typing_context: Any) -> Any:
+        def generate(context: Any, builder: Any, _signature: Any, _arguments: Any) -> Any:
+            return builder.ptrtoint(_alloca_once(builder, block), context.get_value_type(types.intp))
+
+        return types.intp(), generate
+
+    return intrinsic(allocate)
+
+
+def _order_memory(_typing_context: Any) -> Any:
+    def generate(context: Any, builder: Any, _signature: Any, _arguments: Any) -> Any:
+        builder.fence("acq_rel")
+        return context.get_dummy_value()
+
+    return types.none(), generate
+
+
+fence: Any = intrinsic(_order_memory)
+"""For compiled code: other threads see what was written before it before what is written after it."""

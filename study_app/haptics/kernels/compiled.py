@@ -1,0 +1,138 @@
+"""How this package compiles: one decorator, and one cache that no edit can leave stale.
+
+numba keys its on-disk cache on the file of the outermost function alone, so a change in a function it calls would go
+unseen. The cache therefore lives in a folder named after a digest of every source file that may hold kernels; those of
+other sources go when they are old.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import logging
+import os
+import re
+import secrets
+import shutil
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+import numba
+from numba.core.options import DefaultOptions
+
+log = logging.getLogger(__name__)
+
+_PACKAGE = Path(__file__).resolve().parents[2]
+_KERNEL_FOLDERS = ("haptics", "devices", "evaluation", "validation")
+
+KEPT_FOLDERS = 8  # of caches so many stay however old they are
+UNUSED_S = 86_400.0  # no program that runs since less than a day loses its cache
+SWEPT_AT_ONCE = 8  # what removing may take of a start
+_DIGEST = re.compile(r"[0-9a-f]{16}")
+_HALF_REMOVED = re.compile(r"\.[0-9a-f]{16}\.[0-9a-f]{8}\.gone")
+
+_OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
+# numba's own name for it, which its stubs do not know; without it ticks are slower, and just as right.
+_NO_MEMORY: dict[str, Any] = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def _digest_of_sources() -> str:
+    digest = hashlib.sha256()
+    for folder in _KERNEL_FOLDERS:
+        for source in sorted((_PACKAGE / folder).rglob("*.py")):
+            digest.update(source.relative_to(_PACKAGE).as_posix().encode())
+            digest.update(source.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _user_cache() -> Path:
+    if sys.platform == "win32":
+        return Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData" / "Local")) / "liquid-study"
+    if sys.platform == "darwin":
+        return Path.home() / "Library" / "Caches" / "liquid-study"
+    return Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "liquid-study"
+
+
+def _use_own_cache() -> Path | None:
+    """Use the first folder that can be written, and say which if it is not the first; without one, none."""
+    wanted = [*map(Path, filter(None, [os.environ.get("NUMBA_CACHE_DIR")])), _user_cache()]
+    digest = _digest_of_sources()
+    for place in wanted:
+        if _writable(place / digest):
+            if place is not wanted[0]:
+                log.warning("%s cannot be written: what is compiled is kept in %s", wanted[0], place)
+            vars(numba.config)["CACHE_DIR"] = str(place / digest)
+            sweep_caches(place / digest)
+            return place / digest
+    places = " and ".join(map(str, wanted))
+    log.warning(
+        "%s cannot be written: every start compiles anew, for up to a minute; name a folder in NUMBA_CACHE_DIR", places
+    )
+    return None
+
+
+def _writable(folder: Path) -> bool:
+    """Make a folder and say that it is used now; return whether it can be written."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        os.utime(folder)
+    except OSError:
+        return False
+    return os.access(folder, os.W_OK)
+
+
+def sweep_caches(own: Path) -> None:
+    """Remove caches beside ``own`` that no program used for a day, but for the newest.
+
+    A cache says by its time of change when a program last began with it. It is renamed before it is removed, so that of
+    two programs that sweep at once each removes what it renamed. A program that begins with it meanwhile gets it back,
+    and numba makes anew what is missing. What cannot be removed stays.
+    """
+    with contextlib.suppress(OSError):
+        beside = [path for path in own.parent.iterdir() if path != own and path.is_dir()]
+        for left in (path for path in beside if _HALF_REMOVED.fullmatch(path.name)):
+            shutil.rmtree(left, ignore_errors=True)
+        caches = sorted((path.stat().st_mtime, path) for path in beside if _DIGEST.fullmatch(path.name))
+        for used_at, path in caches[: max(0, len(caches) + 1 - KEPT_FOLDERS)][:SWEPT_AT_ONCE]:
+            if time.time() - used_at > UNUSED_S:
+                _remove_cache(path, used_at)
+
+
+def _remove_cache(path: Path, used_at: float) -> None:
+    """Remove a cache, unless a program has begun with it since ``used_at`` [s since 1970]."""
+    gone = path.with_name(f".{path.name}.{secrets.token_hex(4)}.gone")
+    with contextlib.suppress(OSError):
+        path.rename(gone)
+        if gone.stat().st_mtime != used_at:
+            gone.rename(path)
+        else:
+            shutil.rmtree(gone)
+
+
+CACHE: Path | None = _use_own_cache()
+"""Where what is compiled is kept; None where nothing can be."""
+_OPTIONS["cache"] = CACHE is not None
+
+
+def kernel(function: F) -> F:
+    """Compile ``function`` for the servo: no interpreter lock, IEEE arithmetic, division by zero gives infinity.
+
+    numba's memory management is off: code that would allocate does not compile, and arrays that are handed on are not
+    counted, which took two thirds of a tick. They live as long as whoever called from Python holds them.
+    """
+    return cast(F, numba.njit(**_OPTIONS, **_NO_MEMORY)(function))
+
+
+def part(function: F) -> F:
+    """Compile ``function`` into each kernel that calls it: for the steps of a tick, which hand on whole models."""
+    return cast(F, numba.njit(**_OPTIONS, **_NO_MEMORY, forceinline=True)(function))
+
+
+def workings(function: F) -> F:
+    """Compile ``function`` for evaluation, not for the servo: like `kernel`, but it may make arrays."""
+    return cast(F, numba.njit(**_OPTIONS)(function))

@@ -1,0 +1,28 @@
+"""Buoyancy: the liquid carries the ball, and the ball has a weight."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from study_app.haptics.kernels.compiled import part
+from study_app.haptics.model.layout import EFFECT_BUOYANCY
+
+
+@part
+def carry(model: Any) -> None:
+    """Add (Σ ρ V_sub − ρ_body V) g, upward [N], to the force (Archimedes); V_sub is the ball's volume in each liquid.
+
+    The weight counts once, where any liquid that asks for buoyancy is, or is below: a ball that rises through the
+    surface goes on weighing, so its force has no step there. [choice] Without a surface it comes and goes with the
+    border.
+    """
+    parameters, state = model.parameters[0], model.state[0]
+    lift_n = 0.0
+    weighing = 0.0
+    for i in range(parameters.liquids):
+        liquid, local = model.liquids[i], model.liquid_states[i]
+        if liquid.effects & EFFECT_BUOYANCY:
+            lift_n += liquid.buoyancy.lift_n * local.share
+            weighing += local.border
+    state.lift_n[1] = lift_n - parameters.weight_n * min(weighing, 1.0)
+    state.force_n[1] += state.lift_n[1]

@@ -1,0 +1,140 @@
+"""History: the boundary layer around the ball remembers how it was accelerated.
+
+The Basset–Boussinesq force of creeping flow (Landau & Lifshitz, Fluid Mechanics, §24),
+
+    F = −6 R² √(πρµ) φ ∫ dw/dτ (t − τ)^(−½) dτ ,
+
+with w piecewise linear between ticks. Intervals younger than the window are integrated as they are; for the rest the
+kernel 1/√τ is replaced by ten exponentials Σ a_i √(e/t_i) e^(−τ/2t_i), t_i = t̃_i · window (van Hinsberg, ten Thije
+Boonkkamp & Clercx 2011, J. Comput. Phys. 230:1465): within 0.7 % up to 100 windows, and each sum decays by itself. At
+Reynolds numbers far above 1 the true force fades sooner; this is an upper bound.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from study_app.haptics.kernels.compiled import part
+from study_app.haptics.kernels.vector import clear
+from study_app.haptics.model.effects.records import EXPONENTIALS
+from study_app.haptics.model.layout import Record
+
+TIMES = (0.1, 0.3, 1.0, 3.0, 10.0, 40.0, 190.0, 1000.0, 6500.0, 50000.0)  # t̃_i
+WEIGHTS = (
+    0.23477481312586,
+    0.28549576238194,
+    0.28479416718255,
+    0.26149775537574,
+    0.32056200511938,
+    0.35354490689146,
+    0.39635904496921,
+    0.42253908596514,
+    0.48317384225265,
+    0.63661146557001,
+)  # a_i
+NOTHING = 1e-30
+ROUNDING_S = 1e-9  # so that a window of whole ticks holds as many of them, however their sum is rounded
+
+
+@part
+def remember(
+    liquid: Record, local: Record, state: Record, intervals: Any, exponentials: Any, interval_s: float
+) -> None:
+    """Add the history force, (3,) [N], to the force; φ is the share of the volume in the liquid.
+
+    w is smoothed over τ before, as for the added mass.
+    """
+    history, tracks = liquid.history, local.history
+    if tracks.primed == 0:
+        _begin(history, tracks, local.relative_mps, exponentials)
+    _fade(history, exponentials, interval_s)
+    _append(history, tracks, local.relative_mps, intervals, interval_s)
+    clear(tracks.force_n)
+    oldest_s = _integrate(history, tracks, intervals)
+    for i in range(EXPONENTIALS):
+        exponential = exponentials[history.tail_row + i]
+        for axis in range(3):
+            tracks.force_n[axis] += exponential.memory[axis]
+    _hand_on(history, tracks, intervals, exponentials, oldest_s)
+    for axis in range(3):
+        tracks.force_n[axis] *= -history.factor_kg_rs * local.share
+        state.force_n[axis] += tracks.force_n[axis]
+
+
+@part
+def _begin(history: Record, tracks: Record, w: Any, exponentials: Any) -> None:
+    """Begin at the present velocity, as if it had always been so."""
+    tracks.primed = 1
+    tracks.first = 0
+    tracks.held = 0
+    for axis in range(3):
+        tracks.smoothed_mps[axis] = w[axis] if abs(w[axis]) > NOTHING else 0.0
+    for i in range(EXPONENTIALS):
+        clear(exponentials[history.tail_row + i].memory)
+
+
+@part
+def _fade(history: Record, exponentials: Any, interval_s: float) -> None:
+    """Let the exponentials decay over Δt."""
+    for i in range(EXPONENTIALS):
+        exponential = exponentials[history.tail_row + i]
+        keep = math.exp(-0.5 * interval_s / (TIMES[i] * history.window_s))
+        for axis in range(3):
+            kept = keep * exponential.memory[axis]
+            exponential.memory[axis] = kept if abs(kept) > NOTHING else 0.0
+
+
+@part
+def _append(history: Record, tracks: Record, w: Any, intervals: Any, interval_s: float) -> None:
+    """Put the newest interval into the window; there is room for it. What is left of w at rest ends as 0."""
+    weight = -math.expm1(-history.filter_per_s * interval_s)
+    newest = intervals[history.row + _wrapped(tracks.first + tracks.held, history.rows)]
+    for axis in range(3):
+        change_mps = weight * (w[axis] - tracks.smoothed_mps[axis])
+        if abs(tracks.smoothed_mps[axis] + change_mps) <= NOTHING:
+            change_mps = -tracks.smoothed_mps[axis]
+        tracks.smoothed_mps[axis] += change_mps
+        newest.acceleration_mps2[axis] = change_mps / interval_s
+    newest.duration_s = interval_s
+    tracks.held += 1
+
+
+@part
+def _integrate(history: Record, tracks: Record, intervals: Any) -> float:
+    """Add ∫ dw/dτ (t − τ)^(−½) dτ over the window to the force; return how long ago its oldest interval began."""
+    age_s = root = 0.0
+    for back in range(1, tracks.held + 1):
+        interval = intervals[history.row + _wrapped(tracks.first + tracks.held - back, history.rows)]
+        age_s += interval.duration_s
+        longer = math.sqrt(age_s)
+        weight = 2.0 * (longer - root)
+        root = longer
+        for axis in range(3):
+            tracks.force_n[axis] += weight * interval.acceleration_mps2[axis]
+    return age_s
+
+
+@part
+def _hand_on(history: Record, tracks: Record, intervals: Any, exponentials: Any, oldest_s: float) -> None:
+    """Move intervals that are older than the window into the exponentials, the oldest also where rows run out."""
+    while tracks.held > 0:
+        interval = intervals[history.row + tracks.first]
+        ended_s = oldest_s - interval.duration_s
+        if ended_s < history.window_s - ROUNDING_S and tracks.held < history.rows:
+            return
+        for i in range(EXPONENTIALS):
+            time_s = TIMES[i] * history.window_s
+            share = math.exp(-0.5 * ended_s / time_s) * -math.expm1(-0.5 * interval.duration_s / time_s)
+            weight = 2.0 * WEIGHTS[i] * math.sqrt(math.e * time_s) * share
+            exponential = exponentials[history.tail_row + i]
+            for axis in range(3):
+                exponential.memory[axis] += weight * interval.acceleration_mps2[axis]
+        oldest_s = ended_s
+        tracks.first = _wrapped(tracks.first + 1, history.rows)
+        tracks.held -= 1
+
+
+@part
+def _wrapped(number: int, rows: int) -> int:
+    return number if number < rows else number - rows

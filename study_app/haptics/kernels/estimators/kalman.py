@@ -1,0 +1,211 @@
+"""A Kalman filter of velocity that knows the force just sent and learns the mass that the force moves.
+
+Per axis the state is position, velocity and acceleration, driven by white jerk of density q that grows with speed and
+acceleration; all axes share one covariance. The force, delayed as the loop is believed to be, passes two high-pass
+filters, since only its fast part is certain to meet the device's own mass and not the hand. Its effect is the state's
+response to it at 1 kg, V, times the inverse mass θ, estimated separately: a two-stage filter (Friedland 1969, IEEE TAC
+14:359). So the estimate lags neither behind the hand nor behind what the loop itself does to the handle.
+
+A position that stays the same while the handle must have moved is a sample that the device repeated: it is passed over,
+but a second one in a row is believed. Innovations far outside their variance for 20 ms, or a delay that changes, are
+trouble: from that tick on the estimate is that of EWMA, which runs along, and after a second without trouble the
+filter's again. What is then between the two is carried and fades, so that the estimate does not jump.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from study_app.haptics.kernels.compiled import part
+from study_app.haptics.kernels.vector import copy, square
+from study_app.haptics.model.layout import Record
+
+JERK_M2PS5: Final = 0.5
+JERK_OF_SPEED_PS3: Final = 4000.0
+JERK_OF_ACCELERATION_PS: Final = 20.0
+TIMING_S: Final = 20e-6
+"""Standard deviation of a sample's time."""
+CORNER_RADPS: Final = 2.0 * math.pi * 6.0
+"""Of both high-pass filters."""
+USUAL_PER_KG: Final = 1.5
+LEARNING_PKG2S: Final = 10.0
+"""By how much the variance of θ grows in a second [1/(kg² s)]."""
+FORGETTING_S: Final = 0.5
+"""How fast θ returns to what is usual."""
+FIRST_SPEED_MPS: Final = 0.01
+FIRST_ACCELERATION_MPS2: Final = 1.0
+
+TROUBLE: Final = 16.0
+"""Mean of Σ innovation² / its variance over three axes, from which on it is far outside; single ones count up to twice
+that."""
+REPEATED: Final = 9.0
+"""Innovation² / its variance from which on an unchanged position is taken for a repeated sample."""
+TROUBLE_S: Final = 20e-3
+"""Over what time."""
+QUIET_S: Final = 1.0
+CARRIED_S: Final = 10e-3
+NOTHING: Final = 1e-30
+"""Smaller values become 0: denormal numbers would slow arithmetic down [SI units]."""
+
+
+@part
+def begin_filter(parameters: Record, filtered: Record) -> None:
+    """Forget all motion and force; trust the filter."""
+    for axis in range(3):
+        filtered.passed_n[axis] = filtered.input_n[axis] = 0.0
+        filtered.offset_m[axis] = filtered.velocity_mps[axis] = filtered.acceleration_mps2[axis] = 0.0
+        filtered.response_m[axis] = filtered.response_mps[axis] = filtered.response_mps2[axis] = 0.0
+        filtered.estimate_mps[axis] = filtered.smoothed_mps[axis] = filtered.carried_mps[axis] = 0.0
+    copy(filtered.force_n, filtered.before_n)
+    filtered.covariance[0] = 0.5 * parameters.count_m * parameters.count_m
+    filtered.covariance[1] = filtered.covariance[2] = filtered.covariance[4] = 0.0
+    filtered.covariance[3] = FIRST_SPEED_MPS * FIRST_SPEED_MPS
+    filtered.covariance[5] = FIRST_ACCELERATION_MPS2 * FIRST_ACCELERATION_MPS2
+    filtered.per_kg = min(USUAL_PER_KG, 1.0 / parameters.mass_kg)
+    filtered.per_kg_variance = 0.25 * USUAL_PER_KG * USUAL_PER_KG
+    filtered.distrusted = 0
+    filtered.delay_ticks = filtered.believed_ticks
+    filtered.surprise = 0.0
+    filtered.quiet_s = 0.0
+    filtered.repeated = 0
+
+
+@part
+def take_force(state: Record, safety: Record) -> None:
+    """Take the mean force that acted since the last sample, as late as the loop is believed to be."""
+    account, filtered = safety.account, state.kalman
+    late = account.turn - safety.delay_ticks
+    late_n = account.acted_n[late if late >= 0 else late + account.acted_n.shape[0]]
+    lasted_s = account.impulse_s + safety.turn_s
+    for axis in range(3):
+        filtered.force_n[axis] = late_n[axis]
+        if lasted_s > 0.0:
+            filtered.force_n[axis] = (account.acted_impulse_ns[axis] + late_n[axis] * safety.turn_s) / lasted_s
+    filtered.believed_ticks = safety.delay_ticks
+
+
+@part
+def filter_velocity(parameters: Record, state: Record, interval_s: float) -> None:
+    """Bring ``state.estimate_mps`` to the newest position; EWMA's estimate is already in ``smoothed_mps``."""
+    filtered = state.kalman
+    _filter_force(filtered, interval_s)
+    ratio = _correct(parameters, state, filtered, interval_s)
+    distrusted = _distrust(filtered, ratio, interval_s)
+    share = interval_s / CARRIED_S
+    kept = 1.0 - share / (1.0 + share * (0.5 + share / 12.0))
+    for axis in range(3):
+        source_mps = filtered.smoothed_mps[axis] if distrusted else parameters.scale * filtered.estimate_mps[axis]
+        if distrusted != filtered.distrusted:
+            filtered.carried_mps[axis] = state.estimate_mps[axis] - source_mps
+        else:
+            filtered.carried_mps[axis] = _or_zero(kept * filtered.carried_mps[axis])
+        state.estimate_mps[axis] = source_mps + filtered.carried_mps[axis]
+    filtered.distrusted = distrusted
+
+
+@part
+def _filter_force(filtered: Record, interval_s: float) -> None:
+    """Pass the force through two high-pass filters of first order."""
+    x = CORNER_RADPS * interval_s
+    kept = 1.0 - x / (1.0 + x * (0.5 + x / 12.0))  # exp(-x) to 1e-4 over ten milliseconds
+    for axis in range(3):
+        force_n, passed_n = filtered.force_n[axis], filtered.passed_n[axis]
+        once_n = _or_zero(kept * (passed_n + force_n - filtered.before_n[axis]))
+        filtered.input_n[axis] = _or_zero(kept * (filtered.input_n[axis] + once_n - passed_n))
+        filtered.passed_n[axis] = once_n
+        filtered.before_n[axis] = force_n
+
+
+@part
+def _correct(parameters: Record, state: Record, filtered: Record, interval_s: float) -> float:
+    """Predict and correct state, response and inverse mass; return Σ innovation² / its variance over the axes."""
+    t, half = interval_s, 0.5 * interval_s * interval_s
+    speed_m2ps2 = square(filtered.estimate_mps)
+    jerk_m2ps5 = (
+        JERK_M2PS5 + JERK_OF_SPEED_PS3 * speed_m2ps2 + JERK_OF_ACCELERATION_PS * square(filtered.acceleration_mps2)
+    )
+    qt = jerk_m2ps5 * t
+    qh = jerk_m2ps5 * half
+    p = filtered.covariance
+    pv, pa, va = p[1] + t * p[3] + half * p[4], p[2] + t * p[4] + half * p[5], p[4] + t * p[5]
+    pp = p[0] + t * p[1] + half * p[2] + t * pv + half * pa + 0.2 * half * half * qt
+    vv = p[3] + t * p[4] + t * va + t * qh * (2.0 / 3.0)
+    pv += t * pa + 0.5 * half * qh
+    pa += t * qh / 3.0
+    va += qh
+    aa = p[5] + qt
+
+    variance_m2 = pp + 0.5 * parameters.count_m * parameters.count_m + TIMING_S * TIMING_S * speed_m2ps2
+    told = 1.0
+    if filtered.repeated:
+        filtered.repeated = 0
+    elif _repeats(parameters, state, filtered, t, variance_m2):
+        filtered.repeated = 1
+        told = 0.0
+    to_p, to_v, to_a = told * pp / variance_m2, told * pv / variance_m2, told * pa / variance_m2
+    p[0], p[1], p[2] = pp * (1.0 - to_p), pv * (1.0 - to_p), pa * (1.0 - to_p)
+    p[3], p[4], p[5] = vv - to_v * pv, va - to_v * pa, aa - to_a * pa
+
+    responses_m2 = products_m2 = squares_m2 = 0.0
+    per_m = 1.0 / parameters.scale
+    for axis in range(3):
+        v, a = filtered.velocity_mps[axis], filtered.acceleration_mps2[axis]
+        step_m = (state.position_m[axis] - state.previous_m[axis]) * per_m
+        offset_m = filtered.offset_m[axis] + t * v + half * a - step_m
+        filtered.offset_m[axis] = _or_zero(offset_m - to_p * offset_m)
+        filtered.velocity_mps[axis] = _or_zero(v + t * a - to_v * offset_m)
+        filtered.acceleration_mps2[axis] = _or_zero(a - to_a * offset_m)
+        rv, ra, input_n = filtered.response_mps[axis], filtered.response_mps2[axis], filtered.input_n[axis]
+        response_m = filtered.response_m[axis] + t * rv + half * (ra + input_n)
+        filtered.response_m[axis] = _or_zero(response_m - to_p * response_m)
+        filtered.response_mps[axis] = _or_zero(rv + t * (ra + input_n) - to_v * response_m)
+        filtered.response_mps2[axis] = _or_zero(ra - to_a * response_m)
+        left_m = -offset_m - response_m * filtered.per_kg
+        responses_m2 += response_m * response_m
+        products_m2 += response_m * left_m
+        squares_m2 += left_m * left_m
+
+    uncertain = filtered.per_kg_variance
+    gain = told * uncertain / (responses_m2 * uncertain + variance_m2)
+    per_kg = filtered.per_kg + gain * products_m2
+    per_kg += (USUAL_PER_KG - per_kg) * t / FORGETTING_S
+    filtered.per_kg = min(max(per_kg, 0.0), 1.0 / parameters.mass_kg)
+    filtered.per_kg_variance = uncertain - gain * uncertain * responses_m2 + LEARNING_PKG2S * t
+    for axis in range(3):
+        filtered.estimate_mps[axis] = filtered.velocity_mps[axis] + filtered.response_mps[axis] * filtered.per_kg
+    return float(told * squares_m2 / (variance_m2 + responses_m2 * uncertain))
+
+
+@part
+def _repeats(parameters: Record, state: Record, filtered: Record, t: float, variance_m2: float) -> bool:
+    """Return whether a sample is the one before where the handle must have moved on by far more than is uncertain."""
+    half, squares_m2 = 0.5 * t * t, 0.0
+    for axis in range(3):
+        if state.position_m[axis] != state.previous_m[axis]:
+            return False
+        response_m = filtered.response_m[axis] + t * filtered.response_mps[axis]
+        response_m += half * (filtered.response_mps2[axis] + filtered.input_n[axis])
+        left_m = filtered.offset_m[axis] + t * filtered.velocity_mps[axis] + half * filtered.acceleration_mps2[axis]
+        left_m += response_m * filtered.per_kg
+        squares_m2 += left_m * left_m
+    return squares_m2 > REPEATED * variance_m2
+
+
+@part
+def _distrust(filtered: Record, ratio: float, interval_s: float) -> int:
+    """Return 1 where EWMA is to be used at this tick, 0 where the filter is."""
+    share = interval_s / TROUBLE_S
+    weight = share / (1.0 + share * (0.5 + share / 12.0))
+    filtered.surprise += weight * (min(ratio, 2.0 * TROUBLE) - filtered.surprise)
+    filtered.quiet_s += interval_s
+    if filtered.surprise > TROUBLE or filtered.delay_ticks != filtered.believed_ticks:
+        filtered.quiet_s = 0.0
+        filtered.delay_ticks = filtered.believed_ticks
+        return 1
+    return 1 if filtered.distrusted and filtered.quiet_s < QUIET_S else 0
+
+
+@part
+def _or_zero(value: float) -> float:
+    return value if abs(value) > NOTHING else 0.0

@@ -1,0 +1,59 @@
+"""Where each liquid is: which one the body is in, and how much of it each one gets."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from study_app.haptics.kernels.compiled import part
+from study_app.haptics.kernels.effects.surface import submerge
+from study_app.haptics.model.layout import EFFECT_SURFACE, REGION_BOX, REGION_EVERYWHERE, Record
+
+HYSTERESIS_M = 1e-3
+FADE_S = 20e-3
+
+
+@part
+def share_out(model: Any, interval_s: float) -> None:
+    """Say how much of the body every liquid has: its share φ of the volume, and of the frontal area to begin with.
+
+    Where liquids overlap, the last listed counts, as far as the body is under its surface. At a border φ takes 20 ms
+    from 0 to 1, but starts at its end when a scene begins; a surface needs no time, there φ is the part below it.
+    """
+    parameters, state = model.parameters[0], model.state[0]
+    free = 1.0
+    for i in range(parameters.liquids - 1, -1, -1):
+        liquid, local = model.liquids[i], model.liquid_states[i]
+        surfaced = liquid.effects & EFFECT_SURFACE
+        local.inside = _contains(liquid.region, state.position_m, local.inside, surfaced)
+        target = free if local.inside else 0.0
+        step = interval_s / FADE_S if state.placed else 1.0
+        local.border += min(max(target - local.border, -step), step)
+        local.share = local.border
+        local.frontal = local.border
+        if surfaced:
+            submerge(liquid, local, state.position_m, parameters.radius_m)
+            local.share *= local.surface.volume
+            free *= 1.0 - local.inside * local.surface.volume
+        else:
+            free *= 1.0 - local.inside
+    state.placed = 1
+
+
+@part
+def _contains(region: Record, place_m: Any, inside: int, surfaced: int) -> int:
+    """Return 1 where ``place_m`` is in the region; a body that was inside leaves it 1 mm beyond the border.
+
+    With a surface, the top face is no border, and the region reaches up from it without end.
+    """
+    if region.kind == REGION_EVERYWHERE:
+        return 1
+    margin_m = HYSTERESIS_M if inside else 0.0
+    dx = abs(place_m[0] - region.centre_m[0])
+    dy = region.centre_m[1] - place_m[1] if surfaced else abs(place_m[1] - region.centre_m[1])
+    dz = abs(place_m[2] - region.centre_m[2])
+    if region.kind == REGION_BOX:
+        within = dx <= region.half_m[0] + margin_m and dz <= region.half_m[2] + margin_m
+    else:
+        within = math.sqrt(dx * dx + dz * dz) <= region.half_m[0] + margin_m
+    return 1 if within and dy <= region.half_m[1] + margin_m else 0

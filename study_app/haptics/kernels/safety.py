@@ -1,0 +1,216 @@
+"""What is sent to the hand: always the last step of a turn, in the hand frame [N].
+
+Order: slope limits on drag and inertia, finite, norm, fade, the energy account's weakening, slew, its settling, norm; a
+force stop or a fault goes past all of them to zero. The slew limit counts from the force of the turn before as it was
+without the settling: a brake that it remembered would go on acting after its time, and drive what it should damp.
+``lift_n``, what of the force is buoyancy and weight, is shortened along with it: the energy account needs it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from study_app.haptics.kernels.compiled import kernel, part
+from study_app.haptics.kernels.passivity import log_command, observe, open_account, settle, weaken
+from study_app.haptics.kernels.vector import clear, copy, distance, dot, is_finite, norm, square, square_distance
+from study_app.haptics.model.device_dynamics import BELIEVED_TICKS
+from study_app.haptics.model.layout import (
+    EFFECT_ADDED_MASS,
+    EFFECT_DRAG,
+    EFFECT_HISTORY,
+    LIMITER_ENERGY,
+    LIMITER_FADE,
+    LIMITER_NON_FINITE,
+    LIMITER_NORM,
+    LIMITER_SLEW,
+    LIMITER_SLOPE,
+    LIMITER_STALE,
+    LIMITER_STOP,
+    SAFETY,
+    STATUS_NON_FINITE,
+    Record,
+    records,
+)
+
+START_FADE_S = 0.5
+SCENE_FADE_S = 0.05
+FADE_OUT_S = 0.045
+LEAST_SLEW = 1.0 / 3.0
+"""Share of the slew limit that a fade gets, and a loop that has shown a great debt."""
+
+
+def new_safety(device_limit_n: float = math.inf, delay_ticks: int = BELIEVED_TICKS) -> Any:
+    """Return one SAFETY record, shape (1,), for a servo that is about to start: no force yet, 500 ms to full force.
+
+    ``delay_ticks`` is how many writes late a force is believed to act.
+    """
+    safety = records(SAFETY, 1)
+    safety[0].fade_s = START_FADE_S
+    open_account(safety[0].account)
+    safety[0].device_limit_n = device_limit_n
+    safety[0].delay_ticks = delay_ticks
+    return safety
+
+
+@kernel
+def begin_scene(safety: Record) -> None:
+    """Let the force of another scene fade in, its energy at 0; a start fade that is not over begins again.
+
+    A brake that was sent for the scene before is let go on the next turn, which says so.
+    """
+    settling = safety.account.settling
+    safety.fade = 0.0
+    open_account(safety.account)
+    safety.account.settling = settling
+
+
+@part
+def guard(model: Any, safety: Record, sample: Record, interval_s: float) -> None:
+    """Turn the force of the effects into the force to be sent, ``sample.device_force_n``.
+
+    ``interval_s`` is the time since the last accepted sample, 0 where this turn brought none.
+    """
+    parameters, state = model.parameters[0], model.state[0]
+    account = safety.account
+    force_n, lift_n = sample.device_force_n, account.lift_n
+    observe(model, safety, interval_s)
+    copy(lift_n, account.lift_before_n)
+    copy(state.force_n, force_n)
+    copy(state.lift_n, lift_n)
+    _limit_slope(model, safety, sample)
+    _limit_inertia(model, safety, sample)
+    if not (is_finite(force_n) and is_finite(lift_n)):
+        sample.limiters |= LIMITER_NON_FINITE
+        sample.status = STATUS_NON_FINITE
+        clear(force_n)
+        clear(lift_n)
+    limit_n = min(parameters.force_limit_n, safety.device_limit_n)
+    account.norm_share = min(limit_n / max(norm(force_n), limit_n), 1.0) if limit_n > 0.0 else 1.0
+    _limit_norm(force_n, lift_n, limit_n, sample)
+    _fade(force_n, lift_n, safety, sample)
+    copy(force_n, safety.permitted_n)
+    weaken(parameters, account, sample)
+    _limit_slew(force_n, parameters, state, safety, sample)
+    copy(force_n, safety.slewed_n)
+    settle(parameters, safety, sample)
+    _limit_norm(force_n, lift_n, limit_n, sample)
+    if safety.stop != 0 or safety.fault != 0:
+        _let_go(force_n, safety, sample)
+        clear(lift_n)
+        clear(safety.slewed_n)
+        clear(safety.permitted_n)
+    log_command(account, force_n)
+    copy(force_n, sample.command_n)
+    sample.delay_ticks = safety.delay_ticks
+    sample.permitted_n = norm(safety.permitted_n)
+    sample.withheld_n = distance(safety.permitted_n, force_n)
+
+
+@part
+def _limit_slope(model: Any, safety: Record, sample: Record) -> None:
+    """Shorten each drag to F·min(1, B|w|/|F|): a secant a sampled damper of the hand's mass stays stable under.
+
+    Where the body passes between liquids they share the limit B, so that their sum keeps it.
+    """
+    parameters = model.parameters[0]
+    shares = 0.0
+    for i in range(parameters.liquids):
+        shares += model.liquid_states[i].share
+    for i in range(parameters.liquids):
+        local = model.liquid_states[i]
+        if model.liquids[i].effects & EFFECT_DRAG and local.share > 0.0:
+            most_nspm = parameters.slope_limit_nspm[safety.delay_ticks] * local.share / shares
+            if square(local.drag.force_n) > most_nspm * most_nspm * square(local.relative_mps):
+                sample.limiters |= LIMITER_SLOPE
+                excess = 1.0 - most_nspm * norm(local.relative_mps) / norm(local.drag.force_n)
+                for axis in range(3):
+                    sample.device_force_n[axis] -= excess * local.drag.force_n[axis]
+
+
+@part
+def _limit_inertia(model: Any, safety: Record, sample: Record) -> None:
+    """Weaken added mass and history to what the loop bears (`pack`): fast motion meets them as dampers, too."""
+    for i in range(model.parameters[0].liquids):
+        liquid, local = model.liquids[i], model.liquid_states[i]
+        excess = 1.0 - liquid.inertia_share[safety.delay_ticks]
+        if excess > 0.0 and local.share > 0.0:
+            sample.limiters |= LIMITER_SLOPE
+            for axis in range(3):
+                if liquid.effects & EFFECT_ADDED_MASS:
+                    sample.device_force_n[axis] -= excess * local.added_mass.force_n[axis]
+                if liquid.effects & EFFECT_HISTORY:
+                    sample.device_force_n[axis] -= excess * local.history.force_n[axis]
+
+
+@part
+def _limit_norm(force_n: Any, lift_n: Any, limit_n: float, sample: Record) -> None:
+    """Shorten the force to the limit, keeping its direction."""
+    if square(force_n) > limit_n * limit_n:
+        sample.limiters |= LIMITER_NORM
+        _scale(force_n, lift_n, limit_n / norm(force_n))
+
+
+@part
+def _scale(force_n: Any, lift_n: Any, factor: float) -> None:
+    for axis in range(3):
+        force_n[axis] *= factor
+        lift_n[axis] *= factor
+
+
+@part
+def _fade(force_n: Any, lift_n: Any, safety: Record, sample: Record) -> None:
+    """Weaken the force while it fades in (start 500 ms, scene 50 ms) or out (no usable sample, or a late turn)."""
+    if safety.withheld or safety.late_s > 0.0:
+        sample.limiters |= safety.withheld if safety.withheld else LIMITER_STALE
+        lasted_s = max(safety.late_s, safety.turn_s if safety.withheld else 0.0)
+        safety.fade = max(safety.fade - lasted_s / FADE_OUT_S, 0.0)
+        if safety.late_s >= FADE_OUT_S:
+            safety.fade_s = START_FADE_S
+    else:
+        safety.fade = min(safety.fade + safety.turn_s / safety.fade_s, 1.0)
+    if safety.fade < 1.0:
+        sample.limiters |= LIMITER_FADE
+        _scale(force_n, lift_n, safety.fade)
+    else:
+        safety.fade_s = SCENE_FADE_S
+
+
+@part
+def _limit_slew(force_n: Any, parameters: Record, state: Record, safety: Record, sample: Record) -> None:
+    """Limit the change of the force from tick to tick (`limits.slew_limit_n`), without pushing the hand on thereby.
+
+    A loop that has shown an energy debt gets less, by the controller's gain; a fade the least. A force that is late to
+    let go at a reversal would do work on the hand: what of it lies along the motion, and is not wanted there, is
+    dropped at once.
+    """
+    most_n = parameters.slew_n * (LEAST_SLEW if safety.fade < 1.0 else max(safety.account.gain, LEAST_SLEW))
+    if square_distance(force_n, safety.slewed_n) <= most_n * most_n:
+        return
+    sample.limiters |= LIMITER_SLEW
+    account = safety.account
+    v_mps, lift_n, before_n = state.estimate_mps, account.lift_n, account.lift_before_n
+    wanted_nmps = dot(force_n, v_mps)
+    share = most_n / distance(force_n, safety.slewed_n)
+    for axis in range(3):
+        force_n[axis] = safety.slewed_n[axis] + (force_n[axis] - safety.slewed_n[axis]) * share
+        lift_n[axis] = before_n[axis] + (lift_n[axis] - before_n[axis]) * share
+    excess_nmps = dot(force_n, v_mps) - max(wanted_nmps, 0.0)
+    square_mps2 = square(v_mps)
+    if excess_nmps > 0.0 and square_mps2 > 0.0:  # the square of a speed below 1e-162 m/s is 0
+        for axis in range(3):
+            force_n[axis] -= excess_nmps * v_mps[axis] / square_mps2
+        if square_distance(force_n, safety.slewed_n) > most_n * most_n:
+            sample.limiters |= LIMITER_ENERGY
+
+
+@part
+def _let_go(force_n: Any, safety: Record, sample: Record) -> None:
+    """Zero force now; when let on again, the force fades in as at the start."""
+    if safety.stop != 0:
+        sample.limiters |= LIMITER_STOP
+    if safety.fault != 0:
+        sample.status = safety.fault
+    safety.fade = 0.0
+    safety.fade_s = START_FADE_S
+    clear(force_n)

@@ -1,0 +1,54 @@
+"""When the turns of a simulated servo come: late by some jitter, or not at all, as on a busy computer."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from study_app.haptics.kernels.compiled import kernel
+from study_app.haptics.model.layout import records
+
+PACE = np.dtype(
+    [
+        ("period_s", np.float64),
+        ("jitter_s", np.float64),  # a turn is late by anything up to this
+        ("missed", np.float64),  # share of the turns that do not come
+        ("late_s", np.float64),  # how late the last one was
+        ("random", np.uint64),
+    ],
+    align=True,
+)
+
+
+def new_pace(period_s: float, *, jitter_s: float = 0.0, missed: float = 0.0, seed: int = 1) -> Any:
+    """Return the record of a servo's pace; ``jitter_s`` must stay below the period, ``missed`` below 1."""
+    pace = records(PACE, 1)
+    pace.period_s = period_s
+    pace.jitter_s = jitter_s
+    pace.missed = missed
+    pace.random = 0x9E3779B97F4A7C15 ^ seed
+    return pace[0]
+
+
+@kernel
+def next_turn(pace: Any) -> float:
+    """Return the time until the servo's next turn [s]: its deadlines stay regular, it is late or misses some."""
+    turns = 1.0
+    while pace.missed > 0.0 and random(pace) < pace.missed:
+        turns += 1.0
+    before_s = pace.late_s
+    pace.late_s = pace.jitter_s * random(pace)
+    elapsed_s: float = turns * pace.period_s + pace.late_s - before_s
+    return elapsed_s
+
+
+@kernel
+def random(pace: Any) -> float:
+    """Return the next of a row of numbers spread evenly over [0, 1) (xorshift64, Marsaglia 2003)."""
+    x = pace.random
+    x ^= x << np.uint64(13)
+    x ^= x >> np.uint64(7)
+    x ^= x << np.uint64(17)
+    pace.random = x
+    return float(x >> np.uint64(11)) * 2.0**-53

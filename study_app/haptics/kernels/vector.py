@@ -1,0 +1,68 @@
+"""Vectors of three, in place: an array field of a record, shape (3,)."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from study_app.haptics.kernels.compiled import part
+
+
+@part
+def clear(vector: Any) -> None:
+    """Set it to zero."""
+    vector[0] = 0.0
+    vector[1] = 0.0
+    vector[2] = 0.0
+
+
+@part
+def copy(source: Any, to: Any) -> None:
+    """Set ``to`` to ``source``."""
+    x, y, z = source[0], source[1], source[2]  # all read before one is written: they travel together
+    to[0], to[1], to[2] = x, y, z
+
+
+@part
+def subtract(a: Any, b: Any, to: Any) -> None:
+    """Set ``to`` to a − b."""
+    x, y, z = a[0] - b[0], a[1] - b[1], a[2] - b[2]
+    to[0], to[1], to[2] = x, y, z
+
+
+@part
+def norm(vector: Any) -> float:
+    """Return its length."""
+    return math.sqrt(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2])
+
+
+@part
+def square(vector: Any) -> float:
+    """Return its length squared: enough to compare lengths, and no root."""
+    return float(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2])
+
+
+@part
+def dot(a: Any, b: Any) -> float:
+    """Return a · b."""
+    return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
+
+
+@part
+def distance(a: Any, b: Any) -> float:
+    """Return the length of a − b."""
+    x, y, z = a[0] - b[0], a[1] - b[1], a[2] - b[2]
+    return math.sqrt(x * x + y * y + z * z)
+
+
+@part
+def square_distance(a: Any, b: Any) -> float:
+    """Return the length of a − b, squared."""
+    x, y, z = a[0] - b[0], a[1] - b[1], a[2] - b[2]
+    return float(x * x + y * y + z * z)
+
+
+@part
+def is_finite(vector: Any) -> bool:
+    """Return whether all three are finite."""
+    return math.isfinite(vector[0]) and math.isfinite(vector[1]) and math.isfinite(vector[2])

@@ -1,0 +1,1 @@
+"""Scenes, liquids, bodies and limits as plain values; no compiler."""

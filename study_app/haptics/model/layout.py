@@ -1,0 +1,328 @@
+"""The memory that Python and compiled code share: shapes, units and meaning of every field, said here once.
+
+Records are rows of ``np.recarray``: compiled they are plain structs, uncompiled (``NUMBA_DISABLE_JIT=1``) they still
+have attributes. Positions and forces are float64; unless a name says otherwise, m, m/s, N, s.
+"""
+
+from __future__ import annotations
+
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from study_app.haptics.model.device_dynamics import MOST_DELAY
+from study_app.haptics.model.effects.records import (
+    ADDED_MASS,
+    ADDED_MASS_STATE,
+    BUOYANCY,
+    CURRENT,
+    CURRENT_STATE,
+    DRAG,
+    DRAG_STATE,
+    HISTORY,
+    HISTORY_STATE,
+    LOCAL_WAKE,
+    LOCAL_WAKE_STATE,
+    SURFACE_STATE,
+    WAKE,
+    WAKE_STATE,
+)
+from study_app.haptics.model.kalman_records import KALMAN_STATE
+
+Record: TypeAlias = Any  # one row of a recarray: fields as attributes, compiled or not
+
+# Limiters that acted in a tick, as bits of Sample.limiters.
+LIMITER_SLOPE = 1 << 0
+LIMITER_NON_FINITE = 1 << 1
+LIMITER_ENERGY = 1 << 2
+LIMITER_NORM = 1 << 3
+LIMITER_SLEW = 1 << 4
+LIMITER_FADE = 1 << 5
+LIMITER_STALE = 1 << 6
+LIMITER_GLITCH = 1 << 7  # the position was refused: nobody may believe it
+LIMITER_STOP = 1 << 8
+LIMITER_ESTIMATOR = 1 << 9  # the velocity is EWMA's: the Kalman filter was in trouble within the last second
+
+LIMITER_NAMES = ("slope", "non_finite", "energy", "norm", "slew", "fade", "stale", "glitch", "stop", "estimator")
+
+# Status of the servo, in Sample.status; the owner turns a fault into ServoFault.
+STATUS_OK = 0
+STATUS_STALE_FAULT = 1
+STATUS_DEVICE_LOST = 2
+STATUS_NON_FINITE = 3
+
+# The device button that stops the force, heard by the servo itself, as a bit of Sample.buttons: button 4.
+BUTTON_STOP = 1 << 3
+
+SAMPLE = np.dtype(
+    [
+        ("tick", np.int64),  # counts turns of the servo since it started
+        ("time_ns", np.int64),  # when the device was read, on the servo's monotonic clock
+        ("lateness_ns", np.int64),  # how late the turn began after its deadline
+        ("busy_ns", np.int64),  # how long the turn took, from reading to writing
+        ("scene", np.int64),  # serial number of the scene in force; 0 is rest (no liquid, no force)
+        ("position_m", np.float64, (3,)),  # device, hand frame
+        ("velocity_mps", np.float64, (3,)),  # scene frame, after estimator and knee
+        ("wake_mps", np.float64, (3,)),  # scene frame, as used by this tick's drag
+        ("force_n", np.float64, (3,)),  # sum of the effects on the body, before slope limit and safety
+        ("command_n", np.float64, (3,)),  # the force on the hand that the servo asked the device for
+        ("device_force_n", np.float64, (3,)),  # the force on the hand that the device sent
+        ("permitted_n", np.float64),  # size of the force after slope limits, norm and fades
+        ("withheld_n", np.float64),  # size of what passivity controller, slew limit and device changed of it
+        ("delay_ticks", np.int64),  # how many writes late a force is believed to act
+        ("buttons", np.int64),  # bit set: button 1 is bit 0
+        ("limiters", np.int64),  # LIMITER_* bits that acted
+        ("fresh", np.int64),  # 1 where the device reported a new sample
+        ("status", np.int64),  # STATUS_*
+    ],
+    align=True,
+)
+
+CONTRACT_VERSION = 1
+"""Of `READING` and `COMMAND`. Later versions append fields: a driver uses those that fit into ``size_bytes``."""
+
+READING = np.dtype(
+    [
+        ("version", np.int64),  # CONTRACT_VERSION, by the servo
+        ("size_bytes", np.int64),  # bytes of this record, by the servo: a driver writes nothing beyond
+        ("position_m", np.float64, (3,)),  # hand frame, after the driver's mapping
+        ("buttons", np.int64),
+        ("delay_ticks", np.int64),  # how many writes late a force acts, as measured while running; -1: not measured
+    ],
+    align=True,
+)
+
+COMMAND = np.dtype(
+    [
+        ("version", np.int64),  # CONTRACT_VERSION, by the servo
+        ("size_bytes", np.int64),  # bytes of this record, by the servo
+        ("force_n", np.float64, (3,)),  # to send: force on the hand, hand frame
+        ("sent_n", np.float64, (3,)),  # ``force_n``; a driver that sends another force puts that here
+    ],
+    align=True,
+)
+
+
+# What follows is the memory of one scene ("model", haptics.pack) and of the safety layer, in the scene frame unless
+# said otherwise. The fields of an effect sit in a record of their own (``effects.records``), untouched where the effect
+# is not asked for.
+
+# Effects a liquid asks for, as bits of Liquid.effects.
+EFFECT_DRAG = 1 << 0
+EFFECT_WAKE = 1 << 1
+EFFECT_LOCAL_WAKE = 1 << 2
+EFFECT_CURRENT = 1 << 3
+EFFECT_BUOYANCY = 1 << 4
+EFFECT_SURFACE = 1 << 5
+EFFECT_ADDED_MASS = 1 << 6
+EFFECT_HISTORY = 1 << 7
+
+REGION_EVERYWHERE = 0
+REGION_BOX = 1
+REGION_CYLINDER = 2
+
+ESTIMATOR_EWMA = 0
+ESTIMATOR_GIVEN = 1
+ESTIMATOR_LINE = 2
+ESTIMATOR_FOAW = 3
+ESTIMATOR_RAW = 4
+ESTIMATOR_KALMAN = 5
+
+KNEE_NONE = 0
+KNEE_SQRT = 1
+KNEE_SQUARE = 2
+
+PARAMETERS = np.dtype(
+    [
+        ("scale", np.float64),  # scene metres a hand metre
+        ("origin_m", np.float64, (3,)),  # where the hand's origin is
+        ("period_s", np.float64),  # nominal time between ticks
+        ("liquids", np.int64),  # how many of the liquids' rows count
+        ("effects", np.int64),  # EFFECT_* bits that any of them asks for
+        ("radius_m", np.float64),  # of the body
+        ("weight_n", np.float64),  # of the body
+        ("estimator", np.int64),  # ESTIMATOR_*
+        (
+            "log_keep_per_s",
+            np.float64,
+        ),  # ln(1 - α) a second: the share of the old velocity kept after t is exp of it · t
+        ("window_samples", np.int64),  # of line and foaw: the most samples they look at
+        ("tolerance_m", np.float64),  # of foaw, in the scene
+        ("knee_law", np.int64),  # KNEE_*
+        ("knee_threshold_mps", np.float64),
+        ("slope_limit_nspm", np.float64, (MOST_DELAY + 1,)),  # greatest |drag| / |w| [N·s/m, scene], by the delay
+        ("force_limit_n", np.float64),
+        ("slew_n", np.float64),  # the most that the force changes within a tick, while the loop shows no energy debt
+        ("filter_lag_s", np.float64),  # mean delay of the velocity estimator, as far as it stores energy
+        ("fallback_lag_s", np.float64),  # the same of EWMA, which stands in for a Kalman filter in trouble
+        ("count_m", np.float64),  # one encoder count of the device, hand frame
+        ("mass_kg", np.float64),  # the least mass that the device presents
+    ],
+    align=True,
+)
+
+REGION = np.dtype(
+    [
+        ("kind", np.int64),  # REGION_*
+        ("centre_m", np.float64, (3,)),
+        ("half_m", np.float64, (3,)),  # half extents; of a cylinder: radius, half height, radius
+    ],
+    align=True,
+)
+
+LIQUID = np.dtype(
+    [
+        ("effects", np.int64),
+        ("inertia_share", np.float64, (MOST_DELAY + 1,)),  # how much of added mass and history the loop bears
+        ("region", REGION),
+        ("drag", DRAG),
+        ("wake", WAKE),
+        ("local_wake", LOCAL_WAKE),
+        ("current", CURRENT),
+        ("buoyancy", BUOYANCY),
+        ("added_mass", ADDED_MASS),
+        ("history", HISTORY),
+    ],
+    align=True,
+)
+
+STATE = np.dtype(
+    [
+        ("tracking", np.int64),  # 1 once a position was accepted
+        ("placed", np.int64),  # 1 once the body was found inside or outside of each liquid
+        ("rejected", np.int64),  # samples refused in a row
+        ("accepted_ns", np.int64),  # when the last accepted sample was taken
+        ("hand_m", np.float64, (3,)),  # the last accepted position, hand frame
+        ("position_m", np.float64, (3,)),  # the same in the scene
+        ("previous_m", np.float64, (3,)),  # the one before
+        ("window_newest", np.int64),  # row of the newest sample in the model's window
+        ("window_held", np.int64),  # how many samples are in it
+        ("weight", np.float64),  # of the newest difference, for an interval of ``weighted_s``
+        ("weighted_s", np.float64),
+        ("kalman", KALMAN_STATE),
+        ("estimate_mps", np.float64, (3,)),  # the estimator's own velocity, before the knee
+        ("velocity_mps", np.float64, (3,)),  # after the knee
+        ("wake_mps", np.float64, (3,)),  # of the last listed liquid that acts, as used by drag
+        ("drift_mps", np.float64, (3,)),  # velocity of the current at the body, of the same liquid
+        ("force_n", np.float64, (3,)),  # sum of the effects
+        ("lift_n", np.float64, (3,)),  # what of it is buoyancy and weight
+    ],
+    align=True,
+)
+
+WINDOW = np.dtype(
+    [
+        ("position_m", np.float64, (3,)),  # of one accepted sample
+        ("interval_s", np.float64),  # Δt from the sample before it
+        ("age_s", np.float64),  # scratch: how long ago it was, at this tick
+    ],
+    align=True,
+)
+
+LIQUID_STATE = np.dtype(
+    [
+        ("inside", np.int64),  # 1 while the body is within the borders (with hysteresis)
+        ("border", np.float64),  # 0 outside, 1 inside, faded between
+        ("share", np.float64),  # φ of the volume: border, times what of the body is under the surface
+        ("frontal", np.float64),  # φ of the frontal area, likewise; of the motion w
+        ("motion_mps", np.float64, (3,)),  # v - v_current
+        ("wake_mps", np.float64, (3,)),  # v_wake; zero where no wake is asked for
+        ("relative_mps", np.float64, (3,)),  # w = v - v_current - v_wake
+        ("drag", DRAG_STATE),
+        ("wake", WAKE_STATE),
+        ("local_wake", LOCAL_WAKE_STATE),
+        ("current", CURRENT_STATE),
+        ("surface", SURFACE_STATE),
+        ("added_mass", ADDED_MASS_STATE),
+        ("history", HISTORY_STATE),
+    ],
+    align=True,
+)
+
+# What of force and motion is fast, and the work in it, at the hand (haptics.incremental).
+INCREMENTAL = np.dtype(
+    [
+        ("force_n", np.float64, (3,)),  # mean force since the last sample
+        ("force_once_n", np.float64, (3,)),  # the same after one high-pass filter
+        ("force_twice_n", np.float64, (3,)),  # and after two
+        ("velocity_mps", np.float64, (3,)),  # mean velocity in the frame of the current
+        ("velocity_once_mps", np.float64, (3,)),
+        ("velocity_twice_mps", np.float64, (3,)),
+        ("balance_j", np.float64),  # B: 0 or below
+    ],
+    align=True,
+)
+
+# The energy that hand and liquid owe each other, at the hand (haptics.energy).
+ACCOUNT = np.dtype(
+    [
+        ("balance_j", np.float64),  # E: what the hand put in and did not get back yet, were forces to act at once
+        ("late_balance_j", np.float64),  # the same, if they act as late as the loop is believed to be
+        ("later_balance_j", np.float64),  # the same, if they act one tick later still
+        ("turn", np.int64),  # the row of the newest force below
+        ("sent_n", np.float64, (MOST_DELAY + 2, 3)),  # forces of the last turns, without buoyancy and weight
+        ("acted_n", np.float64, (MOST_DELAY + 2, 3)),  # the same of what moved the hand: another liquid's, in a shadow
+        ("acted_impulse_ns", np.float64, (3,)),  # of such forces, as late as the loop is believed to be, times time
+        ("reserve_j", np.float64),  # the most that liquids and estimator could give back at the last sample
+        ("stored_j", np.float64, (MOST_DELAY + 2,)),  # what the velocity estimator stored then, at the hand
+        ("impulse_ns", np.float64, (3,)),  # such a force times time, summed since the last sample [N·s]
+        ("late_impulse_ns", np.float64, (3,)),  # the same of late forces
+        ("later_impulse_ns", np.float64, (3,)),  # the same of forces one tick later still
+        ("impulse_s", np.float64),  # the time since then
+        ("fast", INCREMENTAL),
+        ("velocity_mps", np.float64, (3,)),  # the hand's in the frame of the current, smoothed over 2 ms
+        ("longest_m", np.float64),  # the longest step so far
+        ("strongest_n", np.float64),  # the strongest force so far
+        ("gain", np.float64),  # share of the force that is sent
+        ("norm_share", np.float64),  # share of it that the force limit leaves
+        ("settling", np.int64),  # 1 if the force of the last turn was changed to pay a debt
+        ("lift_n", np.float64, (3,)),  # buoyancy and weight in the force that is sent
+        ("lift_before_n", np.float64, (3,)),  # the same of the turn before
+    ],
+    align=True,
+)
+
+# Survives a change of scene; owned by whoever sends the force. The host may write stop, fault and device_limit_n.
+SAFETY = np.dtype(
+    [
+        ("stop", np.int64),  # nonzero: zero force at once; back to 0: the force fades in as at the start
+        ("fault", np.int64),  # STATUS_* that stopped the force for good, until the host clears it
+        ("withheld", np.int64),  # LIMITER_* bits for which the force is fading out
+        ("started", np.int64),  # 1 after the first turn
+        ("turn_ns", np.int64),  # time of the last turn
+        ("usable_ns", np.int64),  # time of the last sample that was accepted
+        ("turn_s", np.float64),  # time since the turn before
+        ("late_s", np.float64),  # by how much more than is forgiven this turn came late
+        ("fade", np.float64),  # share of the force that is sent, 0 … 1
+        ("fade_s", np.float64),  # how long a fade from 0 to 1 takes at present
+        ("device_limit_n", np.float64),  # the device's own force limit
+        ("delay_ticks", np.int64),  # how many writes late a force is believed to act, 0 … MOST_DELAY
+        ("slower", np.int64),  # samples in a row that the device measured a longer delay at
+        ("faster", np.int64),  # samples in a row that it measured a shorter one at
+        ("permitted_n", np.float64, (3,)),  # the force after slope limits, norm and fades
+        ("slewed_n", np.float64, (3,)),  # the force of the last turn, before the energy account changed it
+        ("account", ACCOUNT),  # begins anew with each scene
+    ],
+    align=True,
+)
+
+
+def records(dtype: np.dtype[Any], count: int) -> Any:
+    """Return ``count`` zeroed records of ``dtype`` as a contiguous ``np.recarray`` of shape (count,)."""
+    return np.zeros(count, dtype).view(np.recarray)
+
+
+def new_reading() -> Any:
+    """Return one ``READING``, shape (1,), that says its version and size."""
+    return _versioned(READING)
+
+
+def new_command() -> Any:
+    """Return one ``COMMAND``, shape (1,), that says its version and size and commands zero force."""
+    return _versioned(COMMAND)
+
+
+def _versioned(dtype: np.dtype[Any]) -> Any:
+    record = records(dtype, 1)
+    record[0].version, record[0].size_bytes = CONTRACT_VERSION, dtype.itemsize
+    return record

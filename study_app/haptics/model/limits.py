@@ -1,0 +1,150 @@
+"""What damping a sampled loop bears: the table behind the slope limit, which knows nothing of compiled code.
+
+The table is ``slope_limits.csv`` beside this file, measured by ``evaluation.stability`` on the servo's own
+tick; how its numbers follow from the measurement is said there.
+"""
+
+from __future__ import annotations
+
+import csv
+from functools import cache
+from importlib import resources
+from typing import Final, NamedTuple
+
+from study_app.errors import StudyError
+from study_app.haptics.model.device_dynamics import Dynamics
+from study_app.haptics.model.scene import Ewma, Given, Kalman, Velocity
+
+SLOWEST_HZ: Final = 500.0
+"""Slower servos are for trying out: what participants would feel there is the limits rather than the liquids."""
+
+
+INERTIA_SHARE: Final = 0.3
+"""Of the limit on drag, for added mass and history, where they need not be felt as they are."""
+CUT_INERTIA_SHARE: Final = 0.15
+"""The same where added mass and history do not fit whole: with more of them, freed handles of 50 g swung for 0.6 s."""
+
+MEASURED_KG: Final = 0.1
+"""The free handle that the table was measured with."""
+LIGHTER: Final = 2.0
+"""Power of the ratio of masses in which a lighter handle bears less: at 1.7, freed handles of 50 g were restless in
+honey, where the delay was one tick longer than believed; from 1.8 on none of 801 handles of 30 to 250 g was."""
+SLEW_N: Final = 1.5
+"""The most that the force on a handle of `MEASURED_KG` or more changes within a millisecond."""
+KALMAN_SLEW: Final = 0.8
+"""Share of it with "kalman": at 1, a freed handle in tar swung where the delay was one tick longer than believed."""
+SLEW_S: Final = 1e-3
+
+_THESIS: Final = Ewma()
+_SAME: Final = 1e-9  # of two periods that differ by rounding alone
+
+
+class Bearable(NamedTuple):
+    """The greatest damping [N·s/m at the hand] that a loop bears of drag, and of added mass and history beside it."""
+
+    drag_nspm: float
+    inertia_nspm: float
+
+
+class Entry(NamedTuple):
+    """One line of the table: a velocity estimator, a tick period and a delay, and what a loop of that kind bears.
+
+    ``alpha`` is that of "ewma"; None for the others.
+    """
+
+    estimator: str
+    alpha: float | None
+    period_s: float
+    delay_ticks: int
+    bearable: Bearable
+
+
+def slope_limit(period_s: float, delay_ticks: int, velocity: Velocity = _THESIS) -> float:
+    """Return the greatest damping of drag [N·s/m at the hand]; see `bearable`."""
+    return bearable(period_s, delay_ticks, velocity).drag_nspm
+
+
+def bearable(period_s: float, delay_ticks: int, velocity: Velocity = _THESIS) -> Bearable:
+    """Return what a loop bears that has a tick period [s], a delay [ticks] and a velocity estimator.
+
+    Between two entries of the table, of periods as of alphas, the worse one counts, and of delays the next longer;
+    beyond the fastest, less in the ratio of the periods. Windows stand in the table as they come; one that is set to
+    smooth less is also held to what the raw difference bears. A given velocity comes from no estimator; it is taken as
+    the thesis' own, "ewma". The entries of "kalman" hold where the delay is one tick longer or shorter than believed,
+    and while EWMA stands in for the filter.
+
+    Raises
+    ------
+    StudyError
+        A loop slower or more delayed than any entry.
+    """
+    found = [one for row in _rows(velocity) for one in _neighbours(row, period_s, delay_ticks)]
+    if not found:
+        raise StudyError(
+            f"no stable force is known for {1 / period_s:g} ticks a second with {delay_ticks} ticks of delay: "
+            "run at 250 Hz or more, with a delay of 4 ticks at most"
+        )
+    beyond = min(1.0, period_s / min(entry.period_s for entry in table()))
+    return Bearable(*(beyond * min(limits) for limits in zip(*found, strict=True)))
+
+
+def slew_limit_n(period_s: float, dynamics: Dynamics, velocity: Velocity = _THESIS) -> float:
+    """Return the most that the force on a device's handle changes within a tick [N].
+
+    A loop slower than 1 kHz gets as much a millisecond. A device that measures no delay has "ewma" for "kalman".
+    """
+    share = KALMAN_SLEW if isinstance(velocity, Kalman) and dynamics.delay_s is not None else 1.0
+    return share * SLEW_N * min(dynamics.mass_kg / MEASURED_KG, 1.0) * max(period_s / SLEW_S, 1.0)
+
+
+def _rows(velocity: Velocity) -> tuple[tuple[str, float | None], ...]:
+    """Return estimator and alpha of the entries that bound this estimator."""
+    if isinstance(velocity, Ewma | Given):
+        alpha = getattr(velocity, "alpha", _THESIS.alpha)
+        known = sorted({entry.alpha for entry in table() if entry.alpha is not None})
+        below = max((it for it in known if it <= alpha), default=known[0])
+        return ("ewma", below), ("ewma", min(it for it in known if it >= alpha))
+    usual = type(velocity)()
+    noisier = getattr(velocity, "samples", 0) < getattr(usual, "samples", 0) or (
+        getattr(velocity, "tolerance_m", 0.0) < getattr(usual, "tolerance_m", 0.0)
+    )
+    return ((velocity.kind, None), ("raw", None)) if noisier else ((velocity.kind, None),)
+
+
+def _neighbours(row: tuple[str, float | None], period_s: float, delay_ticks: int) -> list[Bearable]:
+    """Return what an estimator bears at the next longer delay, at the next slower and the next faster rate."""
+    known = [it for it in table() if (it.estimator, it.alpha) == row and it.delay_ticks >= delay_ticks]
+    delay_ticks = min((entry.delay_ticks for entry in known), default=0)
+    periods_s = {entry.period_s for entry in known}
+    slower_s = [known_s for known_s in periods_s if known_s >= period_s * (1 - _SAME)]
+    faster_s = [known_s for known_s in periods_s if known_s <= period_s * (1 + _SAME)]
+    if not slower_s:
+        return []
+    beside_s = {min(slower_s), max(faster_s, default=min(slower_s))}
+    return [entry.bearable for entry in known if entry.delay_ticks == delay_ticks and entry.period_s in beside_s]
+
+
+@cache
+def table() -> tuple[Entry, ...]:
+    """Return the table as it ships."""
+    with (resources.files("study_app.haptics.model") / "slope_limits.csv").open(encoding="utf-8") as file:
+        return tuple(
+            Entry(
+                row["estimator"],
+                float(row["alpha"]) if row["alpha"] else None,
+                float(row["period_ms"]) * 1e-3,
+                int(row["delay_ticks"]),
+                Bearable(float(row["drag_nspm"]), float(row["inertia_nspm"])),
+            )
+            for row in csv.DictReader(file)
+        )
+
+
+def refuses(rate_hz: float) -> str | None:
+    """Return why a servo of this rate must not run a participant, in a sentence; None where it may."""
+    if rate_hz >= SLOWEST_HZ:
+        return None
+    return (
+        f"the servo turns {rate_hz:g} times a second, and below {SLOWEST_HZ:g} the limits that keep it stable are felt "
+        "instead of the liquids: set device.rate_hz to 1000"
+    )

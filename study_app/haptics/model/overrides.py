@@ -1,0 +1,116 @@
+"""Parameters of a scene set by name, as ``simulate --set`` does."""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from collections.abc import Mapping
+from typing import Any, TypeAlias
+
+from pydantic import ValidationError
+
+from study_app.errors import StudyError
+from study_app.haptics.model.scene import Scene
+
+Tables: TypeAlias = "dict[str, list[dict[str, Any]]]"
+
+SHOWN = 200  # characters of a bad value that a message repeats
+
+# Where a parameter may sit; the places that a plain name means first come first.
+_OF_A_LIQUID = ("wake", "local_wake", "region", "current", "added_mass", "history")
+_OF_THE_SCENE = ("body", "velocity", "knee", "accuracy", "motion")
+_FIXED = {"id", "liquids"}
+
+
+def override(scene: Scene, name: str, value: object) -> Scene:
+    """Return ``scene`` with the one parameter called ``name`` set to ``value``; see `override_all`."""
+    return override_all(scene, {name: value})
+
+
+def override_all(scene: Scene, values: Mapping[str, object]) -> Scene:
+    """Return ``scene`` with parameters set by name, validated once all are set.
+
+    A name is that of a field of the liquid, one of its tables (``wake``, ``drag``, ``region``, ...), a table of the
+    scene (``body``, ``velocity``, ...) or the scene itself. Where several share one, the first found in this order
+    counts, unless the table is named: ``density_kg_m3`` is the liquid's, ``body.density_kg_m3`` the body's. A whole
+    table may be set as an inline table of TOML: ``current={kind="uniform", velocity_mps=[1, 0, 0]}``; a new ``kind``
+    brings its own defaults. With several liquids all that have the parameter get it. Text is read as the field's type;
+    tuples are split at commas.
+
+    Raises
+    ------
+    StudyError
+        An unknown name, or a value out of range.
+    """
+    tree = scene.model_dump()
+    for name, value in values.items():
+        for table, field in _places(_tables(tree), name):
+            _set(table, field, value)
+    try:
+        return Scene.model_validate(tree)
+    except ValidationError as error:
+        named = ", ".join(f"{_shown(name)} = {_shown(value)}" for name, value in values.items())
+        reasons = "; ".join(_reason(problem["loc"], problem["msg"]) for problem in error.errors())
+        raise StudyError(f"cannot set {named}: {reasons}") from error
+
+
+def _shown(value: object) -> str:
+    """Return a value as a message repeats it."""
+    text = str(value)
+    return text if len(text) <= SHOWN else f"{text[:SHOWN]}…"
+
+
+def _reason(place: tuple[int | str, ...], message: str) -> str:
+    """Return what is wrong with a parameter, in a scene's own words."""
+    name = ".".join(str(part) for part in place if part != "liquids" and not isinstance(part, int))
+    said = message.removeprefix("Value error, ").split(", unable to parse")[0].replace("Input should be", "must be")
+    if "valid dictionary" in said:
+        said = "is a table of parameters: set one of them by its name, such as --set drag_coefficient=0.42"
+    return f"{name}: {said}" if name else said
+
+
+def _tables(tree: dict[str, Any]) -> Tables:
+    """Return the tables of a scene by name, in the order in which a plain name is looked for."""
+    liquids = list(tree["liquids"])
+    tables = {"liquid": liquids}
+    for name in _OF_A_LIQUID:
+        tables[name] = [liquid[name] for liquid in liquids if liquid[name] is not None]
+    for name in _OF_THE_SCENE:
+        tables[name] = [tree[name]]
+    tables["drag"] = [liquid["drag"] for liquid in liquids]  # after the knee, whose law a plain name means
+    return {**tables, "scene": [tree]}
+
+
+def _places(tables: Tables, name: str) -> list[tuple[dict[str, Any], str]]:
+    """Return the (table, field) pairs that ``name`` means."""
+    place, _, field = name.rpartition(".")
+    for table_name, rows in tables.items():
+        found = [(row, field) for row in rows if field in row and place in {"", table_name}]
+        if found and field not in _FIXED and (place or field != "kind"):
+            return found
+    leaves = {key for rows in tables.values() for row in rows for key in row}
+    known = sorted(leaves - _FIXED - {"kind"} - tables.keys())
+    near = difflib.get_close_matches(field, known, n=1)
+    meant = f"did you mean {near[0]!r}? " if near else ""
+    raise StudyError(f"this scene has no parameter {_shown(name)!r}: {meant}it has {', '.join(known)}")
+
+
+def _set(table: dict[str, Any], field: str, value: object) -> None:
+    """Set one field; a table of another kind begins with the defaults of that kind."""
+    if isinstance(value, str):
+        value = _read(value, table[field], field)
+    if field == "kind" and value != table[field]:
+        table.clear()
+    table[field] = value
+
+
+def _read(text: str, present: object, field: str) -> object:
+    """Return what a text stands for, as far as the field's own type does not say."""
+    if text.startswith("{"):
+        try:
+            return tomllib.loads(f"table = {text}")["table"]
+        except tomllib.TOMLDecodeError as error:
+            example = f'{field}={{kind="uniform", velocity_mps=[1, 0, 0]}}'
+            raise StudyError(f"cannot read {field} = {_shown(text)}: write a table such as {example}") from error
+    several = isinstance(present, tuple) or field == "effects" or "," in text
+    return tuple(text.split(",")) if several and text != "auto" else text

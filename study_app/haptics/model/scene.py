@@ -1,0 +1,243 @@
+"""What is presented together: a body, the liquids around it, and how its motion is measured.
+
+Frozen, validated values in SI units and the scene frame (x right, y up, z toward the participant; scene = scale · hand
++ origin). Liquids and their effects are in ``liquid``, setting one parameter by its name in ``override``; both are at
+hand from here, too.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, TypeAlias
+
+from pydantic import Field, model_validator
+
+from study_app.haptics.model.liquid import (
+    MAX_LIQUIDS,
+    AddedMass,
+    Box,
+    Channel,
+    Current,
+    Cylinder,
+    Drag,
+    Effect,
+    Everywhere,
+    Frozen,
+    History,
+    Liquid,
+    LocalWake,
+    Region,
+    Uniform,
+    Vortex,
+    Wake,
+)
+from study_app.haptics.model.ranges import (
+    Alpha,
+    Coordinate,
+    DensityKgM3,
+    DiameterM,
+    DragCoefficient,
+    ForceLimitN,
+    Metres,
+    within,
+)
+
+__all__ = [
+    "MAX_LIQUIDS",
+    "MAX_WINDOW",
+    "Accuracy",
+    "AddedMass",
+    "Body",
+    "Box",
+    "Channel",
+    "Current",
+    "Cylinder",
+    "Drag",
+    "Effect",
+    "Estimator",
+    "Everywhere",
+    "Ewma",
+    "Foaw",
+    "Frozen",
+    "Given",
+    "History",
+    "Kalman",
+    "Knee",
+    "Line",
+    "Liquid",
+    "LocalWake",
+    "MotionBox",
+    "Raw",
+    "Region",
+    "Scene",
+    "Uniform",
+    "Velocity",
+    "Vortex",
+    "Wake",
+]
+
+RateHz: TypeAlias = Annotated[float, within(50, 5000, "no servo is stable below, and no tick fits above")]
+SceneScale: TypeAlias = Annotated[float, within(0.01, 100, "a stroke of 60 mm is then 0.6 mm to 6 m in the scene")]
+
+MAX_WINDOW = 16
+
+ADDED_MASS_SMOOTHING_S = 0.025
+HISTORY_SMOOTHING_S = 0.01
+KALMAN_SMOOTHING_S = 0.015
+"""Of both effects with "kalman", whose velocity lags less and may be smoothed for longer before a history."""
+
+HAND_SPEED_MPS = 0.3
+HAND_ACCELERATION_MPS2 = 3.0  # 0.3 m/s at 1.6 Hz
+HAND_REACH_M = 0.04
+
+
+class Body(Frozen):
+    """The ball that is moved through the liquids."""
+
+    diameter_m: DiameterM = 0.068
+    drag_coefficient: DragCoefficient = 0.47
+    density_kg_m3: DensityKgM3 = 1000.0
+
+
+class Ewma(Frozen):
+    """Exponentially weighted velocity; ``alpha`` is the weight of the newest difference at 1 kHz.
+
+    The default. [choice] `Line` has less lag and less noise while the hand leads (7.0 ms and 0.64 mm/s against 9.5 ms
+    and 1.37 mm/s), but at 1 kHz with one tick of delay a free handle of 0.1 kg bears only 23 N·s/m through it, and 71
+    through this: its lag is all delay, a filter's mostly gain lost where a loop would swing. Honey asks for 31, light
+    oil for 55 at 8 N.
+    """
+
+    kind: Literal["ewma"] = "ewma"
+    alpha: Alpha = 0.1
+
+
+class Line(Frozen):
+    """The slope of the least-squares line through the newest ``samples`` positions."""
+
+    kind: Literal["line"] = "line"
+    samples: int = Field(default=15, ge=2, le=MAX_WINDOW)
+
+
+class Foaw(Frozen):
+    """The slope of the longest line that misses no position by more than ``tolerance_m`` (``velocity``).
+
+    First-order adaptive windowing: at most ``samples`` positions, fewer where the motion bends. The tolerance is in the
+    hand frame, by default one count of the Falcon's encoders.
+    """
+
+    kind: Literal["foaw"] = "foaw"
+    samples: int = Field(default=16, ge=2, le=MAX_WINDOW)
+    tolerance_m: Annotated[float, within(0, 0.01, "10 mm is a third of a hand's stroke")] = 38e-6
+
+
+class Kalman(Frozen):
+    """A Kalman filter that knows the force just sent and learns the mass it moves (`kalman`).
+
+    Encoder count, delay and least mass come from the device. Where it does not measure its delay, and while the filter
+    is in trouble, the velocity is that of `Ewma` as it comes.
+    """
+
+    kind: Literal["kalman"] = "kalman"
+
+
+class Raw(Frozen):
+    """The newest difference of positions over its time, as it is."""
+
+    kind: Literal["raw"] = "raw"
+
+
+class Given(Frozen):
+    """The velocity comes with the motion: for recorded or programmed motions, never for a device."""
+
+    kind: Literal["given"] = "given"
+
+
+Estimator: TypeAlias = Annotated[Ewma | Line | Foaw | Kalman | Raw, Field(discriminator="kind")]
+Velocity: TypeAlias = Annotated[Ewma | Line | Foaw | Kalman | Raw | Given, Field(discriminator="kind")]
+
+
+class Knee(Frozen):
+    """How speeds above a threshold are lowered before anything is computed from them."""
+
+    law: Literal["sqrt", "square", "none"] = "sqrt"
+    threshold_mps: Annotated[float, within(0.01, 1000, "a hand moves at 0.01 to 2 m/s, times the scale")] = 5.0
+
+
+class Accuracy(Frozen):
+    """What ``effects = "auto"`` may leave out: up to a share of the whole force, or a force if that is greater."""
+
+    relative: Annotated[float, within(0, 1, "a share of the force")] = 0.05
+    absolute_n: Annotated[float, within(0, 20, "the force limit is at most 20 N")] = 0.05
+
+
+class MotionBox(Frozen):
+    """How the body is expected to move, in the scene: greatest speed and acceleration, and how deep its centre gets.
+
+    ``depth_m`` is the least and the greatest depth of the centre below a liquid's top face; negative is above it. What
+    is None follows from a hand that moves 40 mm to every side at up to 0.3 m/s and 3 m/s² (`Scene.motion_in`).
+    """
+
+    speed_mps: Annotated[float, within(0.001, 1000, "a hand moves at 0.01 to 2 m/s, times the scale")] | None = None
+    acceleration_mps2: (
+        Annotated[float, within(0.001, 1e5, "a hand accelerates at 0.01 to 100 m/s², times the scale")] | None
+    ) = None
+    depth_m: tuple[Coordinate, Coordinate] | None = None
+
+    @model_validator(mode="after")
+    def _least_depth_comes_first(self) -> MotionBox:
+        if self.depth_m is not None and self.depth_m[0] > self.depth_m[1]:
+            raise ValueError(f"depth_m is the least depth, then the greatest, not {list(self.depth_m)}")
+        return self
+
+
+class Scene(Frozen):
+    """Everything the force model needs. Without liquids a scene is rest: zero force.
+
+    ``scale`` and ``origin_m`` map the hand into the scene; ``rate_hz`` is the nominal rate of ticks; ``force_limit_n``
+    the greatest force that may be sent. ``accuracy`` and ``motion`` are for liquids with ``effects = "auto"``.
+    """
+
+    scale: SceneScale = 10.0
+    origin_m: Metres = (0.0, 0.0, 0.0)
+    rate_hz: RateHz = 1000.0
+    body: Body = Body()
+    liquids: tuple[Liquid, ...] = Field(default=(), max_length=MAX_LIQUIDS)
+    velocity: Velocity = Ewma()
+    knee: Knee = Knee()
+    force_limit_n: ForceLimitN = 8.0
+    accuracy: Accuracy = Accuracy()
+    motion: MotionBox = MotionBox()
+
+    @model_validator(mode="after")
+    def _liquids_are_told_apart(self) -> Scene:
+        names = [liquid.id for liquid in self.liquids]
+        if len(set(names)) < len(names):
+            raise ValueError(f"two liquids share an id in {names}")
+        return self
+
+    def smoothing_s(self, effect: AddedMass | History) -> float:
+        """Return over what time [s] an effect smooths what it measures; velocities that are given are not smoothed."""
+        if isinstance(self.velocity, Given):
+            return 0.0
+        said_s, usual_s = (
+            (effect.filter_s, ADDED_MASS_SMOOTHING_S)
+            if isinstance(effect, AddedMass)
+            else (effect.smoothing_s, HISTORY_SMOOTHING_S)
+        )
+        if said_s is not None:
+            return said_s
+        return KALMAN_SMOOTHING_S if isinstance(self.velocity, Kalman) else usual_s
+
+    def motion_in(self, liquid: Liquid) -> MotionBox:
+        """Return ``motion`` with what it leaves open filled in; without a top there is no depth."""
+        depth_m = self.motion.depth_m
+        if depth_m is None and not isinstance(liquid.region, Everywhere):
+            region = liquid.region
+            top_m = region.centre_m[1] + (region.size_m[1] if isinstance(region, Box) else region.height_m) / 2
+            middle_m, reach_m = top_m - self.origin_m[1], self.scale * HAND_REACH_M
+            depth_m = (middle_m - reach_m, middle_m + reach_m)
+        return MotionBox(
+            speed_mps=self.motion.speed_mps or self.scale * HAND_SPEED_MPS,
+            acceleration_mps2=self.motion.acceleration_mps2 or self.scale * HAND_ACCELERATION_MPS2,
+            depth_m=depth_m,
+        )

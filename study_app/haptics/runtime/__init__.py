@@ -1,0 +1,1 @@
+"""The servo and what surrounds it: packing, telemetry, threads, offline runs."""

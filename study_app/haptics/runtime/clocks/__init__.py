@@ -1,0 +1,1 @@
+"""Clocks and thread priorities of each operating system."""

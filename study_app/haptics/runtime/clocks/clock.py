@@ -1,0 +1,164 @@
+"""Time for the servo: monotonic nanoseconds and a sleep to an absolute deadline, as C functions.
+
+``SystemClock`` is the machine's own clock, ``VirtualClock`` a number that a sleep sets forward, so that the same loop
+runs as fast as it computes. Both have what the loop takes: ``now``, ``sleep`` (see ``cfunctions``) and ``context``.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from functools import cache
+from typing import Any, Protocol
+
+import numpy as np
+
+from study_app.errors import StudyError
+from study_app.haptics.kernels.c_functions import NOW, SLEEP, c_function, record_at
+from study_app.haptics.model.layout import records
+from study_app.haptics.runtime.clocks.grants import Blocks, Grant
+
+if sys.platform == "win32":
+    from study_app.haptics.runtime.clocks import windows as platform
+elif sys.platform == "darwin":
+    from study_app.haptics.runtime.clocks import macos as platform
+else:
+    from study_app.haptics.runtime.clocks import linux as platform
+
+MOST_SPIN_US = 1000.0
+VIRTUAL = np.dtype([("now_ns", np.int64)], align=True)
+_virtual_at = record_at(VIRTUAL)
+
+
+class Clock(Protocol):
+    """What the servo asks of a clock.
+
+    ``now`` and ``sleep`` are C functions, ``context`` is the address of the clock's own memory, handed to both, and
+    ``runs`` tells whether time passes by itself.
+    """
+
+    now: Any
+    sleep: Any
+    context: int
+    runs: bool
+
+    def now_ns(self) -> int:
+        """Return the time [ns]."""
+        ...
+
+    def suspended_ns(self) -> int:
+        """Return how long this clock stood still while the machine was suspended, since its start [ns]."""
+        ...
+
+
+class SystemClock:
+    """The monotonic clock of the machine, whose origin is the machine's own (often its start).
+
+    Parameters
+    ----------
+    spin_us : how long before a deadline a sleep ends early, to look at the clock until it is there; default: what this
+        system's timer needs. It takes up to ``spin_us`` of a core's time every period, which `spun_ns` counts.
+
+    Raises
+    ------
+    StudyError
+        A spin below 0 or above 1000 µs.
+    """
+
+    runs = True
+
+    def __init__(self, spin_us: float | None = None) -> None:
+        self.spin_us = platform.SPIN_US if spin_us is None else spin_us
+        if not 0.0 <= self.spin_us <= MOST_SPIN_US:
+            raise StudyError(f"a spin lasts 0 to {MOST_SPIN_US:g} µs before a deadline, not {spin_us:g}")
+        self._memory = platform.open_clock(round(1000 * self.spin_us))
+        self.now, self.sleep = _system_functions()
+        self.context = int(self._memory.ctypes.data)
+
+    def now_ns(self) -> int:
+        """Return the time [ns]."""
+        return int(self.now.ctypes(self.context))
+
+    def suspended_ns(self) -> int:
+        """Return how long the machine was suspended since its start [ns], at most a little too much.
+
+        The loop sleeps on CLOCK_MONOTONIC of Linux and ``mach_absolute_time`` of macOS, which stand still meanwhile: no
+        tick is late after a suspension. CLOCK_BOOTTIME and ``mach_continuous_time`` go on, so the difference is the
+        suspension. The counter of Windows goes on by itself: there a suspension is a late tick, and this is 0.
+        """
+        if sys.platform == "linux":
+            return _ahead_ns(time.CLOCK_BOOTTIME, time.CLOCK_MONOTONIC)
+        elif sys.platform == "darwin":
+            return _ahead_ns(time.CLOCK_MONOTONIC_RAW, time.CLOCK_UPTIME_RAW)
+        else:
+            return 0
+
+    @property
+    def spun_ns(self) -> int:
+        """How long all sleeps together looked at the clock instead of sleeping [ns]."""
+        return int(self._memory[0].spun_ns)
+
+
+class VirtualClock:
+    """A clock that stands still but for sleeps: each sets it to its deadline at once.
+
+    ``suspension_ns`` is how long the machine is said to have been suspended.
+    """
+
+    runs = False
+
+    def __init__(self, start_ns: int = 0) -> None:
+        self.suspension_ns = 0
+        self._memory = records(VIRTUAL, 1)
+        self._memory[0].now_ns = start_ns
+        self.now, self.sleep = _virtual_functions()
+        self.context = int(self._memory.ctypes.data)
+
+    def now_ns(self) -> int:
+        """Return the time [ns]."""
+        return int(self._memory[0].now_ns)
+
+    def suspended_ns(self) -> int:
+        """Return ``suspension_ns``."""
+        return self.suspension_ns
+
+
+def raise_priority(blocks: Blocks = (), *, real_time: bool = True) -> Grant:
+    """Ask the system to run the calling thread before others, and to keep memory at hand; return what it granted.
+
+    Parameters
+    ----------
+    blocks : the thread's memory, of which none is locked where this is empty
+    real_time : False: stay an ordinary thread, whose timers are exact nevertheless
+    """
+    grant = platform.raise_priority(real_time=real_time)
+    if not (blocks and real_time):
+        return grant
+    return grant.with_memory(locked=platform.lock_memory(blocks), advice=platform.MEMORY)
+
+
+if sys.platform != "win32":
+
+    def _ahead_ns(clock: int, of: int) -> int:
+        """Return how far a clock is ahead of another [ns]: the least of several readings, one may be interrupted."""
+        return min(-time.clock_gettime_ns(of) + time.clock_gettime_ns(clock) for _ in range(3))
+
+
+@cache
+def _system_functions() -> tuple[Any, Any]:
+    return c_function(NOW, platform.now), c_function(SLEEP, platform.sleep)
+
+
+@cache
+def _virtual_functions() -> tuple[Any, Any]:
+    return c_function(NOW, _virtual_now), c_function(SLEEP, _virtual_sleep)
+
+
+def _virtual_now(context: int) -> Any:
+    return _virtual_at(context).now_ns
+
+
+def _virtual_sleep(context: int, deadline_ns: int) -> Any:
+    clock = _virtual_at(context)
+    clock.now_ns = max(clock.now_ns, deadline_ns)
+    return clock.now_ns

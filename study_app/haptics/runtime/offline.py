@@ -1,0 +1,111 @@
+"""The force along a motion, by the servo's own tick, without a device and without a clock."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from study_app.errors import StudyError
+from study_app.haptics.kernels.compiled import kernel
+from study_app.haptics.kernels.estimators.kalman import take_force
+from study_app.haptics.kernels.safety import guard, new_safety
+from study_app.haptics.kernels.sample_validation import clamp, place
+from study_app.haptics.kernels.tick import report, respond
+from study_app.haptics.model.device_dynamics import MOST_DELAY, Dynamics
+from study_app.haptics.model.layout import ESTIMATOR_GIVEN, SAMPLE, Record, records
+from study_app.haptics.model.limits import bearable
+from study_app.haptics.model.motion import Motion, read
+from study_app.haptics.model.scene import Given, Scene
+from study_app.haptics.runtime.pack import pack
+
+Table: TypeAlias = "np.recarray[Any, Any]"
+
+_VECTORS = {
+    "position_m": ("x_m", "y_m", "z_m"),
+    "velocity_mps": ("vx_mps", "vy_mps", "vz_mps"),
+    "wake_mps": ("wake_x_mps", "wake_y_mps", "wake_z_mps"),
+    "force_n": ("fx_n", "fy_n", "fz_n"),
+    "device_force_n": ("device_fx_n", "device_fy_n", "device_fz_n"),
+}
+COLUMNS = ("t_s", *(name for names in _VECTORS.values() for name in names), "limiters")
+
+
+def simulate(scene: Scene, path: Motion | str | os.PathLike[str]) -> Table:
+    """Return what a body feels along a motion (or a CSV file with one): a recarray of n rows, named `COLUMNS`.
+
+    Every row is a new accepted sample and one tick. Δt is the time since the row before, clamped as in the servo; the
+    first row takes the scene's nominal period. Velocities that come with the motion are used as they are, only the knee
+    follows. ``vx_mps …`` is the velocity after filter and knee, ``wake_x_mps …`` the wake that this tick's drag met,
+    ``fx_n …`` the sum of the effects, ``device_fx_n …`` the force as it would be sent, the start fade over, by a loop
+    of 1 ms with one tick of delay; ``limiters`` the ``LIMITER_*`` bits that acted on it. Places and velocities are in
+    the scene frame; a force is the same vector at the hand.
+
+    Raises
+    ------
+    StudyError
+        The motion cannot be read, or the scene wants a given velocity and there is none.
+    """
+    motion = path if isinstance(path, Motion) else read(Path(path))
+    return _table(motion.t_s, samples_along(scene, motion))
+
+
+def samples_along(scene: Scene, motion: Motion, dynamics: Dynamics | None = None) -> Any:
+    """Return what `simulate` tabulates as the servo's own samples: (n,) recarray of ``layout.SAMPLE``.
+
+    ``dynamics`` are those of a device: limits, slew and delay are then those of its loop at the scene's rate. By
+    default the loop is that of `simulate`.
+
+    Raises
+    ------
+    StudyError
+        The scene wants a given velocity and there is none.
+    """
+    estimator = scene.velocity
+    if motion.velocity_mps is not None:
+        scene = scene.model_copy(update={"velocity": Given()})
+    elif isinstance(scene.velocity, Given):
+        raise StudyError("the scene takes the velocity as given, but the motion has no vx_mps, vy_mps, vz_mps")
+    if dynamics is None:
+        model = pack(scene, limits=bearable(1e-3, 1, estimator), dynamics=Dynamics(delay_s=1e-3))
+        safety = new_safety()
+    else:
+        model = pack(scene, dynamics=dynamics)
+        safety = new_safety(delay_ticks=min(dynamics.delay_ticks(scene.rate_hz), MOST_DELAY))
+    safety[0].fade = 1.0
+    samples = records(SAMPLE, len(motion.t_s))
+    samples.position_m = motion.position_m
+    samples.velocity_mps = 0.0 if motion.velocity_mps is None else motion.velocity_mps
+    _run(model, safety[0], samples, motion.t_s)
+    return samples
+
+
+@kernel
+def _run(model: Any, safety: Record, samples: Any, t_s: Any) -> None:
+    """Take the samples one after another, positions in the scene frame; fill in the rest of them."""
+    parameters, state = model.parameters[0], model.state[0]
+    for k in range(len(samples)):
+        sample = samples[k]
+        interval_s = clamp(t_s[k] - t_s[k - 1]) if k > 0 else parameters.period_s
+        place(state, sample.position_m[0], sample.position_m[1], sample.position_m[2])
+        if parameters.estimator == ESTIMATOR_GIVEN:
+            for axis in range(3):
+                state.estimate_mps[axis] = sample.velocity_mps[axis]
+        safety.turn_s = interval_s
+        take_force(state, safety)
+        respond(model, interval_s)
+        report(state, sample)
+        guard(model, safety, sample, interval_s)
+
+
+def _table(t_s: Any, samples: Any) -> Table:
+    """Return the samples with a column of its own for every component."""
+    table = np.recarray(len(samples), [(name, np.int64 if name == "limiters" else np.float64) for name in COLUMNS])
+    table["t_s"] = t_s
+    table["limiters"] = samples.limiters
+    for field, names in _VECTORS.items():
+        for axis, name in enumerate(names):
+            table[name] = samples[field][:, axis]
+    return table

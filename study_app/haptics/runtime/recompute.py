@@ -1,0 +1,126 @@
+"""Ticks taken again from what telemetry says of them, and the places at which they left a wake.
+
+A sample says when and where the device was read, whether that was new, and whether the force was stopped: all that a
+tick takes from outside. So the same tick beside the servo, with a model and a safety record of its own, answers with
+the same force to the last bit, or with that of another liquid on the same motion.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from study_app.haptics.kernels.compiled import kernel, part
+from study_app.haptics.kernels.effects.wake import REST_MPS
+from study_app.haptics.kernels.passivity import log_acted, log_delivery
+from study_app.haptics.kernels.tick import tick
+from study_app.haptics.kernels.vector import copy, distance, square
+from study_app.haptics.model.layout import (
+    EFFECT_LOCAL_WAKE,
+    EFFECT_WAKE,
+    LIMITER_STOP,
+    STATUS_DEVICE_LOST,
+    Record,
+    records,
+)
+
+PLACE = np.dtype(
+    [
+        ("hand_m", np.float64, (3,)),  # where the hand was, hand frame
+        ("segment", np.int64),  # number of the wake's segment
+        ("moving", np.int64),  # 0 for a zero element
+    ],
+    align=True,
+)
+
+TRAIL = np.dtype(
+    [
+        ("left", np.int64),  # elements left since the wake was empty; number q is in row q % (rows of the ring)
+        ("held", np.int64),  # how many of them are still in the wake
+        ("segments", np.int64),  # segments that hold one of them
+        ("time_s", np.float64),  # of a local wake, after the last tick
+    ],
+    align=True,
+)
+
+
+def new_trail(elements: int) -> tuple[Any, Any]:
+    """Return an empty trail, (1,) ``TRAIL``, and the ring of its places, (elements,) ``PLACE``."""
+    return records(TRAIL, 1), records(PLACE, elements)
+
+
+@part
+def was_lost_at_read(sample: Record) -> bool:
+    """Return whether the servo read a lost device: it took no tick then, and the device says what it holds."""
+    return bool(
+        sample.status == STATUS_DEVICE_LOST
+        and sample.fresh == 0
+        and sample.limiters == 0
+        and square(sample.force_n) == 0.0
+        and square(sample.velocity_mps) == 0.0
+    )
+
+
+@part
+def take_sample(model: Any, safety: Record, sample: Record, delivered: bool) -> None:
+    """Recompute the tick of a sample from what it says of the servo's input: stop, delay, and what the device sent.
+
+    Where that was not ``delivered`` for this model's command, only the velocity estimator is told of it: the hand moved
+    under that force.
+    """
+    sent_x, sent_y, sent_z = sample.device_force_n[0], sample.device_force_n[1], sample.device_force_n[2]
+    as_asked = sent_x == sample.command_n[0] and sent_y == sample.command_n[1] and sent_z == sample.command_n[2]
+    safety.stop = 1 if sample.limiters & LIMITER_STOP else 0
+    safety.delay_ticks = sample.delay_ticks
+    tick(model, safety, sample)
+    if not delivered:
+        log_acted(safety.account, (sent_x, sent_y, sent_z))
+    elif not as_asked:
+        log_delivery(safety, sample, (sent_x, sent_y, sent_z))
+
+
+@kernel
+def take_again(model: Any, safety: Record, samples: Any, trail: Record, places: Any, delivered: bool) -> None:
+    """Take each of ``samples`` as the servo took it, and write what comes out into them.
+
+    ``trail`` and ``places`` follow the wake of the model's first liquid. ``delivered`` says that the forces in
+    ``samples`` answer this model's commands: where the device sent another one, it is logged.
+    """
+    for k in range(samples.shape[0]):
+        sample = samples[k]
+        if was_lost_at_read(sample):
+            continue
+        take_sample(model, safety, sample, delivered)
+        _note(model, trail, places)
+
+
+@part
+def _note(model: Any, trail: Record, places: Any) -> None:
+    """Remember where the hand was, if this tick left an element of the wake there."""
+    if model.parameters[0].liquids == 0:
+        return
+    liquid, local, state = model.liquids[0], model.liquid_states[0], model.state[0]
+    if liquid.effects & EFFECT_WAKE:
+        wake, tracks = liquid.wake, local.wake
+        if tracks.stored > 0 and tracks.stored != trail.left:
+            place = places[(tracks.stored - 1) % places.shape[0]]
+            copy(state.hand_m, place.hand_m)
+            place.segment = tracks.last_segment
+            place.moving = model.elements[wake.row + (tracks.stored - 1) % wake.length].moving
+        trail.left = tracks.stored
+        trail.held = tracks.held
+        trail.segments = tracks.last_segment - tracks.first_segment + 1 if tracks.speed_mps > 0.0 else 0
+    elif liquid.effects & EFFECT_LOCAL_WAKE:
+        tracks = local.local_wake
+        if tracks.held == 0:
+            trail.left = 0
+        elif tracks.time_s != trail.time_s:
+            place = places[trail.left % places.shape[0]]
+            copy(state.hand_m, place.hand_m)
+            place.segment = 0
+            place.moving = 1 if distance(state.velocity_mps, state.drift_mps) >= REST_MPS else 0
+            trail.left += 1
+        trail.time_s = tracks.time_s
+        trail.held = tracks.held
+        trail.segments = tracks.cells

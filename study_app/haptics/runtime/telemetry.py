@@ -1,0 +1,180 @@
+"""What the servo did, tick by tick: a ring with one writer, and any number of readers that never hold it up.
+
+The servo fills the slot after the newest sample, then advances the count of samples written. A reader copies, looks at
+the count again, and drops what may have been overwritten meanwhile, counting it; so the slot being filled and all that
+was lost are known without a lock.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from study_app.haptics.kernels.c_functions import fence
+from study_app.haptics.kernels.compiled import kernel
+from study_app.haptics.model.layout import LIMITER_GLITCH, SAMPLE, records
+
+HISTORY = 32_768  # samples kept: 32 s at 1 kHz, 6 MB
+
+
+class Telemetry:
+    """The samples of one servo.
+
+    Parameters
+    ----------
+    history : how many samples are kept
+    """
+
+    def __init__(self, history: int = HISTORY) -> None:
+        self.ring = records(SAMPLE, history)
+        self.ring.status = 0  # touches every page of memory now, so that the servo meets no page fault
+        self.written = np.zeros(1, np.int64)
+
+    def reader(self) -> Reader:
+        """Return a reader of all samples from now on."""
+        return Reader(self)
+
+    def latest(self) -> Any | None:
+        """Return a copy of the newest sample (one record of ``SAMPLE``), or None before the first."""
+        written = int(self.written[0])
+        if written == 0:
+            return None
+        newest = (written - 1) % self.ring.size
+        return self.ring[newest : newest + 1].copy()[0]
+
+    def position_at(self, time_ns: int) -> tuple[np.ndarray[Any, Any], int]:
+        """Return where the handle was at a moment [m, (3,), hand frame], and the moment this is true of [ns].
+
+        Between two samples the position is interpolated and the moment is ``time_ns`` itself; before the oldest and
+        after the newest it is that sample's place and time, never an extrapolation. Samples whose position is not
+        finite or was refused at the door are passed over. Before the first sample: the origin, at 0.
+        """
+        position = np.zeros(3)
+        moment = _position_at(self.ring, self.written, time_ns, position)
+        return position, int(moment)
+
+
+class Reader:
+    """One reader's place in the ring; ``dropped`` counts the samples that were overwritten before it read them."""
+
+    def __init__(self, telemetry: Telemetry) -> None:
+        self._ring = telemetry.ring
+        self._written = telemetry.written
+        self._next = int(telemetry.written[0])
+        self.dropped = 0
+
+    def read(self) -> Any:
+        """Return copies of all samples since the last read, oldest first (recarray of ``SAMPLE``, maybe empty)."""
+        waiting = min(int(self._written[0]) - self._next, self._ring.size)
+        out = records(SAMPLE, waiting)
+        first, following = _copy(self._ring, self._written, self._next, out)
+        kept = following - first
+        self.dropped += first - self._next
+        self._next = following
+        return out[:kept]
+
+
+@dataclass(frozen=True, slots=True)
+class Timing:
+    """How regularly the servo ran: all zero where too little was seen to say.
+
+    ``rate_hz`` is the rate achieved, lateness how late turns began, ``worst_gap_s`` the longest time between two
+    readings of the device, ``overruns`` how many deadlines were passed over.
+    """
+
+    ticks: int
+    rate_hz: float
+    lateness_p99_s: float
+    worst_gap_s: float
+    overruns: int
+
+
+def timing(samples: Any, rate_hz: float) -> Timing:
+    """Return the timing of ``samples`` (recarray of ``SAMPLE``, in order, gaps allowed) at the nominal ``rate_hz``."""
+    ticks = int(samples.size)
+    if ticks == 0:
+        return Timing(0, 0.0, 0.0, 0.0, 0)
+    p99_s = float(np.percentile(samples.lateness_ns, 99)) * 1e-9
+    follows = np.diff(samples.tick) == 1
+    gaps_s = np.diff(samples.time_ns)[follows] * 1e-9
+    deadlines_s = np.diff(samples.time_ns - samples.lateness_ns)[follows] * 1e-9
+    elapsed_s = float(gaps_s.sum())
+    return Timing(
+        ticks=ticks,
+        rate_hz=gaps_s.size / elapsed_s if elapsed_s > 0.0 else 0.0,
+        lateness_p99_s=p99_s,
+        worst_gap_s=float(gaps_s.max(initial=0.0)),
+        overruns=int(np.rint(deadlines_s * rate_hz - 1.0).sum()),
+    )
+
+
+@kernel
+def _copy(ring: Any, written: Any, wanted: int, out: Any) -> tuple[int, int]:
+    """Copy samples from number ``wanted`` on into ``out``; return the numbers of the first one kept and of the next.
+
+    Sample i is whole as long as sample i + n is not begun, that is while fewer than i + n are written.
+    """
+    size = ring.shape[0]
+    following = written[0]
+    fence()
+    first = max(wanted, following - size + 1)
+    for i in range(first, following):
+        if i - first < out.shape[0]:
+            out[i - first] = ring[i % size]
+    following = min(following, first + out.shape[0])
+    fence()
+    whole = min(max(first, written[0] - size + 1), following)
+    for i in range(whole, following):
+        out[i - whole] = out[i - first]
+    return whole, following
+
+
+@kernel
+def _position_at(ring: Any, written: Any, time_ns: int, position: Any) -> Any:
+    """Write the position at ``time_ns`` into ``position`` (3,); return the moment it is true of [ns]."""
+    size = ring.shape[0]
+    end = written[0]
+    fence()
+    oldest = max(0, end - size + 1)
+    low, high = oldest - 1, end  # the last sample not after time_ns is in [low, high)
+    while high - low > 1:
+        middle = (low + high) // 2
+        if ring[middle % size].time_ns <= time_ns:
+            low = middle
+        else:
+            high = middle
+    before = low
+    while before >= oldest and not _believed(ring[before % size]):
+        before -= 1
+    after = high
+    while after < end and not _believed(ring[after % size]):
+        after += 1
+    if before < oldest and after >= end:
+        return 0
+    if before < oldest:
+        return _place(ring[after % size], position)
+    if after >= end:
+        return _place(ring[before % size], position)
+    early, late = ring[before % size], ring[after % size]
+    share = (time_ns - early.time_ns) / (late.time_ns - early.time_ns)
+    for axis in range(3):
+        position[axis] = early.position_m[axis] + share * (late.position_m[axis] - early.position_m[axis])
+    return time_ns
+
+
+@kernel
+def _place(sample: Any, position: Any) -> Any:
+    for axis in range(3):
+        position[axis] = sample.position_m[axis]
+    return sample.time_ns
+
+
+@kernel
+def _believed(sample: Any) -> bool:
+    if sample.limiters & LIMITER_GLITCH != 0:
+        return False
+    position = sample.position_m
+    return math.isfinite(position[0]) and math.isfinite(position[1]) and math.isfinite(position[2])

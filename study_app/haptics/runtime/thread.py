@@ -1,0 +1,266 @@
+"""The loop's memory, its thread, and all the ways it ends.
+
+Whatever ends the host ends the loop, and with it the force: being stopped, an exception, the last reference to the
+servo, the interpreter's exit, and those signals that would otherwise kill the process on the spot.
+"""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+import weakref
+from types import FrameType
+from typing import Any
+
+from study_app.errors import DeviceError, ServoFault
+from study_app.haptics.kernels.c_functions import Driver
+from study_app.haptics.kernels.loop import (
+    CONTROL,
+    ClockCalls,
+    DeviceCalls,
+    Output,
+    Records,
+    let_go,
+    offer_numbers,
+    offer_scene,
+    run,
+)
+from study_app.haptics.kernels.safety import new_safety
+from study_app.haptics.model.device_dynamics import MOST_DELAY
+from study_app.haptics.model.layout import STATUS_OK, new_command, new_reading, records
+from study_app.haptics.model.scene import Scene
+from study_app.haptics.runtime.clocks.clock import Clock, raise_priority
+from study_app.haptics.runtime.clocks.grants import NO_THREAD, Blocks, Grant
+from study_app.haptics.runtime.pack import pack, pack_into
+from study_app.haptics.runtime.suspension import allow_suspension, refuse_suspension
+from study_app.haptics.runtime.telemetry import Telemetry
+
+_FOREVER = -1
+_PATIENCE_S = 2.0  # for a loop that was told to end; it takes one turn
+_STUCK_NS = 75_000_000  # a tick late by this may never come: seen with the next frame, it is known within 100 ms
+_SUSPENDED_NS = 100_000_000  # less is the error of two clocks that are read one after the other
+_THAW_S = 0.25  # within which a loop goes on that stood still with the whole process
+
+
+class LoopThread:
+    """What the loop needs to turn, kept apart from the servo, so that a servo nobody holds any more is collected.
+
+    Parameters
+    ----------
+    driver, clock : what it reads and writes, and when
+    rest : a scene without liquids, which it begins with
+    elements : wake elements each of the two slots has room for
+    real_time : whether to ask for a thread that runs before others
+    """
+
+    def __init__(
+        self,
+        driver: Driver,
+        clock: Clock,
+        rest: Scene,
+        elements: int,
+        telemetry: Telemetry,
+        *,
+        real_time: bool = True,
+    ) -> None:
+        self.clock = clock
+        self._driver = driver  # both kept alive: the loop has nothing but addresses of theirs
+        self.live = False  # begun, and not ended
+        self.thread: threading.Thread | None = None
+        self.grant: Grant = NO_THREAD
+        self.control = records(CONTROL, 1)
+        self.control[0].period_ns = round(1e9 / rest.rate_hz)
+        self._rest = rest
+        self._real_time = real_time
+        self._rate_hz = rest.rate_hz
+        self._suspended_ns = clock.suspended_ns()
+        self._stuck_at = -1  # the count of turns at which it was found stuck
+        self._safety = self._new_safety()
+        self._slots = (pack(rest, capacity=elements), pack(rest, capacity=elements))
+        self._output = Output(telemetry.ring, telemetry.written)
+        self._exchanged = Records(new_reading(), new_command())
+        self._device = DeviceCalls(driver.context, driver.read.address, driver.write.address)
+        self._arguments = (
+            self.control,
+            self._slots,
+            self._safety,
+            self._exchanged,
+            self._output,
+            self._device,
+            ClockCalls(clock.context, clock.now.address, clock.sleep.address),
+        )
+
+    def compile(self) -> None:
+        """Compile the loop for its arguments, or load it from the cache: zero force is written, no turn taken."""
+        let_go(self._exchanged.command, self._device)
+        run(*self._arguments, 0)
+
+    @property
+    def stuck(self) -> bool:
+        """Whether the tick that is due, or under way, has been so for so long that something hangs.
+
+        Where the whole process stood still, whoever asks may run before the loop: then the loop gets time to go on.
+        """
+        turns = int(self.control[0].turns)
+        late_ns = self._late_ns
+        if late_ns <= _STUCK_NS or turns == self._stuck_at:
+            return late_ns > _STUCK_NS
+        until_s = time.monotonic() + (_THAW_S if late_ns > 2 * _STUCK_NS else 0.0)
+        while self._late_ns > _STUCK_NS:
+            if time.monotonic() >= until_s:
+                self._stuck_at = turns
+                return True
+            time.sleep(1e-3)
+        return False
+
+    @property
+    def _late_ns(self) -> int:
+        """How long a tick is due while the loop runs [ns]."""
+        running = self.thread is not None and self.live and self.control[0].run != 0
+        return self.clock.now_ns() - int(self.control[0].deadline_ns) if running else 0
+
+    @property
+    def worst_gap_ns(self) -> int:
+        """The longest time between two ticks since the newest scene was handed over, up to now [ns].
+
+        The loop keeps it itself, whatever telemetry lost. The time that the machine was suspended counts, during which
+        the loop's clock stands still (`Clock.suspended_ns`).
+        """
+        host = self.control[0]
+        now_ns = self.clock.now_ns() - int(host.began_ns)
+        kept_ns = int(host.worst_gap_ns) if host.taken == host.request else 0
+        suspended_ns = self.clock.suspended_ns() - self._suspended_ns
+        return max(now_ns, kept_ns, suspended_ns if suspended_ns > _SUSPENDED_NS else 0)
+
+    def start(self) -> None:
+        """Turn in a thread of its own until `end`; until then Ctrl-Z does not stop it with its force on."""
+        self._begin()
+        refuse_suspension(self)
+        ready = threading.Event()
+        self.thread = threading.Thread(target=self._turn, args=(ready,), name="servo", daemon=True)
+        self.thread.start()
+        ready.wait()
+
+    def advance(self, turns: int) -> int:
+        """Take ``turns`` in the calling thread; return how many were taken."""
+        if not self.live:
+            self._begin()
+        return int(run(*self._arguments, max(turns, 0)))
+
+    def hand_over(self, scene: Scene, serial: int, *, goes_on: bool = False) -> None:
+        """Pack ``scene`` into the spare slot and let the next turn take it; first let it take the one before.
+
+        With ``goes_on`` the turn takes nothing but its numbers.
+        """
+        host = self.control[0]
+        patience = time.monotonic() + _PATIENCE_S
+        while self.thread is not None and self.thread.is_alive() and not self._all_taken:
+            if time.monotonic() > patience:
+                raise self._silence()
+            time.sleep(host.period_ns * 1e-9)
+        spare = (int(host.request) + 1) % 2
+        pack_into(self._slots[spare], scene, dynamics=self._driver.dynamics)
+        if not goes_on:
+            self._suspended_ns = self.clock.suspended_ns()
+        (offer_numbers if goes_on else offer_scene)(self.control, spare, serial)
+
+    @property
+    def delay_ticks(self) -> int:
+        """How many ticks late a force is believed to act at present."""
+        return int(self._safety[0].delay_ticks)
+
+    @property
+    def _all_taken(self) -> bool:
+        host = self.control[0]
+        return bool(host.taken == host.request and host.numbers_taken == host.numbers)
+
+    def end(self) -> None:
+        """End the loop, wait for it, and write zero force once more from here; then rest is what it would begin with.
+
+        Raises
+        ------
+        ServoFault
+            The loop does not answer: the device's driver hangs.
+        """
+        if not self.live:
+            return
+        self.control[0].run = 0
+        if self.thread is not None and self.thread is not threading.current_thread():
+            self.thread.join(_PATIENCE_S)
+            if self.thread.is_alive():
+                raise self._silence()
+        self.thread = None
+        self.live = False
+        let_go(self._exchanged.command, self._device)
+        allow_suspension(self)
+        self.hand_over(self._rest, 0)
+
+    def _blocks(self) -> Blocks:
+        """Return the memory that the loop works in."""
+        arrays = (self.control, *self._slots[0], *self._slots[1], self._safety, *self._exchanged, *self._output)
+        return [(array.ctypes.data, array.nbytes) for array in arrays if array.nbytes]
+
+    def _silence(self) -> ServoFault:
+        return ServoFault(
+            f"the servo is stuck: its device '{self._driver.name}' gave no answer for {_PATIENCE_S:g} s; switch it off"
+        )
+
+    def _new_safety(self) -> Any:
+        """Return the safety record of a loop that begins, for the delay that the device measured.
+
+        Raises
+        ------
+        DeviceError
+            The device is so slow that no force is stable.
+        """
+        driver = self._driver
+        delay_ticks = driver.dynamics.delay_ticks(self._rate_hz)
+        if delay_ticks > MOST_DELAY:
+            raise DeviceError(
+                f"the device '{driver.name}' answers {delay_ticks} ticks late at {self._rate_hz:g} Hz, and no force is "
+                f"stable beyond {MOST_DELAY}: connect it without a hub, close what else uses the bus, start anew"
+            )
+        return new_safety(driver.force_limit_n, delay_ticks)
+
+    def _begin(self) -> None:
+        _leave_by_the_exit()
+        _live.add(self)
+        self._safety[0] = self._new_safety()[0]
+        host = self.control[0]
+        host.status = STATUS_OK
+        host.began_ns = self.clock.now_ns()
+        host.deadline_ns = host.began_ns + host.period_ns
+        host.run = 1
+        self.live = True
+
+    def _turn(self, ready: threading.Event) -> None:
+        try:
+            self.grant = raise_priority(self._blocks(), real_time=self._real_time)
+            self.control[0].began_ns = self.clock.now_ns()
+            self.control[0].deadline_ns = self.control[0].began_ns + self.control[0].period_ns
+        finally:
+            ready.set()
+        try:
+            run(*self._arguments, _FOREVER)
+        finally:
+            let_go(self._exchanged.command, self._device)
+
+
+_live: weakref.WeakSet[LoopThread] = weakref.WeakSet()
+
+
+def _leave_by_the_exit() -> None:
+    """Let signals that would kill the process at once end it as ``sys.exit`` does; others keep their handlers."""
+    if threading.current_thread() is not threading.main_thread():
+        return
+    for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK"):
+        number = getattr(signal, name, None)
+        if number is not None and signal.getsignal(number) is signal.SIG_DFL:
+            signal.signal(number, _leave)
+
+
+def _leave(number: int, _frame: FrameType | None) -> None:
+    for loop in tuple(_live):
+        loop.control[0].run = 0
+    raise SystemExit(128 + number)

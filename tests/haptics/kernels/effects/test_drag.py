@@ -1,0 +1,91 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from study_app.haptics.model.laws import LAWS, drag_n
+from study_app.haptics.model.scene import Body, Drag, Given
+from study_app.haptics.runtime.offline import simulate
+from tests.haptics.scenes import UNBENT, WATER_FACTOR, examples, liquid, moving, scene, vectors
+
+speeds = st.floats(-20, 20)
+
+
+def test_water_at_one_metre_a_second_resists_with_the_drag_equation():
+    table = simulate(scene(), moving([(1.0, 0.0, 0.0)]))
+    assert table.fx_n[0] == pytest.approx(-0.5 * 1000 * 0.47 * 3.6317e-3, rel=1e-4)
+    assert (table.fy_n[0], table.fz_n[0]) == (0.0, 0.0)
+
+
+@settings(max_examples=examples(100), deadline=None)
+@given(vx=speeds, vy=speeds, vz=speeds, density=st.floats(1, 20_000), diameter=st.floats(0.001, 1), cd=st.floats(0, 10))
+def test_drag_is_half_rho_cd_a_v_squared_against_the_motion(vx, vy, vz, density, diameter, cd):
+    body = Body(diameter_m=diameter, drag_coefficient=cd)
+    table = simulate(scene(liquid(density), body=body, knee=UNBENT), moving([(vx, vy, vz)]))
+    v = np.array([vx, vy, vz])
+    expected = -0.5 * density * cd * (np.pi * diameter**2 / 4) * np.linalg.norm(v) * v
+    assert vectors(table, "force")[0] == pytest.approx(expected, rel=1e-12, abs=1e-12)
+
+
+def test_no_motion_is_no_force():
+    table = simulate(scene(), moving(np.zeros((5, 3))))
+    assert not vectors(table, "force").any()
+
+
+@settings(max_examples=examples(50), deadline=None)
+@given(angle=st.floats(0, 2 * np.pi), vx=speeds, vy=speeds, vz=speeds)
+def test_turning_the_motion_about_the_vertical_turns_the_force(angle, vx, vy, vz):
+    turn = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
+    v = np.array([vx, vy, vz])
+    straight, turned = (vectors(simulate(scene(), moving([u])), "force")[0] for u in (v, turn @ v))
+    assert turned == pytest.approx(turn @ straight, abs=1e-12 * max(np.linalg.norm(straight), 1))
+
+
+def test_two_liquids_in_one_place_do_not_add_up():
+    both = scene(liquid(1000, id="a"), liquid(500, id="b"), velocity=Given())
+    assert simulate(both, moving([(1.0, 0.0, 0.0)])).fx_n[0] == pytest.approx(-WATER_FACTOR / 2)
+
+
+def viscous(law, density, viscosity, **fields):
+    return scene(liquid(density, viscosity_pa_s=viscosity, drag=Drag(law=law)), knee=UNBENT, **fields)
+
+
+@pytest.mark.parametrize("law", ["constant", *LAWS])
+@settings(max_examples=examples(50), deadline=None)
+@given(
+    velocity=st.tuples(speeds, speeds, speeds),
+    scale=st.sampled_from([1.0, 1e-3, 1e-9]),
+    density=st.floats(500, 2000),
+    viscosity=st.floats(1e-4, 1e3),
+    diameter=st.floats(0.001, 1),
+)
+def test_drag_follows_its_law_against_the_motion(law, velocity, scale, density, viscosity, diameter):
+    body = Body(diameter_m=diameter)
+    v = scale * np.array(velocity)
+    force = vectors(simulate(viscous(law, density, viscosity, body=body), moving([v])), "force")[0]
+    fluid = {"density_kg_m3": density, "viscosity_pa_s": viscosity, "diameter_m": diameter, "drag_coefficient": 0.47}
+    speed = np.linalg.norm(v)
+    expected = -drag_n(law, speed, **fluid) * v / speed if speed > 0 else 0 * v
+    assert force == pytest.approx(expected, rel=1e-9, abs=1e-100)
+
+
+@pytest.mark.parametrize("law", ["haider-levenspiel", "brown-lawler"])
+@pytest.mark.parametrize(
+    ("density", "viscosity", "at_half_mps_n", "mps_at_8_n"),
+    [(998.2, 1.0016e-3, 0.2166, 3.01), (913, 0.084, 0.2652, 3.51), (1420, 10, 4.622, 0.780), (1150, 100, None, 0.121)],
+)
+def test_real_liquids_are_as_strong_as_published(law, density, viscosity, at_half_mps_n, mps_at_8_n):
+    felt = simulate(viscous(law, density, viscosity), moving([(0.5, 0, 0), (mps_at_8_n, 0, 0)])).fx_n
+    if at_half_mps_n is not None:
+        assert felt[0] == pytest.approx(-at_half_mps_n, rel=0.07)
+    assert felt[1] == pytest.approx(-8, rel=0.07)
+
+
+def test_a_coasting_ball_slows_down_as_the_exact_solution_says():
+    # m v' = -c v²: from 1 m/s to 0.10526 m/s in one second for m/c = 0.1/0.85, by the time m dv/F takes.
+    body = Body(drag_coefficient=2 * 0.85 / (1000 * np.pi * 0.034**2))
+    v = np.linspace(1 / 9.5, 1.0, 100_001)
+    force = simulate(scene(body=body, knee=UNBENT), moving(np.outer(v, [0.6, 0, 0.8])))
+    resisting = np.linalg.norm(vectors(force, "force"), axis=1)
+    assert 0.1 * np.trapezoid(1 / resisting, v) == pytest.approx(1.0, rel=1e-6)
+    assert v[0] == pytest.approx(0.10526316, abs=1e-8)

@@ -1,0 +1,127 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from study_app.haptics.kernels.effects.history import TIMES, WEIGHTS
+from study_app.haptics.model.motion import Motion
+from study_app.haptics.model.scene import Box, Drag, History
+from study_app.haptics.runtime.offline import simulate
+from study_app.haptics.runtime.pack import pack
+from tests.haptics.scenes import COMPILED, UNBENT, examples, liquid, moving, scene, vectors
+
+HONEY = {"density_kg_m3": 1420, "viscosity_pa_s": 10}
+GLYCERIN = {"density_kg_m3": 1261, "viscosity_pa_s": 1.41}
+OLIVE_OIL = {"density_kg_m3": 913, "viscosity_pa_s": 0.084}
+WATER = {"density_kg_m3": 998.2, "viscosity_pa_s": 1.0016e-3}
+RADIUS_M = 0.034
+CREEPING_MPS = 1e-10
+
+
+def tank(effects=("history",), *, rate_hz=1000.0, history=None, **fluid):
+    """Return a scene of one viscous liquid, laws of creeping flow, velocities as given."""
+    one = liquid(**fluid, effects=effects, drag=Drag(law="haider-levenspiel"), history=History(**(history or {})))
+    return scene(one, knee=UNBENT, rate_hz=rate_hz)
+
+
+def basset(fluid, t_s, speed_mps, ages_s):
+    """Return −6 R² √(πρµ) ∫ dw/dτ (t − τ)^(−½) dτ for speeds (n,) that are straight lines between their times."""
+    factor = 6 * RADIUS_M**2 * np.sqrt(np.pi * fluid["density_kg_m3"] * fluid["viscosity_pa_s"])
+    slope = np.diff(speed_mps) / np.diff(t_s)
+    since = np.sqrt(np.maximum(ages_s - t_s[:-1], 0)) - np.sqrt(np.maximum(ages_s - t_s[1:], 0))
+    return -factor * np.sum(slope * 2 * since)
+
+
+def test_the_exponentials_are_the_kernel_within_a_percent_up_to_a_hundred_windows():
+    tau = np.geomspace(1, 100, 4000)
+    times, weights = np.array(TIMES), np.array(WEIGHTS)
+    kernel = (weights * np.sqrt(np.e / times) * np.exp(-tau[:, None] / (2 * times))).sum(axis=1)
+    assert abs(kernel * np.sqrt(tau) - 1).max() <= 0.007
+
+
+@pytest.mark.skipif(not COMPILED, reason="tens of thousands of ticks are for compiled code")
+@pytest.mark.parametrize(
+    ("fluid", "hertz", "damping_nspm", "inertia_kg"),
+    [
+        (HONEY, 1, 11.011, 0.8494),
+        (HONEY, 2, 12.918, 0.6348),
+        (GLYCERIN, 1, 2.532, 0.3630),
+        (OLIVE_OIL, 1, 0.392, 0.1290),
+        (WATER, 1, 0.0393, 0.0883),
+    ],
+)
+def test_creeping_oscillation_is_that_of_landau_and_lifshitz(fluid, hertz, damping_nspm, inertia_kg):
+    rate_hz = 5000.0  # a difference lags by half a tick: at 1 kHz that adds 4 % to what little damping water has
+    omega, t_s = 2 * np.pi * hertz, np.arange(100_000) / rate_hz
+    speed, acceleration = CREEPING_MPS * np.sin(omega * t_s), CREEPING_MPS * omega * np.cos(omega * t_s)
+    motion = moving(np.outer(speed, [0.6, 0.0, 0.8]), 1 / rate_hz)
+    felt = simulate(tank(("drag", "added_mass", "history"), rate_hz=rate_hz, **fluid), motion)
+    late = t_s >= 15
+    along = (vectors(felt, "force") @ [0.6, 0.0, 0.8])[late]
+    (damping, inertia), *_ = np.linalg.lstsq(-np.column_stack([speed, acceleration])[late], along, rcond=None)
+    assert damping == pytest.approx(damping_nspm, rel=0.01)
+    assert inertia == pytest.approx(inertia_kg, rel=0.01)
+
+
+@pytest.mark.skipif(not COMPILED, reason="thousands of ticks are for compiled code")
+@pytest.mark.parametrize(
+    ("fluid", "factors"), [(HONEY, (1.723, 1.323, 1.229, 1.102)), (GLYCERIN, (2.814, 1.811, 1.574, 1.257))]
+)
+def test_a_sudden_start_is_felt_long_after(fluid, factors):
+    velocity = np.full((5100, 3), [CREEPING_MPS, 0.0, 0.0])
+    velocity[:10] = 0.0
+    felt = simulate(tank(("drag", "history"), **fluid), moving(velocity)).fx_n
+    stokes = 6 * np.pi * fluid["viscosity_pa_s"] * RADIUS_M * CREEPING_MPS
+    at = [9 + round(1000 * t) for t in (0.1, 0.5, 1.0, 5.0)]
+    assert -felt[at] / stokes == pytest.approx(factors, rel=0.006)
+
+
+@settings(max_examples=examples(30), deadline=None)
+@given(
+    legs=st.lists(st.floats(-2, 2), min_size=1, max_size=8),
+    pace=st.sampled_from([[1.0], [1.0, 0.7, 1.4, 0.9, 3.0], [5.0], [0.21]]),
+)
+def test_within_the_window_and_far_beyond_it_is_the_integral(legs, pace):
+    ticks = 40 * len(legs) if COMPILED else 12 * len(legs)
+    interval_s = 1e-3 * np.resize(pace, ticks)
+    speed = np.repeat(np.cumsum(legs), ticks // len(legs))
+    motion = moving(np.outer(speed, [0.0, 1.0, 0.0]), interval_s)
+    felt = simulate(tank(**HONEY, history={"window_s": 0.02}), motion).fy_n
+    exact = [basset(HONEY, motion.t_s[: k + 1], speed[: k + 1], motion.t_s[k]) for k in range(1, ticks)]
+    assert felt[0] == 0.0
+    # Ticks that come five times too fast outgrow the rows of the window: the exponentials count from a fifth of it.
+    worst = 0.02 if pace == [0.21] else 0.002
+    assert abs(felt[1:] - exact).max() <= worst * max(abs(np.array(exact)).max(), 1e-12)
+
+
+def test_even_motion_has_no_history():
+    assert not simulate(tank(**HONEY), moving(np.tile([1.0, 0.5, 0.0], (60, 1)))).fx_n.any()
+
+
+def test_measured_velocities_are_smoothed_first():
+    place_m = np.zeros((80, 3))
+    place_m[40:, 0] = 38e-6  # one count of an encoder, at scale 1
+    motion = Motion(np.arange(80) / 1000, place_m)
+    one = liquid(**HONEY, effects=("history",))
+    raw = one.model_copy(update={"history": History(smoothing_s=0.0)})
+    rough, smooth = (abs(simulate(scene(fluid), motion).fx_n).max() for fluid in (raw, one))
+    assert smooth < 0.35 * rough
+
+
+def test_it_owns_rows_for_its_window_at_the_rate_of_the_scene():
+    few, many = (pack(tank(**HONEY, rate_hz=rate, history={"window_s": 0.05})) for rate in (500.0, 2000.0))
+    assert (len(few.intervals), len(many.intervals)) == (29, 104)
+    assert len(few.exponentials) == 10
+
+
+def test_after_leaving_the_past_is_forgotten():
+    pool = liquid(**HONEY, effects=("history",), region=Box(size_m=(1, 1, 1)))
+    t_s = np.arange(200) / 1000
+    x_m = np.where(t_s < 0.1, 0.0, np.where(t_s < 0.14, 1.0, 0.0))
+    velocity = np.zeros((200, 3))
+    velocity[50:100, 0] = 1.0
+    motion = moving(velocity)
+    motion.position_m[:, 0] = x_m
+    felt = simulate(scene(pool), motion).fx_n
+    assert abs(felt[99]) > 0.1
+    assert not felt[125:].any()

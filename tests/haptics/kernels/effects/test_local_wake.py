@@ -1,0 +1,209 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from study_app.evaluation.references import local_wakes
+from study_app.haptics.model.effects.records import CELLS
+from study_app.haptics.model.motion import Motion
+from study_app.haptics.model.paths import path
+from study_app.haptics.model.scene import Box, LocalWake, Uniform
+from study_app.haptics.runtime.offline import simulate
+from study_app.haptics.runtime.pack import pack
+from tests.haptics.scenes import COMPILED, UNBENT, WATER_FACTOR, Hand, examples, liquid, moving, scene, vectors
+
+STEP_S = 1e-3
+
+
+def tank(*others, current=None, **wake):
+    """Return a scene of water with this local wake, by default of 100 elements that do not fade or spread."""
+    plain = {"length": 100, "scaling": 100, "decay": 1.0, "spreading_m2ps": 0.0}
+    effects = ("drag", "local_wake", *others)
+    return scene(liquid(effects=effects, local_wake=LocalWake(**{**plain, **wake}), current=current), knee=UNBENT)
+
+
+def legs(*pieces):
+    """Return a motion of (velocity, seconds) pieces, and the row after each."""
+    velocities = [np.tile(np.asarray(velocity, float), (round(seconds / STEP_S), 1)) for velocity, seconds in pieces]
+    return moving(np.concatenate(velocities)), np.cumsum([len(piece) for piece in velocities])
+
+
+def literal(felt, motion):
+    """Return what the definition says, element by element."""
+    wake = felt.liquids[0].local_wake
+    interval_s = np.diff(motion.t_s, prepend=motion.t_s[0] - 1 / felt.rate_hz)
+    h_mps = motion.velocity_mps * np.array([1.0, 1.0 if wake.axes == "xyz" else 0.0, 1.0])
+    numbers = (wake.length, wake.scaling, wake.exponent, wake.decay, wake.reach_m or 0.068, wake.spreading_m2ps)
+    return local_wakes(h_mps, motion.position_m, interval_s, *numbers)
+
+
+PATHS = {
+    "circle": {},
+    "stop": {},
+    "zigzag": {},
+    "reach": {"distance_m": 0.2},
+    "reverse": {},
+}
+
+
+@pytest.mark.skipif(not COMPILED, reason="seconds of motion are for compiled code")
+@pytest.mark.parametrize("name", PATHS)
+@pytest.mark.parametrize(("length", "worst"), [(300, 0.01), (1700, 0.06)])
+def test_cells_stand_for_their_elements(name, length, worst):
+    felt = tank(length=length, scaling=length, decay=0.999975, spreading_m2ps=1e-3)
+    motion = path(name, **PATHS[name])
+    exact = literal(felt, motion)
+    error = np.linalg.norm(vectors(simulate(felt, motion), "wake") - exact, axis=1)
+    assert error.max() <= worst * np.linalg.norm(exact, axis=1).max()
+
+
+def test_within_one_cell_the_first_ticks_are_the_definition():
+    felt = tank(decay=0.99, exponent=0.5)
+    motion = moving(np.tile([0.5, 0.0, 0.1], (6, 1)))
+    assert vectors(simulate(felt, motion), "wake") == pytest.approx(literal(felt, motion), rel=1e-3)
+
+
+@pytest.mark.parametrize("exponent", [0.5, 1.0, 2.0])
+def test_what_fades_counts_less_in_the_response_too(exponent):
+    felt = tank(decay=0.95, exponent=exponent)
+    motion, (moved, _, again) = legs(((1.0, 0, 0), 0.02), ((0.0, 0, 0), 0.03), ((0.2, 0, 0), 0.02))
+    exact = literal(felt, motion)
+    assert vectors(simulate(felt, motion), "wake")[moved:again] == pytest.approx(
+        exact[moved:again], rel=0.01, abs=1e-12
+    )
+
+
+def test_who_leaves_fast_after_a_stop_feels_nothing_and_who_returns_does():
+    there, back = ((0.0, 0.0, 2.0), 0.3), ((0.0, 0.0, -2.0), 0.3)
+    motion, (_, stopped, left, _, returned, _) = legs(
+        ((1.0, 0, 0), 0.8), ((0.0, 0, 0), 0.2), there, ((0, 0, 0), 0.1), back, ((0, 0, 0), 0.1)
+    )
+    wake = {"length": 3000, "scaling": 3000}
+    tail = simulate(scene(liquid(wake={**wake, "breaking_span_m": 0.0}), knee=UNBENT), motion)
+    local = simulate(tank(**wake, decay=0.999975, spreading_m2ps=1e-3), motion)
+    push_there, push_away, push_again = local.fx_n[stopped - 1], local.fx_n[left + 50], local.fx_n[returned + 50]
+    assert tail.wake_x_mps[left + 50] > 0.25  # the fault: 0.6 m away, the tail still pushes to where it was going
+    assert tail.fx_n[left + 50] > 1000 * push_there * 1e-4
+    assert push_there > 0.0
+    assert abs(push_away) < 1e-6 * push_there
+    assert push_again > 0.5 * push_there
+
+
+def test_steady_motion_meets_liquid_at_rest_but_for_what_is_right_behind():
+    motion, _ = legs(((1.0, 0, 0), 3.0))
+    local = simulate(tank(length=1700, scaling=1700), motion)
+    tail = simulate(scene(liquid(wake={"length": 1700, "scaling": 1700}), knee=UNBENT), motion)
+    assert local.wake_x_mps[-1] < 0.07
+    assert local.fx_n[-1] < -0.85 * WATER_FACTOR
+    assert tail.fx_n[-1] > -0.01 * WATER_FACTOR
+
+
+@pytest.mark.skipif(not COMPILED, reason="seconds of motion are for compiled code")
+def test_circling_in_one_place_builds_a_whirl_that_is_felt_in_all_of_it():
+    motion = path("circle", radius_m=0.1, revolutions=8.0, rest_s=0.5)
+    felt = simulate(tank(length=5000, scaling=5000), motion)
+    round_once = round(2 * np.pi * 0.1 / STEP_S)
+    along = (vectors(felt, "wake") * motion.velocity_mps).sum(axis=1)
+    assert (along[round_once : 5 * round_once] > 1.5 * along[round_once // 2]).mean() > 0.9
+
+
+def test_rest_displaces_it_within_its_length():
+    motion, (_, stopped) = legs(((1.0, 0.0, 0.0), 0.1), ((0.0, 0.0, 0.0), 0.1))
+    felt = simulate(tank(), Motion(motion.t_s, np.zeros_like(motion.position_m), motion.velocity_mps))
+    assert felt.wake_x_mps[100] == pytest.approx(1.0)
+    assert felt.wake_x_mps[100:stopped] == pytest.approx(1 - np.arange(100) / 100, abs=0.07)
+
+
+@pytest.mark.parametrize("spreading", [0.0, 1e-3, 5e-3])
+def test_it_spreads_as_in_a_viscous_liquid(spreading):
+    motion, (moved, _) = legs(((0.5, 0.0, 0.0), 0.02), ((0.0, 0.0, 0.0), 2.0))
+    felt = simulate(tank(length=50_000, scaling=50_000, spreading_m2ps=spreading, reach_m=0.1), motion)
+    age_s = motion.t_s - motion.t_s[moved - 1]
+    wide_m2 = 0.1**2 + 2 * spreading * age_s
+    expected = felt.wake_x_mps[moved] * (0.1**2 / wide_m2) ** 1.5
+    assert felt.wake_x_mps[moved:] == pytest.approx(expected[moved:], rel=0.02)
+
+
+@pytest.mark.parametrize("distance", [0.0, 0.05, 0.1, 0.2])
+def test_it_fades_with_the_distance_from_its_place(distance):
+    velocity = np.zeros((40, 3))
+    velocity[:10, 0] = 0.3
+    position = np.zeros((40, 3))
+    position[10:, 2] = distance
+    felt = simulate(tank(reach_m=0.1), Motion(np.arange(40) * STEP_S, position, velocity)).wake_x_mps
+    near = simulate(tank(reach_m=0.1), Motion(np.arange(40) * STEP_S, 0 * position, velocity)).wake_x_mps
+    assert felt[10:] == pytest.approx(near[10:] * np.exp(-0.5 * (distance / 0.1) ** 2), rel=1e-9)
+
+
+@settings(max_examples=examples(30), deadline=None)
+@given(
+    seed=st.integers(0, 2**32 - 1), current=st.tuples(*[st.floats(-2, 2)] * 3), exponent=st.sampled_from([0.5, 1, 2])
+)
+def test_a_current_carries_it_along(seed, current, exponent):
+    random = np.random.default_rng(seed)
+    velocity = np.repeat(random.uniform(-2, 2, (8, 3)), 15, axis=0)
+    pond = moving(velocity)
+    river = moving(velocity + np.array(current))
+    flowing = tank("current", current=Uniform(velocity_mps=current), exponent=exponent)
+    still = vectors(simulate(tank(exponent=exponent), pond), "wake")
+    assert vectors(simulate(flowing, river), "wake") == pytest.approx(still, abs=1e-9)
+
+
+@settings(max_examples=examples(40), deadline=None)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    length=st.sampled_from([1, 2, 7, 50, 400]),
+    exponent=st.sampled_from([0.25, 1.0, 3.0]),
+    decay=st.sampled_from([1.0, 0.999975, 0.8]),
+    reach=st.sampled_from([None, 1e-3, 10.0]),
+)
+def test_whatever_the_motion_it_never_outruns_the_body_and_loses_no_element(seed, length, exponent, decay, reach):
+    random = np.random.default_rng(seed)
+    hand = Hand(tank(length=length, scaling=length, exponent=exponent, decay=decay, reach_m=reach, axes="xyz"))
+    place, fastest = np.zeros(3), 0.0
+    for turn in range(1, 600 if COMPILED else 60):
+        if turn % 40 == 0:
+            speed, heading = random.choice([0.0, 1e-4, 0.01, 2.0]), random.normal(size=3)
+        elif turn == 1:
+            speed, heading = 0.5, random.normal(size=3)
+        place = place + speed * STEP_S * heading / np.linalg.norm(heading)
+        sample = hand.turn(place)
+        fastest = max(fastest, float(np.linalg.norm(sample.velocity_mps)))
+        assert np.linalg.norm(sample.wake_mps) <= fastest * (1 + 1e-12)
+        tracks = hand.model.liquid_states[0].local_wake
+        rows = (tracks.first + np.arange(tracks.cells)) % CELLS
+        assert tracks.held == min(turn, length)
+        assert hand.model.cells["count"][rows].sum() == tracks.held
+
+
+def test_the_oldest_cells_are_merged_and_nothing_of_them_is_lost():
+    hand = Hand(tank(length=50_000, scaling=50_000))
+    hand.sweep(2.0, 600)  # 12 m of path: 176 diameters
+    tracks = hand.model.liquid_states[0].local_wake
+    assert tracks.cells == CELLS
+    motion = hand.model.cells["velocity_mps"].sum(axis=0)
+    assert motion[0] == pytest.approx(hand.model.cells["speed_mps"].sum())
+    assert hand.model.cells["count"].sum() == 600
+
+
+def test_out_of_the_liquid_it_is_forgotten():
+    pool = tank().liquids[0].model_copy(update={"region": Box(size_m=(1, 1, 1))})
+    x_m = np.where((np.arange(120) < 50) | (np.arange(120) > 80), 0.0, 3.0)
+    motion = Motion(np.arange(120) * STEP_S, np.column_stack([x_m, 0 * x_m, 0 * x_m]), np.tile([1.0, 0, 0], (120, 1)))
+    wake = simulate(scene(pool, knee=UNBENT), motion).wake_x_mps
+    assert wake[49] == pytest.approx(0.49)
+    assert not wake[75:82].any()
+    assert wake[82] == pytest.approx(0.01)
+
+
+@pytest.mark.parametrize(("axes", "rises"), [("xz", False), ("xyz", True)])
+def test_vertical_motion_enters_only_where_asked(axes, rises):
+    felt = simulate(tank(axes=axes), moving(np.tile([1.0, 1.0, 0.0], (20, 1))))
+    assert felt.wake_x_mps[-1] > 0
+    assert (felt.wake_y_mps[-1] > 0) == rises
+
+
+def test_it_owns_its_cells_and_nothing_else():
+    model = pack(tank())
+    assert (len(model.cells), len(model.elements), len(model.intervals)) == (CELLS, 0, 0)
+    assert len(pack(scene()).cells) == 0

@@ -1,0 +1,147 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from study_app.haptics.kernels.regions import share_out
+from study_app.haptics.model.motion import Motion
+from study_app.haptics.model.scene import Box, Cylinder, Given
+from study_app.haptics.runtime.offline import simulate
+from study_app.haptics.runtime.pack import pack
+from tests.haptics.scenes import UNBENT, WATER_FACTOR, examples, liquid, scene, vectors
+
+RADIUS_M = 0.034
+TOP_M = 0.3
+POOL = Box(centre_m=(0.0, -0.2, 0.0), size_m=(2.0, 1.0, 2.0))
+TANK = Cylinder(centre_m=(0.0, -0.2, 0.0), radius_m=1.0, height_m=1.0)
+
+
+def pool(*effects, region=POOL, **fields):
+    return scene(liquid(effects=(*effects, "surface"), region=region, **fields), knee=UNBENT, velocity=Given())
+
+
+def shares(depth, region=POOL):
+    """Return the shares of volume, of the frontal areas upright and level, at h/D = ``depth``."""
+    model = pack(pool("drag", region=region))
+    model.state[0].position_m[1] = TOP_M + RADIUS_M - depth * 2 * RADIUS_M
+    share_out(model, 1e-3)
+    surface = model.liquid_states[0].surface
+    assert model.liquid_states[0].share == surface.volume
+    return surface.volume, surface.upright, surface.level
+
+
+def through(y_m, velocity_mps, interval_s=1e-3):
+    """Return a motion at these heights (n,) with one velocity (3,)."""
+    y_m = np.asarray(y_m, float)
+    places = np.column_stack([0 * y_m, y_m, 0 * y_m])
+    return Motion(np.arange(len(y_m)) * interval_s, places, np.tile(np.asarray(velocity_mps, float), (len(y_m), 1)))
+
+
+@pytest.mark.parametrize("region", [POOL, TANK], ids=["box", "cylinder"])
+@pytest.mark.parametrize(
+    ("depth", "volume", "upright", "level"),
+    [
+        (-0.5, 0, 0, 0),
+        (0.0, 0, 0, 0),
+        (0.1, 0.0280, 0.36, 0.0520),
+        (0.25, 0.15625, 0.75, 0.1955),
+        (0.5, 0.5, 1, 0.5),
+        (0.75, 0.84375, 1, 0.8045),
+        (1.0, 1, 1, 1),
+        (3.0, 1, 1, 1),
+    ],
+)
+def test_the_cap_of_a_ball(depth, volume, upright, level, region):
+    assert shares(depth, region) == pytest.approx((volume, upright, level), abs=5e-5)
+
+
+@settings(max_examples=examples(100), deadline=None)
+@given(depth=st.floats(-0.1, 1.1))
+def test_shares_are_areas_and_volumes_by_quadrature(depth):
+    h = min(max(depth, 0.0), 1.0) * 2 * RADIUS_M
+    z = (np.arange(4000) + 0.5) / 4000 * h - RADIUS_M
+    chord = np.sqrt(RADIUS_M**2 - z**2)
+    dz = h / 4000
+    expected = (
+        math.pi * (chord**2).sum() * dz / (4 / 3 * math.pi * RADIUS_M**3),
+        1.0 if h > RADIUS_M else (2 * RADIUS_M * h - h * h) / RADIUS_M**2,
+        2 * chord.sum() * dz / (math.pi * RADIUS_M**2),
+    )
+    assert shares(depth) == pytest.approx(expected, abs=1e-5)
+
+
+def test_drag_meets_what_is_under_the_surface():
+    half_under = [TOP_M]
+    level = simulate(pool("drag"), through(half_under, (1.0, 0, 0))).fx_n[0]
+    upright = simulate(pool("drag"), through(half_under, (0, 1.0, 0))).fy_n[0]
+    slanted = vectors(simulate(pool("drag"), through(half_under, (0.6, 0.8, 0))), "force")[0]
+    assert level == pytest.approx(-0.5 * WATER_FACTOR)
+    assert upright == pytest.approx(-WATER_FACTOR)
+    assert slanted == pytest.approx(-(0.36 * 0.5 + 0.64) * WATER_FACTOR * np.array([0.6, 0.8, 0]))
+
+
+@pytest.mark.parametrize("effect", ["added_mass", "history"])
+def test_what_goes_by_volume_meets_the_part_under_the_surface(effect):
+    ticks = np.arange(30)
+    halting = np.outer(np.maximum(20 - ticks, 0) * 0.01, [1.0, 0.0, 0.0])
+
+    def force(y_m):
+        places = np.column_stack([0 * ticks, np.full(30, y_m), 0 * ticks])
+        motion = Motion(ticks / 1000, places, halting)
+        return simulate(pool(effect, viscosity_pa_s=1.0), motion).fx_n
+
+    quarter_up, whole = force(TOP_M + RADIUS_M / 2), force(TOP_M - 1)
+    assert quarter_up == pytest.approx(0.15625 * whole)
+    assert whole[19] > 0.1
+
+
+@pytest.mark.parametrize(
+    ("effects", "velocity"),
+    [(("drag",), (1.0, -1.0, 0.0)), (("buoyancy",), (0, -1.0, 0)), (("drag", "buoyancy"), (0.0, -1.0, 0.5))],
+)
+def test_nothing_steps_at_the_surface(effects, velocity):
+    y_m = np.linspace(TOP_M + 0.05, TOP_M - 0.05, 2001)
+    force = vectors(simulate(pool(*effects), through(y_m, velocity)), "force")
+    assert abs(np.diff(force, axis=0)).max() < 0.01 * abs(force).max()
+
+
+def test_buoyancy_does_not_even_bend_there():
+    y_m = np.linspace(TOP_M + 0.05, TOP_M - 0.05, 2001)
+    force = simulate(pool("buoyancy"), through(y_m, (0, 0, 0))).fy_n
+    slope = np.gradient(force, y_m)
+    assert abs(np.diff(slope)).max() < 0.01 * abs(slope).max()
+    assert slope.min() == pytest.approx(-1000 * 9.80665 * math.pi * RADIUS_M**2, rel=1e-4)  # hydrostatic spring
+
+
+def test_entering_through_the_surface_takes_no_time_and_through_a_wall_20_ms():
+    falling = simulate(pool("drag"), through([TOP_M + 0.05, TOP_M - 0.05], (0, -1.0, 0))).fy_n
+    assert falling == pytest.approx([0.0, WATER_FACTOR])
+    x_m = np.where(np.arange(40) < 10, 1.5, 0.9)
+    places = np.column_stack([x_m, np.zeros(40), np.zeros(40)])
+    entering = simulate(pool("drag"), Motion(np.arange(40) / 1000, places, np.tile([-1.0, 0.0, 0.0], (40, 1)))).fx_n
+    assert entering[:10] == pytest.approx(0)
+    assert entering[10:30] == pytest.approx(WATER_FACTOR * np.arange(1, 21) / 20)
+
+
+def test_out_of_the_water_the_wake_is_gone():
+    wake = {"length": 50, "scaling": 50}
+    y_m = np.concatenate([np.full(60, 0.0), np.full(5, TOP_M + 0.05), np.full(5, 0.0)])
+    felt = simulate(pool("drag", "wake", wake=wake), through(y_m, (1.0, 0, 0)))
+    assert felt.wake_x_mps[59] == pytest.approx(1.0, rel=1e-2)
+    assert not felt.wake_x_mps[60:66].any()
+    assert felt.wake_x_mps[66] == pytest.approx(0.02)
+
+
+def test_of_two_liquids_on_top_of_each_other_the_ball_is_shared_at_their_surface():
+    oil = liquid(500, id="oil", region=Box(size_m=(2, 4, 2)), effects=("drag", "buoyancy"))
+    water = liquid(1000, id="water", region=POOL, effects=("drag", "buoyancy", "surface"))
+    felt = scene(oil, water, knee=UNBENT, velocity=Given())
+    volume = 4 / 3 * math.pi * RADIUS_M**3
+    half, above, below = (
+        simulate(felt, through(np.full(30, y), (0, 0, 0))).fy_n[-1] for y in (TOP_M, TOP_M + 0.1, TOP_M - 0.1)
+    )
+    assert above == pytest.approx((500 - 1000) * volume * 9.80665)
+    assert half == pytest.approx((750 - 1000) * volume * 9.80665)
+    assert below == pytest.approx(0.0, abs=1e-12)

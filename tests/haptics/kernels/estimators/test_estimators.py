@@ -1,0 +1,177 @@
+"""The estimators that look back: line and foaw, and the plain difference."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from study_app.errors import StudyError
+from study_app.haptics.model.motion import Motion
+from study_app.haptics.model.scene import Ewma, Foaw, Line, Raw
+from study_app.haptics.runtime.offline import simulate
+from study_app.haptics.runtime.pack import pack, pack_into
+from tests.haptics.scenes import COMPILED, UNBENT, Hand, examples, scene, vectors
+
+COUNT_M = 38e-6
+PEAK_MPS = 0.03 * 2 * np.pi * 1.5
+
+
+def felt(velocity, position_m, interval_s=None):
+    """Return the velocities (n, 3) that an estimator finds in positions (n, 3) or (n,) along x, hand frame."""
+    position_m = np.asarray(position_m, float)
+    if position_m.ndim == 1:
+        position_m = np.column_stack([position_m, 0 * position_m, 0 * position_m])
+    t_s = np.cumsum(np.full(len(position_m), 1e-3) if interval_s is None else interval_s)
+    return vectors(simulate(scene(scale=1, velocity=velocity, knee=UNBENT), Motion(t_s, position_m)), "velocity")
+
+
+def quantised(x_m):
+    """Return what an encoder of 38 µm reports."""
+    return np.round(np.asarray(x_m) / COUNT_M) * COUNT_M
+
+
+def late(velocity, seconds=4):
+    """Return lag [ms] and noise [mm/s] on a quantised sinusoid of ±30 mm at 1.5 Hz, without the first 0.5 s."""
+    t_s = np.arange(seconds * 1000) / 1000
+    v = felt(velocity, quantised(0.03 * np.sin(3 * np.pi * t_s + 0.3)))[500:, 0]
+    lags_s = np.arange(0, 12.1, 0.25) / 1000
+    errors = [np.sqrt(np.mean((v - PEAK_MPS * np.cos(3 * np.pi * (t_s[500:] - lag) + 0.3)) ** 2)) for lag in lags_s]
+    best = int(np.argmin(errors))
+    return 1e3 * lags_s[best], 1e3 * errors[best]
+
+
+@pytest.mark.skipif(not COMPILED, reason="thousands of ticks")
+@pytest.mark.parametrize(
+    ("velocity", "lag_ms", "noise_mmps"),
+    [(Raw(), 0.5, 15.9), (Ewma(), 9.5, 1.39), (Line(), 7.0, 0.64), (Foaw(), 4.5, 2.9)],
+    ids=lambda value: getattr(value, "kind", value),
+)
+def test_lag_and_noise_on_a_quantised_sinusoid(velocity, lag_ms, noise_mmps):
+    lag, noise = late(velocity)
+    assert lag == pytest.approx(lag_ms, abs=0.3)
+    assert noise == pytest.approx(noise_mmps, rel=0.1)
+
+
+@pytest.mark.skipif(not COMPILED, reason="thousands of ticks")
+@pytest.mark.parametrize(
+    ("velocity", "least", "most"),
+    [(Raw(), 11, 15), (Ewma(), 1.0, 1.3), (Line(), 0.55, 0.75), (Foaw(), 0.25, 0.75)],
+    ids=lambda value: getattr(value, "kind", value),
+)
+def test_noise_at_5_mm_per_second(velocity, least, most):
+    v = felt(velocity, quantised(0.005 * np.arange(3000) / 1000 + 1.23e-5))[300:, 0]
+    assert least < 1e3 * v.std() < most
+    assert v.mean() == pytest.approx(0.005, rel=0.02)
+
+
+def test_the_line_is_quieter_and_sooner_than_ewma_and_foaw_turns_first():
+    def turned(velocity):
+        t_s = np.arange(300) / 1000
+        v = felt(velocity, quantised(np.where(t_s < 0.15, 0.1 * t_s, 0.1 * (0.3 - t_s))))[150:, 0]
+        return int(np.flatnonzero(abs(v + 0.1) > 0.02).max()) + 1
+
+    assert turned(Foaw()) <= 3
+    assert 10 <= turned(Line()) <= 13
+    assert 20 <= turned(Ewma()) <= 24
+
+
+irregular = st.lists(st.floats(0.2e-3, 5e-3), min_size=2, max_size=40).map(np.array)
+
+
+@settings(max_examples=examples(60), deadline=None)
+@given(interval_s=irregular, v=st.tuples(*[st.floats(-2, 2)] * 3))
+@pytest.mark.parametrize("velocity", [Line(), Foaw(tolerance_m=1e-6), Raw()], ids=["line", "foaw", "raw"])
+def test_even_motion_is_found_exactly_however_the_clock_jitters(velocity, interval_s, v):
+    positions_m = np.cumsum(interval_s)[:, None] * np.array(v)
+    assert felt(velocity, positions_m, interval_s)[1:] == pytest.approx(np.tile(v, (len(interval_s) - 1, 1)), abs=1e-9)
+
+
+@settings(max_examples=examples(60), deadline=None)
+@given(
+    x_m=st.lists(st.floats(-0.01, 0.01), min_size=2, max_size=40),
+    interval_s=st.lists(st.floats(0.2e-3, 5e-3), min_size=40, max_size=40),
+    samples=st.integers(2, 16),
+)
+def test_the_line_is_that_of_least_squares_through_the_newest_samples(x_m, interval_s, samples):
+    interval_s = np.array(interval_s[: len(x_m)])
+    t_s = np.cumsum(interval_s)
+    v = felt(Line(samples=samples), x_m, interval_s)[:, 0]
+    for k in range(1, len(x_m)):
+        first = max(0, k + 1 - samples)
+        slope = np.polyfit(t_s[first : k + 1] - t_s[k], x_m[first : k + 1], 1)[0]
+        assert v[k] == pytest.approx(slope, rel=1e-6, abs=1e-9)
+
+
+def longest_line(t_s, p_m, samples, tolerance_m):
+    """Return the slope (3,) by the definition: the best-fit line over the longest window that misses no sample."""
+    slope = np.zeros(3)
+    for count in range(2, min(samples, len(t_s)) + 1):
+        t, p = t_s[-count:] - t_s[-1], p_m[-count:]
+        trial = np.array([np.polyfit(t, p[:, axis], 1)[0] for axis in range(3)])
+        inside = p[1:-1] - (p[-1] + np.outer(t[1:-1], trial))
+        if (np.linalg.norm(inside, axis=1) > tolerance_m).any():
+            break
+        slope = trial
+    return slope
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_foaw_is_its_definition_in_space(seed):
+    random = np.random.default_rng(seed)
+    interval_s = random.uniform(0.5e-3, 2e-3, 200)
+    p_m = np.cumsum(random.normal(0, 3e-6, (200, 3)).cumsum(axis=0), axis=0)
+    t_s = np.cumsum(interval_s)
+    v = felt(Foaw(samples=12, tolerance_m=2e-5), p_m, interval_s)
+    expected = [longest_line(t_s[: k + 1], p_m[: k + 1], 12, 2e-5) for k in range(1, 200)]
+    assert v[1:] == pytest.approx(np.array(expected), rel=1e-6, abs=1e-9)
+
+
+def test_foaw_prefers_no_direction():
+    random = np.random.default_rng(5)
+    p_m = np.cumsum(random.normal(0, 3e-6, (300, 3)).cumsum(axis=0), axis=0)
+    q, _ = np.linalg.qr(random.normal(size=(3, 3)))
+    assert felt(Foaw(), p_m @ q.T) == pytest.approx(felt(Foaw(), p_m) @ q.T, abs=1e-9)
+
+
+@pytest.mark.parametrize("velocity", [Line(), Foaw(), Raw()], ids=["line", "foaw", "raw"])
+def test_a_body_at_rest_has_no_velocity_and_the_first_position_says_nothing(velocity):
+    assert not felt(velocity, np.full(30, 0.02)).any()
+    assert not felt(velocity, np.array([0.5, 0.5001]))[0].any()
+
+
+@pytest.mark.parametrize("velocity", [Line(), Foaw()], ids=["line", "foaw"])
+def test_what_was_before_a_loss_of_the_body_is_forgotten(velocity):
+    hand = Hand(scene(scale=1, velocity=velocity))
+    hand.sweep(0.2, 50)
+    for _ in range(5):
+        hand.turn((np.nan, 0, 0))
+    assert not hand.turn((0.03, 0, 0)).velocity_mps.any()
+    assert hand.turn((0.0302, 0, 0)).velocity_mps[0] == pytest.approx(0.2)
+
+
+def test_only_an_estimator_that_looks_back_owns_a_window():
+    rows = {v.kind: len(pack(scene(velocity=v)).window) for v in (Ewma(), Raw(), Line(samples=5), Foaw())}
+    assert rows == {"ewma": 0, "raw": 0, "line": 5, "foaw": 16}
+
+
+def test_a_window_left_out_is_neither_read_nor_written():
+    model = pack(scene(), capacity=0)
+    model.window.position_m = np.nan
+    hand = Hand(scene())
+    hand.model = model
+    assert hand.sweep(0.2, 40)[-1].velocity_mps[0] == pytest.approx(2.0, rel=0.02)
+    assert np.isnan(model.window.position_m).all()
+
+
+def test_any_estimator_fits_a_model_made_with_a_capacity():
+    model = pack(scene(), capacity=0)
+    for velocity in (Foaw(), Line(), Raw(), Ewma()):
+        pack_into(model, scene(velocity=velocity))
+        hand, fresh = Hand(scene()), Hand(scene(velocity=velocity))
+        hand.model = model
+        assert [s.tobytes() for s in hand.sweep(0.1, 30)] == [s.tobytes() for s in fresh.sweep(0.1, 30)]
+
+
+def test_a_window_that_is_too_small_is_refused():
+    with pytest.raises(StudyError, match=r'"line" looks at 15 samples.*room for 5'):
+        pack_into(pack(scene(velocity=Line(samples=5))), scene(velocity=Line()))

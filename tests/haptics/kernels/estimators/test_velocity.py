@@ -1,0 +1,119 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from study_app.errors import StudyError
+from study_app.evaluation.references import lowered
+from study_app.haptics.model.motion import Motion
+from study_app.haptics.model.scene import Ewma, Given, Knee
+from study_app.haptics.runtime.offline import simulate
+from study_app.haptics.runtime.pack import pack, pack_into
+from tests.haptics.scenes import UNBENT, examples, moving, scene, vectors
+
+
+def felt(x_m, rate_hz=1000.0, alpha=0.1, interval_s=None):
+    """Return the velocity along x for positions x_m."""
+    t_s = np.arange(len(x_m)) / rate_hz if interval_s is None else np.cumsum(interval_s)
+    position_m = np.column_stack([x_m, np.zeros(len(x_m)), np.zeros(len(x_m))])
+    filtering = scene(velocity=Ewma(alpha=alpha), knee=UNBENT, rate_hz=rate_hz)
+    return simulate(filtering, Motion(t_s, position_m)).vx_mps
+
+
+def test_the_first_position_says_nothing_about_velocity():
+    assert felt(np.array([5.0]))[0] == 0.0
+
+
+def test_the_second_moves_the_estimate_by_alpha():
+    assert felt(np.array([0.0, 1e-3])) == pytest.approx([0.0, 0.1])
+
+
+def test_steady_acceleration_is_followed_nine_samples_late():
+    t_s = np.arange(3000) / 1000
+    v = felt(0.5 * t_s**2)
+    ideal_of_the_difference = t_s - 0.5e-3
+    assert (ideal_of_the_difference - v)[-1] == pytest.approx(9e-3, rel=1e-6)
+
+
+def test_a_step_of_speed_is_there_to_99_percent_after_44_samples():
+    v = felt(np.arange(100) * 1e-3)
+    assert v[43] < 0.99 <= v[44]
+    assert v[1:] == pytest.approx(1 - 0.9 ** np.arange(1, 100))
+
+
+def test_white_noise_of_position_is_quieted_to_a_tenth():
+    noise = np.random.default_rng(1).normal(0, 1e-5, 20_000)
+    gain = np.std(felt(noise)[200:]) / (1e-5 / 1e-3)
+    assert gain == pytest.approx(0.1 * np.sqrt(2 / 1.9), rel=0.05)
+
+
+@pytest.mark.parametrize("rate_hz", [250.0, 500.0, 2000.0])
+def test_it_is_the_same_filter_at_any_rate(rate_hz):
+    seconds = 0.02
+    slow = felt(np.arange(round(seconds * rate_hz) + 1) / rate_hz, rate_hz=rate_hz)
+    assert slow[-1] == pytest.approx(1 - 0.9**20)
+
+
+def test_a_late_sample_counts_for_the_time_it_covers():
+    interval_s = np.array([1e-3] * 10 + [7e-3] + [1e-3] * 3)
+    v = felt(np.cumsum(interval_s) - 1e-3, interval_s=interval_s)
+    assert v[-1] == pytest.approx(1 - 0.9**19)
+
+
+def test_alpha_one_is_the_plain_difference():
+    x = np.random.default_rng(2).normal(0, 1e-4, 50)
+    assert felt(x, alpha=1.0)[1:] == pytest.approx(np.diff(x) * 1000)
+
+
+def test_given_velocities_are_taken_as_they_are():
+    v = np.random.default_rng(3).normal(0, 1, (20, 3))
+    assert (vectors(simulate(scene(knee=UNBENT), moving(v)), "velocity") == v).all()
+
+
+def test_a_given_velocity_that_is_not_there_is_refused():
+    motion = Motion(np.arange(3) / 1000, np.zeros((3, 3)))
+    with pytest.raises(StudyError, match="vx_mps"):
+        simulate(scene(velocity=Given()), motion)
+
+
+def test_a_device_cannot_feel_with_given_velocities():
+    with pytest.raises(StudyError, match="ewma"):
+        pack_into(pack(scene(), capacity=10), scene(velocity=Given()))
+
+
+@pytest.mark.parametrize(
+    ("law", "speed", "expected"),
+    [
+        ("sqrt", 4.9, 4.9),
+        ("sqrt", 5.0, 5.0),
+        ("sqrt", 9.0, 7.0),
+        ("sqrt", 17.0, 9.0),
+        ("square", 5.5, 5.25),
+        ("square", 7.0, 9.0),
+        ("none", 17.0, 17.0),
+    ],
+)
+def test_the_knee_lowers_speeds_above_its_threshold(law, speed, expected):
+    v = speed * np.array([2.0, -1.0, 2.0]) / 3
+    knee = Knee(law=law)
+    out = vectors(simulate(scene(knee=knee), moving([v])), "velocity")[0]
+    assert out == pytest.approx(v * expected / speed)
+    assert lowered(v, knee) == pytest.approx(v * expected / speed)
+
+
+@settings(max_examples=examples(100), deadline=None)
+@given(a=st.floats(0, 100), b=st.floats(0, 100), threshold=st.floats(0.1, 20))
+def test_the_square_root_knee_keeps_the_order_of_speeds_and_never_raises_one(a, b, threshold):
+    knee = Knee(threshold_mps=threshold)
+    slow, fast = sorted([a, b])
+    out = simulate(scene(knee=knee), moving([(slow, 0, 0), (fast, 0, 0)])).vx_mps
+    assert out[0] <= out[1] + 1e-12
+    assert (out <= np.array([slow, fast]) * (1 + 1e-12)).all()
+
+
+def test_the_filter_keeps_its_state_before_the_knee():
+    fast = felt(np.arange(60) * 0.02)
+    bent = Motion(np.arange(60) / 1000, np.column_stack([np.arange(60) * 0.02, np.zeros(60), np.zeros(60)]))
+    knee = Knee()
+    expected = [lowered(np.array([v, 0, 0]), knee)[0] for v in fast]
+    assert simulate(scene(knee=knee), bent).vx_mps == pytest.approx(expected)

@@ -1,0 +1,98 @@
+"""A scene pays only for what it calls for: memory of effects left out is neither read nor written."""
+
+import numpy as np
+import pytest
+
+from study_app.haptics.runtime.pack import pack, pack_into
+from tests.haptics.scenes import ALL_EFFECTS, COMPILED, PLACES, POOL, Hand, scene, stroke
+
+TICKS = 1000 if COMPILED else 60
+ROWS = {"wake": ("elements", "segments"), "local_wake": ("cells",), "history": ("intervals", "exponentials")}
+THROUGH_DRAG = {"wake", "local_wake", "current"}
+EFFECTS = (*ALL_EFFECTS, "local_wake")
+
+
+def without(effect):
+    """Return a liquid with every effect but this one and those that need it."""
+    base = PLACES if effect == "wake" else POOL
+    gone = {effect} | (THROUGH_DRAG if effect == "drag" else set())
+    return base.model_copy(update={"effects": tuple(one for one in base.effects if one not in gone)})
+
+
+def records_of(model, effect):
+    """Return all memory of an effect."""
+    records = [rows[effect] for rows in (model.liquids, model.liquid_states) if effect in rows.dtype.names]
+    return records + [getattr(model, name) for name in ROWS.get(effect, ())]
+
+
+def poison(record):
+    """Fill every float with NaN, integers with -1."""
+    for name in record.dtype.names:
+        if record.dtype[name].names:
+            poison(record[name])
+        else:
+            record[name][...] = np.nan if record.dtype[name].base == np.float64 else -1
+
+
+def is_poisoned(record):
+    """Return whether all of it still is what `poison` made of it."""
+    copy = record.copy()
+    poison(copy)
+    return copy.tobytes() == record.tobytes()
+
+
+def test_the_memory_of_every_effect_is_known():
+    names = set(pack(scene(POOL)).liquids.dtype.names) | set(pack(scene(POOL)).liquid_states.dtype.names)
+    assert set(EFFECTS) <= names
+    assert all(records_of(pack(scene(POOL)), effect) for effect in EFFECTS)
+
+
+@pytest.mark.parametrize("refilled", [False, True], ids=["packed", "refilled"])
+@pytest.mark.parametrize("effect", EFFECTS)
+def test_an_effect_left_out_is_neither_read_nor_written(effect, refilled):
+    felt = scene(without(effect))
+    hand, clean = Hand(felt), Hand(felt)
+    if refilled:
+        hand.model = pack(scene(POOL), capacity=1000)
+        pack_into(hand.model, felt)
+    memory = records_of(hand.model, effect)
+    for record in memory:
+        poison(record)
+    for place in stroke(TICKS):
+        felt_now, expected = hand.turn(place), clean.turn(place)
+        assert felt_now.tobytes() == expected.tobytes()
+        assert np.isfinite(felt_now.force_n).all()
+    assert any(sample.any() for sample in (felt_now.force_n, felt_now.velocity_mps))
+    assert all(is_poisoned(record) for record in memory)
+
+
+@pytest.mark.parametrize("effect", EFFECTS)
+def test_an_effect_left_out_owns_no_rows(effect):
+    model = pack(scene(without(effect)))
+    assert all(len(getattr(model, name)) == 0 for name in ROWS.get(effect, ()))
+
+
+@pytest.mark.skipif(not COMPILED, reason="the servo exists compiled only")
+@pytest.mark.parametrize("effect", EFFECTS)
+def test_not_even_by_a_servo_that_has_memory_for_it(effect):
+    from study_app.devices.scripted import ScriptedDevice
+    from study_app.haptics.runtime.clocks.clock import VirtualClock
+    from study_app.haptics.runtime.servo import Servo
+
+    device = ScriptedDevice()
+    servo = Servo(device, clock=VirtualClock())
+    reader = servo.telemetry.reader()
+    servo.load(scene(without(effect)))
+    model = servo._loop._slots[1]  # the spare one, which the first tick takes
+    assert model.liquids[0].effects
+    memory = records_of(model, effect)
+    for record in memory:
+        poison(record)
+    device.reach_to(0.03, 0.02, -0.02)
+    assert servo.advance(TICKS) == TICKS
+    samples = reader.read()
+    assert all(is_poisoned(record) for record in memory)
+    servo.stop()
+    assert np.isfinite(samples.device_force_n).all()
+    assert samples.force_n.any()
+    assert (samples.scene == 1).all()

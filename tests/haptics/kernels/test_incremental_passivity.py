@@ -1,0 +1,80 @@
+"""The incremental passivity observer: what is fast in force and motion, and the gain that follows from its work."""
+
+import numpy as np
+import pytest
+
+from study_app.haptics.kernels.incremental_passivity import (
+    ALLOWANCE_J,
+    CORNER_RADPS,
+    FORGIVEN_W,
+    begin_incremental,
+    close_incremental,
+    observe_incremental,
+)
+from study_app.haptics.kernels.passivity import HALVING_J, open_account, weaken
+from study_app.haptics.model.layout import ACCOUNT, LIMITER_ENERGY, PARAMETERS, SAMPLE, records
+from tests.haptics.scenes import HONEY, Hand
+
+
+def balances(force_n, velocity_mps, period_s=1e-3):
+    """Return the balance [J] after each of some samples along one axis."""
+    fast = records(ACCOUNT, 1)[0].fast
+    begin_incremental(fast)
+    found = []
+    for one_n, one_mps in zip(force_n, velocity_mps, strict=True):
+        observe_incremental(fast, 1, one_n, one_mps, period_s)
+        close_incremental(fast, period_s)
+        found.append(fast.balance_j)
+    return np.array(found)
+
+
+@pytest.mark.parametrize("frequency_hz", [30.0, 60.0])
+@pytest.mark.parametrize("period_s", [0.5e-3, 1e-3])
+def test_a_force_along_a_fast_motion_owes_the_filtered_power(frequency_hz, period_s):
+    t_s = np.arange(0, 1, period_s)
+    omega = 2 * np.pi * frequency_hz
+    wave = np.sin(omega * t_s)
+    found = balances(2.0 * wave, 0.1 * wave, period_s)
+    kept, turn = np.exp(-CORNER_RADPS * period_s), np.exp(-1j * omega * period_s)
+    passed = np.abs(kept * (1 - turn) / (1 - kept * turn)) ** 4
+    power_w = (found[len(t_s) // 2] - found[-1]) / 0.5
+    assert power_w == pytest.approx(0.5 * 2.0 * 0.1 * passed - FORGIVEN_W, rel=0.02)
+
+
+def test_a_damper_owes_nothing_and_what_it_took_is_not_kept():
+    wave = np.sin(2 * np.pi * 40 * np.arange(1000) * 1e-3)
+    found = balances(np.where(np.arange(1000) < 500, -2.0, 2.0) * wave, 0.1 * wave)
+    assert found[:490].min() > -1e-4
+    assert found[-1] < -ALLOWANCE_J
+
+
+def test_a_swing_is_owed_for_although_the_motion_pays_more():
+    """Over a swing at 40 Hz on a motion of 2 Hz the whole force takes energy; its fast part gives some."""
+    t_s = np.arange(1000) * 1e-3
+    slow, fast = 0.3 * np.sin(2 * np.pi * 2 * t_s), 0.05 * np.sin(2 * np.pi * 40 * t_s)
+    force_n, velocity_mps = -20 * slow + 20 * fast, slow + fast
+    assert -np.sum(force_n * velocity_mps) * 1e-3 > 0.5
+    assert balances(force_n, velocity_mps)[-1] < -ALLOWANCE_J
+    assert balances(-20 * slow, slow).min() > -1e-4
+
+
+def test_a_debt_beyond_the_allowance_lowers_the_gain():
+    parameters, account, sample = records(PARAMETERS, 1)[0], records(ACCOUNT, 1)[0], records(SAMPLE, 1)[0]
+    open_account(account)
+    sample.device_force_n[0] = 4.0
+    account.fast.balance_j = -ALLOWANCE_J
+    weaken(parameters, account, sample)
+    assert (sample.device_force_n[0], sample.limiters) == (4.0, 0)
+    account.fast.balance_j = -ALLOWANCE_J - HALVING_J
+    weaken(parameters, account, sample)
+    assert sample.device_force_n[0] == pytest.approx(2.0)
+    assert sample.limiters == LIMITER_ENERGY
+
+
+def test_the_tick_observes_the_force_of_one_tick_more_than_the_loop_is_late():
+    hand = Hand(HONEY)
+    hand.safety[0].delay_ticks = 1
+    places = 0.005 * np.cos(200 * np.arange(60) * 1e-3)
+    sent = [hand.turn((place, 0.0, 0.0)).device_force_n[0] for place in places]
+    assert hand.safety[0].account.fast.force_n[0] == pytest.approx(sent[-4])
+    assert hand.safety[0].account.fast.velocity_mps[0] == pytest.approx((places[-1] - places[-2]) / 1e-3)

@@ -1,0 +1,267 @@
+"""The handle against closed forms."""
+
+import math
+
+import numba
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+if numba.config.DISABLE_JIT:
+    pytest.skip("too many sub-steps for plain Python", allow_module_level=True)
+
+from study_app.errors import StudyError
+from study_app.haptics.kernels.plant import SUB_STEP_S, let_go, measure, move, new_handle, push
+from study_app.haptics.kernels.tick_schedule import new_pace, next_turn
+from study_app.haptics.model.layout import MOST_DELAY
+
+STILL = np.zeros(3)
+
+
+def along_x(value):
+    return np.array([value, 0.0, 0.0])
+
+
+def trace(handle, seconds, *, hand=STILL, force=None, tick_s=1e-3):
+    """Return (t, x, v) after every tick; ``force`` gives the force on x from the handle, held over the tick."""
+    rows = []
+    for k in range(round(seconds / tick_s)):
+        if force is not None:
+            handle.force_n[0] = force(handle)
+        move(handle, hand, hand, tick_s)
+        rows.append(((k + 1) * tick_s, handle.position_m[0], handle.velocity_mps[0]))
+    return np.array(rows).T
+
+
+def test_a_free_handle_keeps_its_velocity():
+    handle = new_handle(mass_kg=0.2)
+    handle.velocity_mps[1] = 0.3
+    trace(handle, 0.5)
+    assert handle.position_m[1] == pytest.approx(0.15)
+    assert handle.velocity_mps[1] == 0.3
+
+
+def test_a_constant_force_accelerates_evenly():
+    t, x, v = trace(new_handle(mass_kg=0.2), 0.1, force=lambda _: 4.0)
+    assert v == pytest.approx(20 * t)
+    assert x == pytest.approx(10 * t**2, abs=20 * 0.1 * SUB_STEP_S)
+
+
+def test_viscous_friction_slows_it_exponentially():
+    handle = new_handle(mass_kg=0.2, viscous_nspm=1.5)
+    handle.velocity_mps[0] = 1.0
+    t, _, v = trace(handle, 0.5)
+    assert v == pytest.approx(np.exp(-1.5 / 0.2 * t), rel=1e-3)
+
+
+@pytest.mark.parametrize("damping_ratio", [0.2, 1.0, 1.5])
+def test_the_step_response_is_that_of_mass_spring_and_damper(damping_ratio):
+    mass, stiffness, step = 0.2, 400.0, 0.01
+    own = math.sqrt(stiffness / mass)
+    handle = new_handle(
+        mass_kg=mass, stiffness_npm=stiffness, damping_nspm=2 * damping_ratio * math.sqrt(stiffness * mass)
+    )
+    t, x, _ = trace(handle, 0.5, hand=along_x(step))
+    root = np.sqrt(complex(1 - damping_ratio**2))
+    if damping_ratio == 1.0:
+        rest = np.exp(-own * t) * (1 + own * t)
+    else:
+        wave = np.cos(root * own * t) + damping_ratio / root * np.sin(root * own * t)
+        rest = (np.exp(-damping_ratio * own * t) * wave).real
+    assert x == pytest.approx(step * (1 - rest), abs=3e-3 * step)
+
+
+def test_an_even_hand_is_followed_without_lag_in_the_end():
+    handle = new_handle(mass_kg=0.2, stiffness_npm=400, damping_nspm=27)
+    for k in range(1000):
+        move(handle, along_x(k * 2e-4), along_x((k + 1) * 2e-4), 1e-3)
+    assert handle.position_m[0] == pytest.approx(0.2, abs=1e-6)
+    assert handle.velocity_mps[0] == pytest.approx(0.2, abs=1e-5)
+
+
+def test_quadratic_drag_lets_it_coast_as_the_exact_solution_says():
+    """With m dv/dt = -c v|v|: v = v_0 / (1 + c v_0 t / m); from 1 m/s, 0.1 kg, 0.85 kg/m: 0.105 263 16 after 1 s."""
+    handle = new_handle(mass_kg=0.1)
+    handle.velocity_mps[0] = 1.0
+    t, x, v = trace(handle, 1.0, force=lambda h: -0.85 * h.velocity_mps[0] * abs(h.velocity_mps[0]))
+    assert v[-1] == pytest.approx(0.10526316, rel=5e-3)
+    assert v == pytest.approx(1 / (1 + 8.5 * t), rel=5e-3)
+    assert x == pytest.approx(np.log1p(8.5 * t) / 8.5, rel=5e-3)
+
+
+def test_coulomb_friction_holds_a_handle_and_then_slides():
+    handle = new_handle(mass_kg=0.2, coulomb_n=0.5)
+    handle.force_n[:] = 0.29, 0.29, 0.28  # 0.497 N in all
+    move(handle, STILL, STILL, 1.0)
+    assert not handle.position_m.any()
+    handle.force_n[:] = 0.6, 0.0, 0.0
+    move(handle, STILL, STILL, 1.0)
+    assert handle.velocity_mps[0] == pytest.approx(0.1 / 0.2)
+
+
+def test_coulomb_friction_stops_it_where_its_energy_is_spent():
+    handle = new_handle(mass_kg=0.2, coulomb_n=0.4)
+    handle.velocity_mps[:] = 0.3, 0.0, 0.4
+    trace(handle, 0.5)
+    assert not handle.velocity_mps.any()
+    stopped_m = 0.2 * 0.5**2 / (2 * 0.4)
+    assert handle.position_m == pytest.approx(stopped_m * np.array([0.6, 0, 0.8]), rel=1e-3)
+
+
+@settings(deadline=None)  # the first example compiles
+@given(st.lists(st.floats(1e-4, 5e-3), min_size=1, max_size=30))
+def test_how_time_is_cut_does_not_matter(cuts):
+    def moved(pieces):
+        handle = new_handle(mass_kg=0.2, viscous_nspm=0.5, stiffness_npm=500, damping_nspm=10)
+        handle.force_n[:] = 1.0, -2.0, 3.0
+        for piece in pieces:
+            move(handle, STILL, STILL, piece)
+        return handle.position_m
+
+    whole = moved([sum(cuts)])
+    assert moved(cuts) == pytest.approx(whole, rel=2e-2, abs=1e-7)
+
+
+@settings(deadline=None)  # the first example compiles
+@given(
+    st.floats(0.01, 1.0),
+    st.floats(0, 1e7),
+    st.floats(0, 1e6),
+    st.floats(0, 100),
+    st.lists(st.floats(-0.1, 0.1), min_size=3, max_size=3),
+)
+def test_no_stiffness_damping_or_friction_makes_energy(mass, stiffness, damping, coulomb, start):
+    handle = new_handle(mass_kg=mass, stiffness_npm=stiffness, damping_nspm=damping, coulomb_n=coulomb)
+    handle.position_m[:] = start
+    handle.velocity_mps[:] = start[::-1]
+
+    def energy():
+        return 0.5 * (mass * (handle.velocity_mps**2).sum() + stiffness * (handle.position_m**2).sum())
+
+    before = energy()
+    for _ in range(20):
+        move(handle, STILL, STILL, 1e-3)
+        after = energy()
+        assert after <= before * (1 + 1e-12) + np.finfo(float).tiny  # below it, numbers lose their digits
+        before = after
+
+
+def test_end_stops_hold_it():
+    handle = new_handle(mass_kg=0.2, stop_m=(0.05, 0.05, 0.05))
+    handle.force_n[:] = 8.0, -8.0, 0.0
+    move(handle, STILL, STILL, 1.0)
+    assert handle.position_m.tolist() == [0.05, -0.05, 0.0]
+    assert not handle.velocity_mps.any()
+    handle.force_n[:] = -8.0, 8.0, 0.0
+    move(handle, STILL, STILL, 0.01)
+    assert abs(handle.position_m[0]) < 0.05
+
+
+@settings(deadline=None)  # the first example compiles
+@given(st.floats(-0.1, 0.1))
+def test_encoders_tell_the_nearest_whole_count(x):
+    handle = new_handle(mass_kg=0.2, quantum_m=38e-6)
+    handle.position_m[0] = x
+    seen = np.zeros(3)
+    measure(handle, seen)
+    assert abs(seen[0] - x) <= 19e-6 * (1 + 1e-9)
+    assert seen[0] / 38e-6 == pytest.approx(round(seen[0] / 38e-6), abs=1e-6)
+
+
+def test_without_encoders_the_position_is_exact():
+    handle = new_handle(mass_kg=0.2)
+    handle.position_m[:] = 0.1, 0.2, 0.3
+    seen = np.zeros(3)
+    measure(handle, seen)
+    assert seen.tolist() == [0.1, 0.2, 0.3]
+
+
+@pytest.mark.parametrize("seconds", [0.0, -1e-3])
+def test_no_time_changes_nothing(seconds):
+    handle = new_handle(mass_kg=0.2, stiffness_npm=100)
+    handle.velocity_mps[0] = 1.0
+    move(handle, along_x(1.0), along_x(1.0), seconds)
+    assert (handle.position_m[0], handle.velocity_mps[0]) == (0.0, 1.0)
+
+
+@pytest.mark.parametrize("delay", range(MOST_DELAY + 1))
+def test_a_force_acts_as_many_writes_late_as_the_device_is_delayed(delay):
+    handle = new_handle(mass_kg=0.2, delay=delay)
+    acting = []
+    for k in range(1, 12):
+        push(handle, k, -k, 2 * k)
+        acting.append(handle.force_n.tolist())
+    assert acting == [[max(k - delay, 0) * sign for sign in (1, -1, 2)] for k in range(1, 12)]
+
+
+@pytest.mark.parametrize("delay", [-1, MOST_DELAY + 1])
+def test_a_delay_beyond_its_memory_is_refused(delay):
+    with pytest.raises(StudyError, match="0 to 4 ticks"):
+        new_handle(mass_kg=0.2, delay=delay)
+
+
+def test_motors_saturate_each_on_its_own_and_give_whole_steps():
+    handle = new_handle(mass_kg=0.2, motor_limit_n=8.0, motor_step_n=0.25)
+    push(handle, 9.0, -100.0, 0.37)
+    assert handle.force_n.tolist() == [8.0, -8.0, 0.25]
+    push(handle, 0.38, -0.38, 0.124)
+    assert handle.force_n.tolist() == [0.5, -0.5, 0.0]
+
+
+def test_letting_go_of_the_force_forgets_what_is_on_its_way():
+    handle = new_handle(mass_kg=0.2, delay=3)
+    for _ in range(4):
+        push(handle, 1.0, 1.0, 1.0)
+    let_go(handle)
+    assert not handle.force_n.any()
+    push(handle, 0.0, 0.0, 0.0)
+    assert not handle.force_n.any()
+
+
+def test_the_mass_of_the_hand_moves_along_until_it_lets_go():
+    handle = new_handle(mass_kg=0.2, hand_kg=0.3)
+    handle.force_n[0] = 1.0
+    move(handle, STILL, STILL, 0.1)
+    assert handle.velocity_mps[0] == pytest.approx(0.2)
+    handle.held = 0
+    move(handle, STILL, STILL, 0.1)
+    assert handle.velocity_mps[0] == pytest.approx(0.7)
+
+
+def test_a_handle_let_go_knows_no_hand():
+    handle = new_handle(mass_kg=0.2, stiffness_npm=500, damping_nspm=30)
+    handle.held = 0
+    move(handle, STILL, along_x(0.03), 0.1)
+    assert not handle.position_m.any()
+
+
+def test_a_regular_pace_is_regular():
+    pace = new_pace(1e-3)
+    assert [next_turn(pace) for _ in range(5)] == [1e-3] * 5
+
+
+def test_a_turn_is_late_but_its_deadlines_stay():
+    pace = new_pace(2e-3, jitter_s=0.5e-3)
+    late_s = np.cumsum([next_turn(pace) for _ in range(5000)]) - 2e-3 * np.arange(1, 5001)
+    assert late_s.min() >= -1e-12
+    assert late_s.max() <= 0.5e-3
+    assert late_s.mean() == pytest.approx(0.25e-3, rel=0.05)
+    assert late_s.std() == pytest.approx(0.5e-3 / math.sqrt(12), rel=0.05)
+
+
+def test_a_share_of_the_turns_does_not_come():
+    pace = new_pace(1e-3, missed=0.2)
+    turns = np.array([next_turn(pace) for _ in range(5000)]) / 1e-3
+    assert turns == pytest.approx(np.rint(turns))
+    assert turns.mean() == pytest.approx(1 / 0.8, rel=0.03)
+    assert turns.max() > 2
+
+
+def test_another_seed_is_another_pace_and_the_same_seed_the_same():
+    def row(seed):
+        pace = new_pace(1e-3, jitter_s=0.5e-3, seed=seed)
+        return [next_turn(pace) for _ in range(10)]
+
+    assert row(1) == row(1)
+    assert row(1) != row(2)

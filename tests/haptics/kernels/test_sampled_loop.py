@@ -1,0 +1,174 @@
+"""The loop of handle, estimator and damper against the published bounds, with the product's own handle and estimator.
+
+Numbers: passivity of a filtered damper, b > B sup Re{-α e^(-jdθ) / (e^(jθ) - 1 + α)}; stability of a free handle by the
+eigenvalues of mass, held force, filter and delay; the explicit map of quadratic drag.
+"""
+
+import numpy as np
+import pytest
+
+from study_app.haptics.kernels.plant import move, new_handle
+from study_app.haptics.model.motion import Motion
+from study_app.haptics.model.scene import Ewma
+from study_app.haptics.runtime.offline import simulate
+from tests.haptics.scenes import COMPILED, UNBENT, scene
+
+pytestmark = pytest.mark.skipif(not COMPILED, reason="too many sub-steps for plain Python")
+STILL = np.zeros(3)
+FRICTION_NSPM = 0.5
+
+
+def coast(handle, k_spm, speed_mps, ticks):
+    """Return the speeds (ticks + 1,) of a free handle under -c v|v|, measured and held a tick: k = T c/m [s/m]."""
+    handle.held = 0
+    handle.velocity_mps[0] = speed_mps
+    speeds = [speed_mps]
+    for _ in range(ticks):
+        v = handle.velocity_mps[0]
+        handle.force_n[0] = -k_spm * handle.mass_kg / 1e-3 * v * abs(v)
+        move(handle, STILL, STILL, 1e-3)
+        speeds.append(handle.velocity_mps[0])
+    return np.array(speeds)
+
+
+def test_quadratic_drag_that_is_held_for_a_tick_diverges_from_k_v_2_on():
+    k_spm = 1e-3 * 0.85 / 0.1  # water on 0.1 kg: 235 m/s
+    calm, wild = (coast(new_handle(mass_kg=0.1), k_spm, kv / k_spm, 9) for kv in (1.99, 2.01))
+    assert (np.diff(abs(calm)) < 0).all()
+    assert (np.diff(abs(wild)) > 0).all()
+    assert abs(wild[9] / wild[0]) == pytest.approx(9.1e10, rel=0.01)
+    assert abs(coast(new_handle(mass_kg=0.1), k_spm, 1.99 / k_spm, 3000)[-1]) * k_spm < 0.05
+
+
+@pytest.mark.parametrize("friction_per_step", [1e-3, 1.0, 2.01, 1e3])
+@pytest.mark.parametrize("stiffness_npm", [0.0, 1e9])
+def test_what_the_handle_itself_integrates_never_diverges(friction_per_step, stiffness_npm):
+    handle = new_handle(mass_kg=0.1, viscous_nspm=0.1 * friction_per_step / 50e-6, stiffness_npm=stiffness_npm)
+    handle.velocity_mps[0] = 1.0
+    speeds = []
+    for _ in range(200):
+        move(handle, STILL, STILL, 50e-6)
+        speeds.append(handle.velocity_mps[0])
+    assert max(abs(np.array(speeds))) < 1.0
+    assert abs(speeds[-1]) < 1.0 / (1 + friction_per_step)
+    if stiffness_npm == 0.0:
+        assert np.array(speeds) == pytest.approx(
+            (1 + friction_per_step) ** -np.arange(1.0, 201.0), rel=1e-9, abs=1e-100
+        )
+
+
+def impulse_response(alpha, ticks=2000):
+    """Return the velocities (ticks,) [m/s] that the product's estimator makes of 1 m for one sample."""
+    x = np.zeros(ticks + 1)
+    x[1] = 1.0
+    motion = Motion(np.arange(ticks + 1) / 1000, np.column_stack([x, 0 * x, 0 * x]))
+    return simulate(scene(velocity=Ewma(alpha=alpha), knee=UNBENT), motion).vx_mps[1:]
+
+
+def passivity_multiplier(alpha, delay):
+    """Return the friction that a filtered, delayed damper needs per damping, and the frequency [Hz] that needs it."""
+    theta = np.linspace(1e-3, np.pi, 20_001)
+    z = np.exp(-1j * theta)
+    response = np.polynomial.polynomial.polyval(z, impulse_response(alpha)) * z**delay  # [1/s]
+    needed = 0.5e-3 / (1 - np.cos(theta)) * ((1 - z) * response).real
+    worst = int(np.argmax(needed))
+    return needed[worst], theta[worst] / (2 * np.pi) * 1000
+
+
+@pytest.mark.parametrize(
+    ("alpha", "delay", "multiplier"),
+    [
+        *[(0.1, d, m) for d, m in [(0, 0.05263), (1, 0.120), (2, 0.181), (4, 0.284), (8, 0.438)]],
+        *[(0.2, d, m) for d, m in [(0, 0.111), (1, 0.225), (2, 0.324), (4, 0.473), (8, 0.659)]],
+        *[(1.0, d, 1.0) for d in (0, 1, 2, 4)],
+    ],
+)
+def test_the_friction_that_makes_a_filtered_damper_passive(alpha, delay, multiplier):
+    assert passivity_multiplier(alpha, delay)[0] == pytest.approx(multiplier, abs=6e-4)
+
+
+@pytest.mark.parametrize("alpha", [1.0, 0.5, 0.2, 0.1, 0.05])
+def test_without_delay_it_is_alpha_over_2_minus_alpha(alpha):
+    assert passivity_multiplier(alpha, 0)[0] == pytest.approx(alpha / (2 - alpha), rel=1e-6)
+
+
+def test_the_more_delay_the_lower_the_frequency_that_is_least_passive():
+    worst_hz = [passivity_multiplier(0.1, delay)[1] for delay in (0, 1, 2, 4, 8)]
+    assert worst_hz == pytest.approx([500, 112, 76, 50, 32], abs=1.0)
+
+
+def exact_step(mass_kg, period_s):
+    """Return how (x, v) and a held force become the next (x, v), (2, 3), with b = 0.5 N·s/m."""
+    rate = FRICTION_NSPM / mass_kg
+    kept = np.exp(-rate * period_s)
+    gone_s = (1 - kept) / rate
+    return np.array([[1, gone_s, (period_s - gone_s) / FRICTION_NSPM], [0, kept, gone_s / mass_kg]])
+
+
+def handles_step(mass_kg, period_s):
+    """Return the same as the product's handle integrates it."""
+    columns = []
+    for x, v, force in np.eye(3):
+        handle = new_handle(mass_kg=mass_kg, viscous_nspm=FRICTION_NSPM)
+        handle.held = 0
+        handle.position_m[0], handle.velocity_mps[0], handle.force_n[0] = x, v, force
+        move(handle, STILL, STILL, period_s)
+        columns.append([handle.position_m[0], handle.velocity_mps[0]])
+    return np.array(columns).T
+
+
+def growth(damping_nspm, step, period_s, alpha, delay):
+    """Return the largest |eigenvalue| of (x, v, x before, estimate, forces under way): over 1 it diverges."""
+    weight = 1 - (1 - alpha) ** (period_s / 1e-3)
+    size = 4 + delay
+    estimate = np.zeros(size)  # u = (x - x before) / T, v ← v + α (u - v)
+    estimate[0], estimate[2], estimate[3] = weight / period_s, -weight / period_s, 1 - weight
+    acting = -damping_nspm * estimate if delay == 0 else np.eye(size)[3 + delay]
+    matrix = np.zeros((size, size))
+    matrix[:2, :2] = step[:, :2]
+    matrix[:2] += np.outer(step[:, 2], acting)
+    matrix[2, 0] = 1.0
+    matrix[3] = estimate
+    if delay > 0:
+        matrix[4] = -damping_nspm * estimate
+        matrix[5:, 4:-1] = np.eye(delay - 1)
+    eigenvalues = np.linalg.eigvals(matrix)
+    moving = eigenvalues[abs(eigenvalues - 1.0) > 1e-9]  # without a spring the place itself stays: 1
+    return abs(moving).max()
+
+
+def critical_nspm(step, period_s, alpha, delay):
+    """Return the least damping that makes the loop of this mechanical step (2, 3) diverge."""
+    low, high = 1.0, 2000.0
+    while high - low > 0.01:
+        middle = (low + high) / 2
+        low, high = (middle, high) if growth(middle, step, period_s, alpha, delay) < 1 else (low, middle)
+    return low
+
+
+def test_a_free_handle_of_100_g_with_one_tick_of_delay_bears_71_newton_seconds_a_metre():
+    assert critical_nspm(exact_step(0.1, 1e-3), 1e-3, 0.1, 1) == pytest.approx(71.5, abs=1.0)
+
+
+@pytest.mark.parametrize(
+    ("period_s", "alpha", "mass_kg", "expected"),
+    [
+        (1e-3, 0.1, 0.1, (210, 71.5, 43.7, 25.0)),
+        (1e-3, 0.1, 0.25, (510, 174, 106, 61)),
+        (1e-3, 0.1, 0.5, (1010, 344, 210, 120)),
+        (1e-3, 1.0, 0.1, (201, 83, 54, 32)),
+        (2e-3, 1 - 0.9**0.5, 0.1, (110, 37, 23, 13)),  # these two: a tenth a tick
+        (4e-3, 1 - 0.9**0.25, 0.1, (60, 20, 12.5, 7.2)),
+    ],
+)
+def test_critical_damping_over_delay(period_s, alpha, mass_kg, expected):
+    found = [critical_nspm(exact_step(mass_kg, period_s), period_s, alpha, delay) for delay in (0, 1, 2, 4)]
+    assert found == pytest.approx(expected, rel=0.02)
+
+
+@pytest.mark.parametrize("mass_kg", [0.1, 0.5])
+@pytest.mark.parametrize("delay", [0, 1, 2, 4])
+def test_the_products_handle_has_the_same_boundary(delay, mass_kg):
+    exact, own = (critical_nspm(step(mass_kg, 1e-3), 1e-3, 0.1, delay) for step in (exact_step, handles_step))
+    # Its sub-steps of 50 µs carry a handle half of one too far: undelayed that is 5 % of damping.
+    assert own == pytest.approx(exact, rel=0.055 if delay == 0 else 0.025)

@@ -1,0 +1,81 @@
+"""What liquids give back with "kalman", whose added mass and history smooth for longer than its velocity lags."""
+
+import numpy as np
+import pytest
+
+from study_app.evaluation.stability.withheld import MOST, QUICK, measure
+from study_app.haptics.model.device_dynamics import Dynamics
+from study_app.haptics.model.layout import LIMITER_ENERGY
+from study_app.haptics.model.scene import AddedMass, Ewma, Given, History, Kalman, Scene
+from study_app.haptics.runtime.pack import pack
+from tests.haptics.scenes import COMPILED, Hand, liquid
+
+compiled = pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")
+
+MEASURED = Dynamics(delay_s=1e-3, count_m=38e-6, mass_kg=0.1)
+RHO_V = 1400 * 4 / 3 * np.pi * 0.034**3
+STOKES_LAYER_KG = 3 * np.pi * 0.034**2 * np.sqrt(2 * 10.0 * 1400 / (2 * np.pi))
+
+
+def inert(velocity=None, effects=("added_mass", "history"), **fields):
+    """Return a scene of a viscous liquid with these effects alone."""
+    one = liquid(1400, viscosity_pa_s=10.0, effects=effects, **fields)
+    return Scene(scale=3, liquids=(one,), velocity=velocity or Kalman())
+
+
+@pytest.mark.parametrize(
+    ("velocity", "dynamics", "added_s", "history_s"),
+    [
+        (Ewma(), MEASURED, 0.025, 0.01),
+        (Kalman(), MEASURED, 0.015, 0.015),
+        (Kalman(), Dynamics(), 0.025, 0.01),  # no delay measured: it is EWMA
+    ],
+    ids=["ewma", "kalman", "delay unknown"],
+)
+def test_accelerations_are_smoothed_as_suits_the_estimator(velocity, dynamics, added_s, history_s):
+    found = pack(inert(velocity), dynamics=dynamics).liquids[0]
+    assert 1 / found.added_mass.filter_per_s == pytest.approx(added_s)
+    assert 1 / found.history.filter_per_s == pytest.approx(history_s)
+
+
+def test_what_a_file_says_counts_and_given_velocities_are_not_smoothed():
+    said = {"added_mass": AddedMass(filter_s=0.04), "history": History(smoothing_s=0.0)}
+    found = pack(inert(**said), dynamics=MEASURED).liquids[0]
+    assert 1 / found.added_mass.filter_per_s == pytest.approx(0.04)
+    assert found.history.filter_per_s == np.inf
+    assert pack(inert(Given(), **said)).liquids[0].added_mass.filter_per_s == np.inf
+
+
+@pytest.mark.parametrize(
+    ("effect", "inertia_kg"), [("added_mass", 0.5 * RHO_V), ("history", STOKES_LAYER_KG)], ids=["added mass", "history"]
+)
+def test_inertia_holds_the_energy_of_the_velocity_as_smoothed(effect, inertia_kg):
+    """A hand that comes to rest gets back ½ m |v_s|² at most, v_s' = (v - v_s)/15 ms."""
+    hand = Hand(inert(effects=(effect,)), dynamics=MEASURED)
+    share = hand.model.liquids[0].inertia_share[1]
+    speeds = np.concatenate([np.full(300, 0.3), np.linspace(0.3, 0.0, 30)])
+    smoothed_mps, reserves_j, expected_j = 0.0, [], []
+    for place_m in np.cumsum(speeds) * 1e-3:
+        v = hand.turn((place_m, 0.0, 0.0)).velocity_mps[0]
+        smoothed_mps += (1 - np.exp(-1 / 15)) * (v - smoothed_mps)
+        reserves_j.append(hand.safety[0].account.reserve_j)
+        expected_j.append(0.5 * share * inertia_kg * smoothed_mps**2 / 3)
+    assert v < 0.2 * smoothed_mps
+    assert reserves_j[-1] == pytest.approx(expected_j[-1], rel=0.1)  # by half a tick in 15 ms
+    assert (np.array(expected_j)[20:] <= 1.02 * np.array(reserves_j)[20:]).all()
+
+
+@compiled
+def test_a_quick_stroke_is_no_debt_of_the_added_mass():
+    mass = Scene(scale=3, liquids=(liquid(1000, effects=("drag", "added_mass")),), velocity=Kalman())
+    hand = Hand(mass, dynamics=MEASURED)
+    samples = [hand.turn((0.03 * np.cos(2 * np.pi * 5 * k / 1000), 0.0, 0.0)) for k in range(1000)]
+    assert not any(sample.limiters & LIMITER_ENERGY for sample in samples)
+
+
+@compiled
+@pytest.mark.parametrize("name", ["physical_glycerin", "physical_gear_oil"])
+def test_shipped_liquids_with_added_mass_meet_the_goal_of_force_withheld(name):
+    for found in measure([name], ["kalman"]):
+        assert found.strokes[-len(QUICK) :] == pytest.approx([0.0] * len(QUICK), abs=MOST / 5)
+        assert found.met

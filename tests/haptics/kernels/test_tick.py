@@ -1,0 +1,127 @@
+import numpy as np
+import pytest
+from numba import njit
+from numba.core.runtime import _nrt_python, rtsys
+
+from study_app.errors import StudyError
+from study_app.haptics.kernels.safety import new_safety
+from study_app.haptics.kernels.tick import tick
+from study_app.haptics.model import layout
+from study_app.haptics.model.layout import SAMPLE, records
+from study_app.haptics.model.motion import Motion
+from study_app.haptics.model.scene import Box, Scene
+from study_app.haptics.runtime.offline import simulate
+from study_app.haptics.runtime.pack import elements_needed, pack, pack_into
+from tests.haptics.scenes import (
+    COMPILED,
+    EVERYTHING,
+    HONEY,
+    LIGHT_OIL,
+    THESIS,
+    WATER,
+    Hand,
+    liquid,
+    scene,
+    stroke,
+    vectors,
+)
+
+MANY = scene(
+    *WATER.liquids,
+    liquid(900, id="pool", region=Box(size_m=(0.3, 0.3, 0.3)), wake={"length": 50, "scaling": 60, "axes": "xyz"}),
+    liquid(1400, id="core", region=Box(size_m=(0.1, 0.1, 0.1))),
+)
+SCENES = {**THESIS, "many": MANY, **EVERYTHING}
+
+
+@pytest.mark.parametrize("felt", SCENES.values(), ids=SCENES)
+def test_the_servos_tick_and_simulate_are_the_same(felt):
+    positions_m = stroke(1500)
+    hand = Hand(felt)
+    live = [hand.turn(place) for place in positions_m]
+    t_s = 1e-9 * (np.array([sample.time_ns for sample in live]) - live[0].time_ns)
+    table = simulate(felt, Motion(t_s, felt.scale * positions_m))
+    for kind, field in [("velocity", "velocity_mps"), ("wake", "wake_mps"), ("force", "force_n")]:
+        assert vectors(table, kind) == pytest.approx(np.array([sample[field] for sample in live]), abs=1e-9)
+    sent = np.array([sample.device_force_n for sample in live])
+    assert vectors(table, "device") == pytest.approx(sent, abs=1e-9)
+    assert (table.limiters == [sample.limiters for sample in live]).all()
+
+
+def test_rest_is_zero_force_and_the_velocity_is_known():
+    hand = Hand(Scene())
+    moved = hand.sweep(0.2, 100)
+    assert not any(sample.device_force_n.any() or sample.force_n.any() for sample in moved)
+    assert moved[-1].velocity_mps[0] == pytest.approx(2.0, rel=1e-3)
+
+
+def test_an_effect_left_out_owns_no_memory():
+    model = pack(HONEY)
+    assert (len(model.elements), len(model.segments), elements_needed(HONEY)) == (0, 0, 0)
+    assert len(pack(LIGHT_OIL).elements) == elements_needed(LIGHT_OIL) == 125
+    assert len(pack(Scene()).liquids) == 0
+
+
+def test_a_model_is_refilled_in_place_with_a_fresh_state():
+    model = pack(WATER, capacity=2000)
+    memory = [field.ctypes.data for field in model]
+    used = Hand(WATER)
+    used.model = model
+    for place in stroke(500):
+        used.turn(place)
+    pack_into(model, LIGHT_OIL)
+    assert [field.ctypes.data for field in model] == memory
+    again, fresh = Hand(LIGHT_OIL), Hand(LIGHT_OIL)
+    again.model = model
+    for place in stroke(500):
+        assert again.turn(place).tobytes() == fresh.turn(place).tobytes()
+
+
+def test_models_made_with_a_capacity_have_room_for_any_scene_within_it():
+    model = pack(Scene(), capacity=1750)
+    pack_into(model, MANY)
+    assert [int(wake.row) for wake in model.liquids.wake[:2]] == [0, 1700]
+    with pytest.raises(StudyError, match=r"needs 1701 wake elements.*room for 1700"):
+        pack_into(pack(Scene(), capacity=1700), scene(liquid(wake={"length": 1701, "scaling": 1701})))
+
+
+def test_two_models_do_not_share_memory():
+    first, second = Hand(WATER), Hand(WATER)
+    first.sweep(0.2, 50)
+    assert not second.model.state[0].position_m.any()
+
+
+@pytest.mark.skipif(not COMPILED, reason="the interpreter allocates all the time")
+@pytest.mark.parametrize("felt", [Scene(), *SCENES.values()], ids=["rest", *SCENES])
+def test_hazard_18_no_tick_allocates_so_no_collection_can_pause_it(felt):
+    @njit
+    def run(model, safety, sample, positions_m, ticks):
+        for k in range(ticks):
+            sample.time_ns += 1_000_000
+            sample.fresh = k % 7 != 0
+            for axis in range(3):
+                sample.position_m[axis] = positions_m[k % len(positions_m), axis]
+            tick(model, safety, sample)
+
+    def allocations(ticks):
+        before = rtsys.get_allocation_stats()
+        run(model, safety[0], sample[0], positions_m, ticks)
+        after = rtsys.get_allocation_stats()
+        return after.alloc - before.alloc, after.mi_alloc - before.mi_alloc
+
+    model, safety, sample, positions_m = pack(felt), new_safety(), records(SAMPLE, 1), stroke(4000)
+    run(model, safety[0], sample[0], positions_m, 10)
+    _nrt_python.memsys_enable_stats()
+    try:
+        assert allocations(1000) == allocations(0)
+        assert allocations(4000) == allocations(0)
+    finally:
+        _nrt_python.memsys_disable_stats()
+
+
+def test_limiter_names_are_those_of_the_bits():
+    bits = {
+        name: value for name, value in vars(layout).items() if name.startswith("LIMITER_") and name != "LIMITER_NAMES"
+    }
+    assert [f"LIMITER_{name.upper()}" for name in layout.LIMITER_NAMES] == list(bits)
+    assert list(bits.values()) == [1 << k for k in range(len(bits))]

@@ -1,0 +1,162 @@
+"""The watchdog: turns that come late, or not at all, and a program that stands still beside the servo."""
+
+import ctypes
+import sys
+from random import Random
+
+import numba
+import numpy as np
+import pytest
+
+if numba.config.DISABLE_JIT:
+    pytest.skip("the servo exists compiled only", allow_module_level=True)
+
+from study_app.devices.scripted import ScriptedDevice
+from study_app.errors import ServoFault
+from study_app.haptics.kernels.safety import begin_scene, new_safety
+from study_app.haptics.kernels.tick import tick
+from study_app.haptics.model.layout import LIMITER_STALE, STATUS_OK
+from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.pack import pack
+from study_app.haptics.runtime.servo import Servo
+from tests.haptics.probe import Probe
+from tests.haptics.runtime.test_servo import HONEY, WATER, felt, force_n, is_zero, wait_until
+
+MS = 1_000_000
+
+
+class Bench:
+    """A servo on a virtual clock whose turns can be kept from coming, with a probe that moves."""
+
+    def __init__(self):
+        self.probe, self.clock = Probe(), VirtualClock()
+        self.servo = Servo(self.probe, clock=self.clock)
+        self.reader = self.servo.telemetry.reader()
+
+    def be_late(self, late_ms):
+        """Let a turn come so late, and take it."""
+        self.clock._memory[0].now_ns += round((1 + late_ms) * MS)
+        return self.servo.advance(1)
+
+    @property
+    def fade(self):
+        return float(self.servo._loop._safety[0].fade)
+
+
+@pytest.fixture
+def bench():
+    return Bench()
+
+
+@pytest.mark.parametrize("late_ms", [0.5, 4.9])
+def test_a_turn_that_is_a_little_late_costs_nothing(bench, late_ms):
+    felt(bench.servo)
+    bench.be_late(late_ms)
+    assert bench.fade == 1.0
+    assert bench.servo.telemetry.latest().limiters & LIMITER_STALE == 0
+
+
+@pytest.mark.parametrize("late_ms", [6.0, 14.0, 27.5, 49.0])
+def test_a_late_turn_finds_the_force_fading_as_without_samples(bench, late_ms):
+    felt(bench.servo)
+    bench.reader.read()
+    bench.be_late(late_ms)
+    share = 1 - (late_ms - 5) / 45
+    assert bench.fade == pytest.approx(share, abs=1e-6)
+    assert bench.servo.telemetry.latest().limiters & LIMITER_STALE
+    assert bench.servo.telemetry.latest().status == STATUS_OK
+    bench.servo.advance(15)
+    forces = bench.reader.read().device_force_n
+    assert np.linalg.norm(np.diff(forces, axis=0), axis=1).max() <= 0.5 + 1e-12
+    assert np.linalg.norm(forces, axis=1).min() <= 8 * share + 8 * 15 / 50
+    bench.servo.advance(50)
+    assert bench.fade == 1.0
+
+
+def test_the_fade_is_the_one_that_silence_of_the_device_gets():
+    silent, late = Bench(), Bench()
+    for bench in (silent, late):
+        felt(bench.servo)
+    silent.probe.state.silent_from_read = silent.probe.state.reads + 1
+    silent.servo.advance(30)
+    late.be_late(29.0)
+    assert late.fade == pytest.approx(silent.fade, abs=0.03)
+
+
+@pytest.mark.parametrize("late_ms", [50.0, 300.0])
+def test_after_fifty_milliseconds_without_a_turn_the_force_is_zero_and_returns_as_at_a_start(bench, late_ms):
+    felt(bench.servo)
+    bench.reader.read()
+    bench.be_late(late_ms)
+    assert bench.fade == 0.0
+    bench.servo.advance(250)
+    assert bench.fade == pytest.approx(0.5, abs=0.01)
+    forces = np.linalg.norm(bench.reader.read().device_force_n, axis=1)
+    assert forces[:17].min() <= 8 * 16 / 500, "0.5 N a turn, from 8 N at most"
+    assert bench.servo.fault is None
+
+
+def test_a_servo_that_hangs_in_its_device_says_so_and_has_let_go_when_it_returns():
+    probe = Probe()
+    servo = Servo(probe)
+    try:
+        servo.start()
+        servo.load(HONEY)
+        wait_until(lambda: probe.state.reads > 20)
+        assert servo.fault is None
+        probe.state.hangs = 1
+        wait_until(lambda: servo.fault is not None)
+        assert "no turn for 75 ms" in servo.fault
+        assert not servo.force_is_on
+        with pytest.raises(ServoFault, match="no turn for 75 ms"):
+            servo.check()
+        turns = probe.state.reads
+        probe.state.hangs = 0
+        wait_until(lambda: probe.state.reads > turns + 2)
+        assert servo._loop._safety[0].fade < 0.1
+    finally:
+        probe.state.hangs = 0
+        servo.stop()
+
+
+def replayed(samples, scene):
+    """Return the forces (n, 3) [N] of readings at their times, by the tick alone: no thread, no clock, no windows."""
+    again = samples.copy()
+    rest, model, safety = pack(scene.model_copy(update={"liquids": ()})), pack(scene), new_safety(8.0)
+    for i in range(len(again)):
+        if i > 0 and again[i].scene != again[i - 1].scene:
+            begin_scene(safety[0])
+        safety[0].delay_ticks = again[i].delay_ticks
+        tick(model if again[i].scene else rest, safety[0], again[i])
+    return again.device_force_n
+
+
+@pytest.mark.realtime
+@pytest.mark.skipif(sys.platform == "win32", reason="a sleep of POSIX")
+def test_five_seconds_in_which_python_stands_still_change_no_force():
+    """The windows' thread holds the interpreter in one call; each force is still that of its reading, to the bit."""
+    freeze = ctypes.PyDLL(None).usleep  # a PyDLL does not let the interpreter go: every thread of Python stands still
+    device = ScriptedDevice(Random(5))  # noqa: S311
+    t_s = np.arange(0, 20, 0.005)
+    device.follow(t_s, np.column_stack((0.03 * np.sin(6 * t_s), 0.01 * np.cos(5 * t_s), 0.03 * np.cos(6 * t_s))))
+    with device, Servo(device) as servo:
+        reader = servo.telemetry.reader()
+        servo.load(WATER)
+        wait_until(lambda: force_n(servo.telemetry) > 0.5)
+        frozen_ns = servo.now_ns()
+        freeze(5_000_000)
+        thawed_ns = servo.now_ns()
+        samples, overruns = reader.read(), servo.overruns
+        assert not (samples.status != STATUS_OK).any()
+    assert reader.dropped == 0
+    assert samples.tick[-1] - samples.tick[0] == len(samples) - 1
+    deadlines_ns = samples.time_ns - samples.lateness_ns
+    assert (np.diff(deadlines_ns) % MS == 0).all()
+    assert int((np.diff(deadlines_ns) // MS - 1).sum()) <= overruns, "a deadline every millisecond, kept or counted"
+    frozen = (samples.time_ns > frozen_ns) & (samples.time_ns < thawed_ns)
+    seconds = (samples.time_ns[frozen] - frozen_ns) // 1_000_000_000
+    assert set(seconds.tolist()) == {0, 1, 2, 3, 4} | ({5} if 5 in seconds else set())
+    assert np.linalg.norm(samples.device_force_n[frozen], axis=1).max() > 0.5
+    first = int(np.flatnonzero(samples.scene)[0])
+    assert is_zero(samples.device_force_n[:first])
+    assert np.array_equal(replayed(samples, WATER), samples.device_force_n)

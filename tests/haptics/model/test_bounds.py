@@ -1,0 +1,159 @@
+"""The bounds of the gate, held against what the effects really do along motions within the box."""
+
+import numpy as np
+import pytest
+
+from study_app.haptics.model.bounds import REFERENCE, bounds
+from study_app.haptics.model.gate import calls_for, resolve
+from study_app.haptics.model.motion import Motion
+from study_app.haptics.model.scene import (
+    Body,
+    Box,
+    Channel,
+    Drag,
+    Given,
+    History,
+    Liquid,
+    MotionBox,
+    Scene,
+    Uniform,
+    Vortex,
+    Wake,
+)
+from study_app.haptics.runtime.offline import simulate
+from tests.haptics.scenes import COMPILED, vectors
+
+pytestmark = pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")
+
+SPEED_MPS, ACCELERATION_MPS2 = 0.5, 4.0
+TICK_S = 1e-3
+POOL = Box(centre_m=(0.0, -0.5, 0.0), size_m=(50.0, 1.0, 50.0))  # its top is at y = 0
+DEPTH_M = (-0.06, 0.3)
+LIQUIDS = {"water": (998.2, 1.0016e-3), "glycerin": (1261, 1.41), "honey": (1420, 10.0)}
+CURRENTS = {
+    "uniform": Uniform(velocity_mps=(0.3, 0.0, -0.2)),
+    "channel": Channel(width_m=1.0, peak_mps=0.4),
+    "vortex": Vortex(core_m=0.2, peak_mps=0.4),
+}
+
+
+def wandering(seed, seconds=4.0):
+    """Return a motion within the box: random turns at full acceleration, rests, places above and below the surface."""
+    random = np.random.default_rng(seed)
+    ticks = int(seconds / TICK_S)
+    velocity_mps, wanted_mps = np.zeros((ticks, 3)), np.zeros(3)
+    position_m = np.tile([0.0, -0.05, 0.0], (ticks, 1))
+    for k in range(1, ticks):
+        if random.random() < 0.004:
+            wanted_mps = random.normal(size=3)
+            wanted_mps *= random.choice([0.0, 0.3, 1.0], p=[0.2, 0.2, 0.6]) * SPEED_MPS / np.linalg.norm(wanted_mps)
+        if not -DEPTH_M[1] < position_m[k - 1, 1] + 0.05 * velocity_mps[k - 1, 1] < -DEPTH_M[0]:
+            wanted_mps[1] = -np.sign(position_m[k - 1, 1] + 0.15) * 0.2
+            wanted_mps *= min(1.0, SPEED_MPS / np.linalg.norm(wanted_mps))
+        step = wanted_mps - velocity_mps[k - 1]
+        step *= min(1.0, ACCELERATION_MPS2 * TICK_S / max(np.linalg.norm(step), 1e-12))
+        velocity_mps[k] = velocity_mps[k - 1] + step
+        position_m[k] = position_m[k - 1] + velocity_mps[k] * TICK_S
+    return Motion(np.arange(ticks) * TICK_S, position_m, velocity_mps)
+
+
+WANDERINGS = [wandering(seed) for seed in range(4)]
+
+
+def box_of(motion, velocity_mps=SPEED_MPS):
+    """Return the box that a motion keeps to."""
+    depth_m = -motion.position_m[:, 1]
+    return MotionBox(
+        speed_mps=velocity_mps, acceleration_mps2=ACCELERATION_MPS2, depth_m=(depth_m.min(), depth_m.max())
+    )
+
+
+def pool(name, motion, **fields):
+    """Return a scene of one liquid with a surface."""
+    density, viscosity = LIQUIDS[name]
+    liquid = Liquid(**{"id": name, "density_kg_m3": density, "viscosity_pa_s": viscosity, "region": POOL, **fields})
+    return Scene(scale=1, velocity=Given(), motion=box_of(motion), body=Body(density_kg_m3=700), liquids=(liquid,))
+
+
+def with_effects(scene, effects, law=REFERENCE):
+    """Return the scene with these effects in its liquid."""
+    liquid = scene.liquids[0].model_copy(update={"effects": tuple(effects), "drag": Drag(law=law)})
+    return scene.model_copy(update={"liquids": (liquid,)})
+
+
+def felt(scene, motion):
+    """Return the force (n, 3) [N]."""
+    return vectors(simulate(scene, motion), "force")
+
+
+ALL = ("drag", "current", "buoyancy", "surface", "added_mass", "history")
+
+
+@pytest.mark.parametrize("motion", WANDERINGS, ids=range(len(WANDERINGS)))
+def test_the_wandering_keeps_to_its_box_and_uses_it(motion):
+    speeds = np.linalg.norm(motion.velocity_mps, axis=1)
+    turns = np.linalg.norm(np.diff(motion.velocity_mps, axis=0), axis=1) / TICK_S
+    assert 0.95 * SPEED_MPS < speeds.max() <= SPEED_MPS * (1 + 1e-9)
+    assert ACCELERATION_MPS2 * 0.99 < turns.max() <= ACCELERATION_MPS2 * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("name", LIQUIDS)
+@pytest.mark.parametrize("current", CURRENTS)
+@pytest.mark.parametrize("effect", ALL)
+def test_no_motion_makes_more_of_an_effect_than_its_bound(name, current, effect):
+    reached = 0.0
+    for motion in WANDERINGS:
+        scene = pool(name, motion, current=CURRENTS[current])
+        bound_n = bounds(scene, scene.liquids[0])[effect]
+        others = [it for it in ALL if it != effect and not (effect == "drag" and it == "current")]
+        missing_n = felt(with_effects(scene, [*others, effect]), motion) - felt(with_effects(scene, others), motion)
+        greatest_n = np.linalg.norm(missing_n, axis=1).max()
+        assert greatest_n <= bound_n * 1.001
+        reached = max(reached, greatest_n / bound_n if bound_n > 0 else 0.0)
+    assert reached > 0.1
+
+
+@pytest.mark.parametrize("name", LIQUIDS)
+@pytest.mark.parametrize("current", CURRENTS)
+def test_what_auto_leaves_out_is_never_missed_by_more_than_the_target(name, current):
+    for motion in WANDERINGS:
+        scene = pool(name, motion, current=CURRENTS[current], effects="auto")
+        verdicts = calls_for(scene)
+        total_n = sum(verdict.bound_n for verdict in verdicts)
+        target_n = max(0.05 * total_n, 0.05)
+        chosen = resolve(scene)
+        missing_n = felt(with_effects(scene, ALL), motion) - felt(chosen, motion)
+        law_n = max(0.05 * bounds(scene, scene.liquids[0])["drag"], 0.05) if "drag" in chosen.liquids[0].effects else 0
+        assert np.linalg.norm(missing_n, axis=1).max() <= target_n + law_n
+
+
+def test_the_worst_motion_for_history_all_but_reaches_its_bound():
+    steady_ticks, turn_s = 4000, 2 * SPEED_MPS / ACCELERATION_MPS2
+    turning = np.minimum(np.arange(1, int(turn_s / TICK_S) + 1) * TICK_S * ACCELERATION_MPS2, 2 * SPEED_MPS)
+    vx = np.concatenate([np.full(steady_ticks, -SPEED_MPS), turning - SPEED_MPS])
+    velocity_mps = np.column_stack([vx, 0 * vx, 0 * vx])
+    motion = Motion(np.arange(len(vx)) * TICK_S, np.cumsum(velocity_mps, axis=0) * TICK_S, velocity_mps)
+    scene = pool("honey", motion).model_copy(
+        update={"motion": MotionBox(speed_mps=SPEED_MPS, acceleration_mps2=ACCELERATION_MPS2)}
+    )
+    liquid = Liquid(id="honey", density_kg_m3=1420, viscosity_pa_s=10, history=History(smoothing_s=0))
+    scene = scene.model_copy(update={"liquids": (liquid,)})
+    force_n = felt(with_effects(scene, ["history"]), motion)
+    assert -force_n[-1, 0] == pytest.approx(bounds(scene, liquid)["history"], rel=0.02)
+
+
+@pytest.mark.parametrize("exponent", [0.25, 1.0, 4.0])
+@pytest.mark.parametrize("scaling", [100, 150])
+def test_a_wake_adds_no_more_than_its_bound(exponent, scaling):
+    for motion in WANDERINGS:
+        wake = Wake(length=100, scaling=scaling, exponent=exponent, breaking_span_m=0.0, axes="xyz")
+        scene = Scene(
+            scale=1,
+            velocity=Given(),
+            motion=box_of(motion),
+            liquids=(Liquid(id="liquid", density_kg_m3=1000, wake=wake),),
+        )
+        added_n = felt(with_effects(scene, ["drag", "wake"], "constant"), motion) - felt(
+            with_effects(scene, ["drag"], "constant"), motion
+        )
+        assert np.linalg.norm(added_n, axis=1).max() <= bounds(scene, scene.liquids[0])["wake"] * 1.001

@@ -1,0 +1,278 @@
+"""Which effects a scene calls for: the rule, its worked examples, and the bounds by arithmetic."""
+
+import math
+import subprocess
+import sys
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from study_app.haptics.model.bounds import bounds, lowered_mps, resistance_n, submerged
+from study_app.haptics.model.gate import calls_for, cheapest_law, describe_gate, resolve
+from study_app.haptics.model.scene import (
+    Accuracy,
+    Body,
+    Box,
+    Channel,
+    Cylinder,
+    Drag,
+    Knee,
+    Liquid,
+    MotionBox,
+    Scene,
+    Uniform,
+    Vortex,
+    Wake,
+)
+
+LIQUIDS = {
+    "water": (998.2, 1.0016e-3),
+    "olive_oil": (913, 0.084),
+    "glycerin": (1261, 1.41),
+    "honey": (1420, 10.0),
+    "tar": (1150, 100.0),
+}
+VOLUME_M3 = math.pi * 0.068**3 / 6
+STROKE_M = 0.04
+HOLLOW = Body(density_kg_m3=0.01)
+
+
+def stirred(name, speed_mps, *, body=HOLLOW, **fields):
+    """Return a scene of scale 1 in which a hand strokes ±4 cm at up to this speed; fields are the liquid's."""
+    density, viscosity = LIQUIDS[name]
+    liquid = Liquid(**{"id": name, "density_kg_m3": density, "viscosity_pa_s": viscosity, "effects": "auto", **fields})
+    box = MotionBox(speed_mps=speed_mps, acceleration_mps2=speed_mps**2 / STROKE_M)
+    return Scene(scale=1, body=body, motion=box, liquids=(liquid,))
+
+
+def taken(scene):
+    """Return the names of the effects that are in."""
+    return [verdict.effect for verdict in calls_for(scene) if verdict.included]
+
+
+def bound(scene, effect):
+    """Return one effect's bound [N]."""
+    return bounds(scene, scene.liquids[0])[effect]
+
+
+@pytest.mark.parametrize(
+    ("name", "speed_mps", "effects"),
+    [
+        ("water", 0.1, ["buoyancy"]),
+        ("honey", 0.1, ["drag", "buoyancy", "history"]),
+        ("tar", 0.1, ["drag", "buoyancy", "history"]),
+        ("water", 1.0, ["drag", "buoyancy", "added_mass"]),
+        ("olive_oil", 1.0, ["drag", "buoyancy", "added_mass", "history"]),
+    ],
+)
+def test_worked_examples(name, speed_mps, effects):
+    """Still pool and slow hand, fast stirring; the sum rule takes history in where a rule for each alone would not."""
+    assert taken(stirred(name, speed_mps)) == effects
+
+
+@pytest.mark.parametrize(
+    ("name", "speed_mps", "drag_n", "added_mass_n", "history_n", "buoyancy_n"),
+    [
+        ("water", 0.5, 0.217, 0.51, 0.039, 1.61),
+        ("water", 1.0, 0.89, 2.05, 0.11, 1.61),
+        ("olive_oil", 0.5, 0.265, 0.47, 0.34, 1.47),
+        ("glycerin", 0.5, 1.16, 0.65, 1.6, 2.04),
+        ("honey", 0.25, 2.04, 0.18, 1.6, 2.29),
+        ("honey", 0.5, 4.62, 0.73, 4.6, 2.29),
+        ("tar", 0.1, 6.6, 0.024, 1.2, 1.86),
+    ],
+)
+def test_bounds_are_those_of_the_published_table(name, speed_mps, drag_n, added_mass_n, history_n, buoyancy_n):
+    """The table's history is the amplitude of a sinusoid; the bound is the worst motion, √2 · 2/√π = 1.6 times that."""
+    scene = stirred(name, speed_mps)
+    assert bound(scene, "drag") == pytest.approx(drag_n, rel=0.07)
+    assert bound(scene, "added_mass") == pytest.approx(added_mass_n, rel=0.03)
+    assert bound(scene, "history") == pytest.approx(history_n * 2 * math.sqrt(2 / math.pi), rel=0.05)
+    assert bound(scene, "buoyancy") == pytest.approx(buoyancy_n, rel=0.01)
+
+
+def test_a_current_is_bounded_by_the_drag_it_adds_and_its_shear_by_what_it_turns():
+    still = stirred("water", 0.5)
+    uniform = stirred("water", 0.5, current=Uniform(velocity_mps=(0.3, 0.0, 0.4)))
+    liquid = uniform.liquids[0]
+    assert bound(uniform, "current") == pytest.approx(
+        resistance_n(uniform, liquid, 1.0) - resistance_n(uniform, liquid, 0.5)
+    )
+    assert bound(uniform, "added_mass") == bound(still, "added_mass")
+    channel = stirred("water", 0.5, current=Channel(width_m=0.2, peak_mps=-0.5))
+    vortex = stirred("water", 0.5, current=Vortex(core_m=0.1, peak_mps=0.5))
+    sheared_mps2 = 0.5 * 4 * 0.5 / 0.2
+    history_n = 12 * 0.034**2 * math.sqrt(2 * math.pi * 998.2 * 1.0016e-3 * sheared_mps2 * 0.5)
+    assert bound(channel, "current") == pytest.approx(
+        bound(uniform, "current") + 0.5 * 998.2 * VOLUME_M3 * sheared_mps2 + history_n
+    )
+    assert bound(channel, "added_mass") == pytest.approx(0.5 * 998.2 * VOLUME_M3 * (6.25 + sheared_mps2))
+    assert bound(channel, "history") == pytest.approx(bound(still, "history") + history_n)
+    assert all(bound(vortex, effect) == pytest.approx(bound(channel, effect)) for effect in ("current", "history"))
+
+
+def test_a_full_wake_against_the_motion_is_the_most_it_can_do():
+    scene = stirred("water", 0.5, viscosity_pa_s=None, wake=Wake(length=100, scaling=200, exponent=2))
+    drag_n = 0.5 * 998.2 * 0.47 * math.pi * 0.034**2 * 0.25
+    assert bound(scene, "wake") == pytest.approx(drag_n * (1.25**2 - 1))
+
+
+def test_without_a_viscosity_there_is_no_history_and_the_coefficient_is_constant():
+    scene = stirred("water", 1.0, viscosity_pa_s=None)
+    assert "history" not in bounds(scene, scene.liquids[0])
+    assert resolve(scene).liquids[0].drag == Drag(law="constant")
+
+
+@pytest.mark.parametrize(("depth", "share"), [(-0.1, 0.0), (-0.017, 0.15625), (0.0, 0.5), (0.017, 0.84375), (9, 1.0)])
+def test_the_cap_under_the_surface(depth, share):
+    assert submerged(depth, 0.034) == pytest.approx(share)
+
+
+POOL = Box(size_m=(1.0, 0.4, 1.0))
+
+
+@pytest.mark.parametrize(
+    ("depth_m", "effects"),
+    [((0.1, 0.3), set()), ((-0.05, 0.3), {"surface", "buoyancy"}), ((-0.5, -0.1), {"buoyancy"})],
+    ids=["deep", "across", "above"],
+)
+def test_the_surface_is_called_for_where_the_ball_can_cross_it(depth_m, effects):
+    scene = stirred("water", 0.1, region=POOL, body=Body(density_kg_m3=998.2))
+    scene = scene.model_copy(update={"motion": scene.motion.model_copy(update={"depth_m": depth_m})})
+    assert set(taken(scene)) == effects
+    if effects == {"buoyancy"}:
+        assert bound(scene, "drag") == bound(scene, "added_mass") == bound(scene, "surface") == 0.0
+        assert bound(scene, "buoyancy") == pytest.approx(998.2 * VOLUME_M3 * 9.80665)
+
+
+def test_a_wake_is_never_taken_but_keeps_its_place_in_the_table():
+    scene = stirred("water", 1.0, wake=Wake(length=1700, scaling=1700))
+    (verdict,) = [verdict for verdict in calls_for(scene) if verdict.effect == "wake"]
+    assert verdict.bound_n > bound(scene, "drag")
+    assert not verdict.included
+    assert "name it" in verdict.why
+    assert taken(scene) == taken(stirred("water", 1.0))
+
+
+def test_a_current_brings_the_drag_that_carries_it():
+    fast = stirred("water", 0.1, current=Uniform(velocity_mps=(2.0, 0, 0)))
+    assert bound(fast, "drag") < 0.05
+    assert taken(fast)[:2] == ["drag", "current"]
+
+
+liquids = st.builds(
+    Liquid,
+    id=st.just("liquid"),
+    density_kg_m3=st.floats(500, 5000),
+    viscosity_pa_s=st.none() | st.floats(1e-4, 200),
+    region=st.just(POOL) | st.builds(Cylinder, radius_m=st.just(0.3), height_m=st.floats(0.05, 1)),
+    effects=st.just("auto"),
+    current=st.none() | st.builds(Uniform, velocity_mps=st.tuples(*[st.floats(-1, 1)] * 3)),
+)
+scenes = st.builds(
+    Scene,
+    scale=st.sampled_from([1.0, 3.0, 10.0]),
+    body=st.builds(Body, density_kg_m3=st.floats(1, 3000)),
+    liquids=liquids.map(lambda liquid: (liquid,)),
+    motion=st.builds(MotionBox, speed_mps=st.floats(0.01, 5), acceleration_mps2=st.floats(0.01, 50)),
+    accuracy=st.builds(Accuracy, relative=st.floats(0, 0.5), absolute_n=st.floats(0, 1)),
+)
+
+
+@given(scene=scenes)
+def test_the_sum_of_what_is_left_out_stays_within_the_target_and_nothing_more_would(scene):
+    verdicts = calls_for(scene)
+    total_n = sum(verdict.bound_n for verdict in verdicts)
+    small = [verdict.bound_n for verdict in verdicts if not verdict.included or "carries" in verdict.why]
+    kept = [verdict.bound_n for verdict in verdicts if verdict.included and "carries" not in verdict.why]
+    target_n = max(scene.accuracy.relative * min(total_n, scene.force_limit_n), scene.accuracy.absolute_n)
+    assert sum(small) <= target_n * (1 + 1e-9)
+    assert not kept or sum(small) + min(kept) > target_n * (1 - 1e-9)
+    assert sum(verdict.share for verdict in verdicts) == pytest.approx(1.0)
+
+
+@given(scene=scenes)
+def test_what_is_resolved_is_named_valid_and_final(scene):
+    named = resolve(scene)
+    assert Scene.model_validate(named.model_dump()) == named
+    assert list(named.liquids[0].effects) == taken(scene) == taken(named)
+    assert resolve(named) is named
+
+
+@given(scene=scenes)
+def test_the_law_is_the_cheapest_within_the_target_at_every_speed(scene):
+    liquid = scene.liquids[0]
+    law = cheapest_law(scene, liquid)
+    if liquid.viscosity_pa_s is None:
+        assert law == "constant"
+        return
+    top_mps = lowered_mps(scene.motion.speed_mps, scene.knee) + math.hypot(
+        *(liquid.current.velocity_mps if liquid.current else (0,))
+    )
+
+    def meets(law):
+        return all(
+            abs(resistance_n(scene, liquid, v, law) - true_n)
+            <= max(scene.accuracy.relative * true_n, scene.accuracy.absolute_n) * (1 + 1e-9)
+            for v in (top_mps * k / 60 for k in range(1, 61))
+            for true_n in [resistance_n(scene, liquid, v)]
+        )
+
+    cheaper = {"constant": [], "schiller-naumann": ["constant"], "haider-levenspiel": ["constant", "schiller-naumann"]}
+    assert meets(law)
+    assert not any(meets(other) for other in cheaper[law])
+
+
+@pytest.mark.parametrize(
+    ("name", "speed_mps", "law"),
+    [("water", 1.0, "constant"), ("olive_oil", 1.0, "schiller-naumann"), ("tar", 0.1, "schiller-naumann")],
+)
+def test_laws_of_the_real_liquids(name, speed_mps, law):
+    scene = stirred(name, speed_mps)
+    assert cheapest_law(scene, scene.liquids[0]) == law
+
+
+def test_effects_that_are_named_stay_as_they_are():
+    scene = Scene(liquids=(Liquid(id="honey", density_kg_m3=1400, viscosity_pa_s=10),))
+    assert resolve(scene) is scene
+    told = {verdict.effect: (verdict.included, verdict.why) for verdict in calls_for(scene)}
+    assert told["drag"] == (True, "named, law constant")
+    assert told["history"] == (False, "not named")
+
+
+def test_the_knee_lowers_the_fastest_motion_too():
+    scene = stirred("water", 9.0, viscosity_pa_s=None)
+    assert bound(scene, "drag") == pytest.approx(0.5 * 998.2 * 0.47 * math.pi * 0.034**2 * 49)
+    assert lowered_mps(7.0, Knee(law="square")) == 9.0
+    assert lowered_mps(7.0, Knee(law="none")) == 7.0
+
+
+def test_the_table_in_words():
+    scene = stirred("glycerin", 0.1)
+    pool = stirred("water", 0.5, region=POOL)
+    lines = describe_gate(scene.model_copy(update={"liquids": (*scene.liquids, *pool.liquids)}))
+    assert lines[0] == "glycerin: effects chosen; up to 0.1 m/s and 0.25 m/s² in the scene"
+    assert lines[1].split() == ["effect", "bound", "[N]", "share", "why"]
+    drag, buoyancy, added_mass, history = (line.split(maxsplit=4) for line in lines[2:6])
+    assert drag[:4] == ["drag", "0.143", "5.9%", "in"]
+    assert "schiller-naumann, within 5 % or 0.05 N of haider-levenspiel" in drag[4]
+    assert added_mass[3:] == ["out", "0.026 N left out in all, within 0.122 N"]
+    assert buoyancy[4].startswith("without it 2.06 N would be missing, more than 0.122 N")
+    assert history[0] == "history"
+    assert lines[6] == ""
+    assert lines[7].endswith("in the scene, centre 0.16 to 0.24 m deep")
+    assert all(line == line.rstrip() for line in lines)
+
+
+def test_the_cost_has_a_column_where_it_was_measured():
+    scene = stirred("water", 0.1)
+    lines = describe_gate(scene, {("water", "buoyancy"): 3.6})
+    assert lines[1].split() == ["effect", "bound", "[N]", "share", "ns", "a", "tick", "why"]
+    assert [line.split()[3] for line in lines[2:5]] == ["–", "4", "–"]
+
+
+def test_neither_the_gate_nor_the_laws_load_the_compiler():
+    code = "import sys, study_app.haptics.model.gate; print('numba' in sys.modules, 'numpy' in sys.modules)"
+    printed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert printed.split() == ["False", "False"]

@@ -1,0 +1,141 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from study_app.errors import ProtocolError, StudyError
+from study_app.haptics.model.motion import Motion, read, write
+from tests.haptics.scenes import examples
+
+HEADER = "t_s,x_m,y_m,z_m"
+numbers = st.floats(allow_nan=False, allow_infinity=False)
+
+
+def written(tmp_path, text):
+    file = tmp_path / "motion.csv"
+    file.write_bytes(text.encode() if isinstance(text, str) else text)
+    return file
+
+
+def problems(tmp_path, *rows, header=HEADER):
+    """Return what is wrong with a file of these rows, one line each."""
+    with pytest.raises(ProtocolError) as caught:
+        read(written(tmp_path, "\n".join([header, *rows]) + "\n"))
+    return [str(problem) for problem in caught.value.problems]
+
+
+def test_positions_are_read_in_order(tmp_path):
+    motion = read(written(tmp_path, f"{HEADER}\n0,1,2,3\n0.001,4,5,6e-1\n"))
+    assert motion.t_s.tolist() == [0, 0.001]
+    assert motion.position_m.tolist() == [[1, 2, 3], [4, 5, 0.6]]
+    assert motion.velocity_mps is None
+
+
+def test_velocities_are_read_where_they_are(tmp_path):
+    motion = read(written(tmp_path, f"{HEADER},vx_mps,vy_mps,vz_mps\n0,1,2,3,4,5,6\n"))
+    assert motion.velocity_mps.tolist() == [[4, 5, 6]]
+
+
+@pytest.mark.parametrize("text", [f"\ufeff{HEADER}\r\n0,1,2,3\r\n", f'{HEADER}\n"0",1,2,3\n\n\n'])
+def test_a_spreadsheets_byte_order_mark_line_ends_and_last_blank_lines_are_fine(tmp_path, text):
+    assert read(written(tmp_path, text)).position_m.tolist() == [[1, 2, 3]]
+
+
+@pytest.mark.parametrize("header", ["x_m,t_s,y_m,z_m", "t,x,y,z", f"{HEADER},vx_mps", "0,1,2,3", ""])
+def test_another_header_is_refused(tmp_path, header):
+    (problem,) = problems(tmp_path, "0,1,2,3", header=header)
+    assert problem.startswith("line 1: header: is ")
+    assert "t_s,x_m,y_m,z_m" in problem
+
+
+def test_every_bad_row_is_named_by_number_and_line(tmp_path):
+    rows = ["0,0,0,0", "0.001,x,0,0", "0.002,0,0", "0.003,nan,0,0", "0.004,0,0,1_0", "0.004,1e999,0,0", "0.006,0,0,0"]
+    assert problems(tmp_path, *rows) == [
+        "line 3: row 2: 'x' is not a finite number",
+        "line 4: row 3: has 3 fields, not 4",
+        "line 5: row 4: 'nan' is not a finite number",
+        "line 6: row 5: '1_0' is not a finite number",
+        "line 7: row 6: '1e999' is not a finite number",
+    ]
+
+
+def test_time_must_increase(tmp_path):
+    assert problems(tmp_path, "0,0,0,0", "0.002,0,0,0", "0.002,0,0,0", "0.001,0,0,0") == [
+        "line 4: row 3: t_s must increase, but 0.002 follows 0.002",
+        "line 5: row 4: t_s must increase, but 0.001 follows 0.002",
+    ]
+
+
+def test_a_blank_line_in_the_middle_is_a_bad_row(tmp_path):
+    assert problems(tmp_path, "0,0,0,0", "", "1,0,0,0") == ["line 3: row 2: has 0 fields, not 4"]
+
+
+def test_of_many_bad_rows_twenty_are_listed_and_the_rest_counted(tmp_path):
+    listed = problems(tmp_path, *["x,0,0,0"] * 30)
+    assert len(listed) == 21
+    assert listed[-1] == "rows: 10 more like these"
+
+
+def test_a_file_without_rows_is_refused(tmp_path):
+    assert problems(tmp_path) == ["rows: there are none (give at least one)"]
+
+
+@pytest.mark.parametrize("content", [None, b"\xff\xfe\x00", b't_s,"x'])
+def test_a_file_that_cannot_be_read_is_named(tmp_path, content):
+    file = tmp_path / "absent.csv" if content is None else written(tmp_path, content)
+    with pytest.raises(StudyError, match=r"cannot read the motion .*csv"):
+        read(file)
+
+
+@settings(max_examples=examples(50), deadline=None)
+@given(values=arrays(float, st.tuples(st.integers(1, 20), st.just(3)), elements=numbers))
+def test_what_is_written_is_read_back_to_the_last_bit(tmp_path_factory, values):
+    table = np.recarray(len(values), [(name, float) for name in HEADER.split(",")])
+    table.t_s = np.arange(len(values)) / 3
+    table.x_m, table.y_m, table.z_m = values.T
+    file = tmp_path_factory.mktemp("motion") / "out.csv"
+    write(file, table)
+    motion = read(file)
+    assert motion.t_s.tobytes() == table.t_s.tobytes()
+    assert motion.position_m.tobytes() == np.ascontiguousarray(values).tobytes()
+
+
+def test_whole_numbers_are_written_as_such(tmp_path):
+    table = np.recarray(1, [("t_s", float), ("limiters", np.int64)])
+    table.t_s, table.limiters = 0.1, 17
+    write(tmp_path / "out.csv", table)
+    assert (tmp_path / "out.csv").read_bytes() == b"t_s,limiters\n0.1,17\n"
+
+
+def test_a_file_is_replaced_whole_and_nothing_is_left_beside_it(tmp_path):
+    file = written(tmp_path, "old")
+    write(file, np.recarray(1, [("t_s", float)], buf=np.zeros(1)))
+    assert file.read_text() == "t_s\n0.0\n"
+    assert [found.name for found in tmp_path.iterdir()] == [file.name]
+
+
+def test_on_error_nothing_is_written_and_what_was_there_stays(tmp_path):
+    (tmp_path / "out.csv").mkdir()
+    with pytest.raises(StudyError, match=r"cannot write .*out.csv"):
+        write(tmp_path / "out.csv", np.recarray(1, [("t_s", float)], buf=np.zeros(1)))
+    assert [found.name for found in tmp_path.iterdir()] == ["out.csv"]
+    with pytest.raises(StudyError, match="cannot write"):
+        write(tmp_path / "absent" / "out.csv", np.recarray(1, [("t_s", float)], buf=np.zeros(1)))
+
+
+@pytest.mark.parametrize(
+    ("t_s", "position_m", "velocity_mps", "message"),
+    [
+        ([], np.zeros((0, 3)), None, "not \\(0,\\)"),
+        ([0.0], np.zeros((1, 2)), None, "positions \\(n, 3\\)"),
+        ([0.0, 1.0], np.zeros((2, 3)), np.zeros((1, 3)), "not \\(2,\\), \\(2, 3\\), \\(1, 3\\)"),
+        ([0.0], np.full((1, 3), math.nan), None, "finite"),
+        ([0.0, 1.0, 1.0], np.zeros((3, 3)), None, "row 3"),
+    ],
+)
+def test_a_motion_checks_itself(t_s, position_m, velocity_mps, message):
+    with pytest.raises(StudyError, match=message):
+        Motion(np.array(t_s), position_m, velocity_mps)

@@ -1,0 +1,154 @@
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from pydantic import BaseModel
+
+from study_app.errors import StudyError
+from study_app.haptics.model.overrides import override, override_all
+from study_app.haptics.model.scene import Box, Channel, Everywhere, Foaw, Line, Uniform, Vortex
+from tests.haptics.scenes import HONEY, LIGHT_OIL, POOL, WATER, scene
+
+FULL = scene(POOL)
+RIVER = Uniform(velocity_mps=(1, 0, 0))
+
+
+def leaves(value: BaseModel, place: str) -> Iterator[tuple[str, str, Any]]:
+    """Yield (table, field, value) of every number and word of a scene; liquids are one table, however many."""
+    for field, found in value:
+        if isinstance(found, BaseModel):
+            yield from leaves(found, field)
+        elif field == "liquids":
+            for one in found:
+                yield from leaves(one, "liquid")
+        else:
+            yield place, field, found
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "where", "value"),
+    [
+        ("density_kg_m3", "1200", lambda s: s.liquids[0].density_kg_m3, 1200.0),
+        ("length", "500", lambda s: s.liquids[0].wake.length, 500),
+        ("exponent", "2", lambda s: s.liquids[0].wake.exponent, 2.0),
+        ("axes", "xyz", lambda s: s.liquids[0].wake.axes, "xyz"),
+        ("effects", "drag", lambda s: s.liquids[0].effects, ("drag",)),
+        ("drag_coefficient", "0.5", lambda s: s.body.drag_coefficient, 0.5),
+        ("body.density_kg_m3", "700", lambda s: s.body.density_kg_m3, 700.0),
+        ("alpha", "0.2", lambda s: s.velocity.alpha, 0.2),
+        ("law", "none", lambda s: s.knee.law, "none"),
+        ("threshold_mps", "3", lambda s: s.knee.threshold_mps, 3.0),
+        ("scale", "3", lambda s: s.scale, 3.0),
+        ("origin_m", "0,0.5,0", lambda s: s.origin_m, (0.0, 0.5, 0.0)),
+    ],
+)
+def test_override_sets_one_parameter_wherever_it_sits(name, text, where, value):
+    changed = override(WATER, name, text)
+    assert where(changed) == value
+    assert where(WATER) != value
+    assert override(WATER, name, where(WATER)) == WATER
+
+
+@pytest.mark.parametrize(
+    "felt",
+    [
+        FULL,
+        FULL.model_copy(update={"velocity": Line()}),
+        FULL.model_copy(update={"velocity": Foaw()}),
+        scene(POOL.model_copy(update={"current": Channel(width_m=1, peak_mps=1), "region": Box(size_m=(1, 2, 3))})),
+        scene(POOL.model_copy(update={"current": Uniform(velocity_mps=(1, 2, 3))})),
+    ],
+)
+def test_every_parameter_is_reached_by_its_table_and_most_by_their_name_alone(felt):
+    found = [(table, field) for table, field, _ in leaves(felt, "scene") if field not in {"id", "kind"}]
+    plain = []
+    for table, field, value in leaves(felt, "scene"):
+        if field == "id":
+            continue
+        text = ",".join(map(str, value)) if isinstance(value, tuple) else value
+        if text is not None:
+            assert override(felt, f"{table}.{field}", text) == felt
+        if [name for _, name in found].count(field) == 1 and text is not None:
+            assert override(felt, field, text) == felt
+            plain.append(field)
+    shared = {field for _, field in found} - set(plain)
+    assert shared <= {
+        *("density_kg_m3", "law", "centre_m", "viscosity_pa_s", "speed_mps", "acceleration_mps2", "depth_m", "reach_m"),
+        *("length", "scaling", "exponent", "decay", "axes", "samples", "tolerance_m", "filter_s", "smoothing_s"),
+    }
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "where", "value"),
+    [
+        ("law", "square", lambda s: s.knee.law, "square"),
+        ("drag.law", "constant", lambda s: s.liquids[0].drag.law, "constant"),
+        ("local_wake.length", "7", lambda s: s.liquids[0].local_wake.length, 7),
+        ("reach_m", "0.1", lambda s: s.liquids[0].local_wake.reach_m, 0.1),
+        ("current.centre_m", "1,2,3", lambda s: s.liquids[0].current.centre_m, (1, 2, 3)),
+        ("centre_m", "1,2,3", lambda s: s.liquids[0].region.centre_m, (1, 2, 3)),
+        ("radius_m", "2", lambda s: s.liquids[0].region.radius_m, 2),
+        ("region", '{kind="box", size_m=[1, 2, 3]}', lambda s: s.liquids[0].region, Box(size_m=(1, 2, 3))),
+        ("current", '{kind="uniform", velocity_mps=[1, 0, 0]}', lambda s: s.liquids[0].current, RIVER),
+        ("peak_mps", "-2", lambda s: s.liquids[0].current, Vortex(core_m=0.2, peak_mps=-2)),
+        ("filter_s", "0.1", lambda s: s.liquids[0].added_mass.filter_s, 0.1),
+        ("window_s", "0.1", lambda s: s.liquids[0].history.window_s, 0.1),
+        ("depth_m", "-0.1,0.5", lambda s: s.motion.depth_m, (-0.1, 0.5)),
+        ("relative", "0.1", lambda s: s.accuracy.relative, 0.1),
+        ("effects", "auto", lambda s: s.liquids[0].effects, "auto"),
+        ("velocity.kind", "line", lambda s: s.velocity, Line()),
+        ("velocity", '{kind="foaw", samples=9}', lambda s: s.velocity, Foaw(samples=9)),
+    ],
+)
+def test_parameters_of_every_effect_can_be_set(name, text, where, value):
+    changed = override(FULL, name, text)
+    assert where(changed) == value
+    assert where(FULL) != value
+
+
+def test_tables_and_effects_are_judged_together():
+    river = {"effects": "drag,current", "current": '{kind="channel", width_m=0.3, peak_mps=1}'}
+    assert override_all(WATER, river).liquids[0].current == Channel(width_m=0.3, peak_mps=1)
+    with pytest.raises(StudyError, match="its table"):
+        override(WATER, "effects", "drag,current")
+    with pytest.raises(StudyError, match="a region with a top"):
+        override_all(FULL, {"region": '{kind="everywhere"}'})
+    named = override_all(FULL, {"effects": "auto", "region": '{kind="everywhere"}'})
+    assert override(named, "effects", "drag").liquids[0].region == Everywhere()
+    assert override(named, "effects", "drag").liquids[0].effects == ("drag",)
+
+
+def test_override_reaches_every_liquid_that_has_the_parameter():
+    mixed = scene(*WATER.liquids, *HONEY.liquids, *LIGHT_OIL.liquids)
+    changed = override(mixed, "decay", 0.9)
+    assert [one.wake and one.wake.decay for one in changed.liquids] == [0.9, None, 0.9]
+
+
+def test_parameters_that_belong_together_are_judged_together():
+    with pytest.raises(StudyError, match="outrun"):
+        override(WATER, "length", 5000)
+    wake = override_all(WATER, {"length": "5000", "scaling": "5000"}).liquids[0].wake
+    assert (wake.length, wake.scaling) == (5000, 5000)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("densty_kg_m3", 1, "no parameter 'densty_kg_m3': did you mean 'density_kg_m3'"),
+        ("wake.alpha", 1, "no parameter 'wake.alpha': did you mean 'alpha'"),
+        ("kind", "given", "no parameter 'kind'"),
+        ("wake", "{length=1", "cannot read wake = {length=1: write a table such as"),
+        ("liquids", "1", "no parameter 'liquids'"),
+        ("decay", 1.5, "cannot set decay = 1.5.*less than or equal to 1"),
+        ("decay", "fast", "cannot set decay = fast.*valid number"),
+        ("drag", "1", "cannot set drag = 1: drag: is a table of parameters: set one of them by its name"),
+    ],
+)
+def test_an_override_that_fails_says_why(name, value, message):
+    with pytest.raises(StudyError, match=message):
+        override(WATER, name, value)
+
+
+def test_a_parameter_of_an_effect_left_out_is_unknown():
+    with pytest.raises(StudyError, match=r"no parameter .length.*it has absolute_n, acceleration_mps2, alpha, "):
+        override(HONEY, "length", 5)

@@ -1,0 +1,117 @@
+import pytest
+from pydantic import ValidationError
+
+from study_app.haptics.model.layout import EFFECT_DRAG
+from study_app.haptics.model.scene import Body, Box, Everywhere, Given, Liquid, MotionBox, Scene, Wake
+from study_app.haptics.runtime.pack import pack
+from tests.haptics.scenes import PLACES, POOL, WATER, liquid, scene
+
+SHORT = {"length": 1, "scaling": 1}
+
+
+def test_defaults_are_those_of_the_thesis():
+    empty = Scene()
+    assert empty.body == Body(diameter_m=0.068, drag_coefficient=0.47, density_kg_m3=1000)
+    assert (empty.scale, empty.rate_hz, empty.force_limit_n) == (10, 1000, 8)
+    assert (empty.velocity.kind, empty.velocity.alpha) == ("ewma", 0.1)
+    assert (empty.knee.law, empty.knee.threshold_mps) == ("sqrt", 5)
+    wake = Wake(length=1700, scaling=1700)
+    assert (wake.breaking_angle_deg, wake.breaking_span_m, wake.decay, wake.axes) == (45, 0.068, 0.999975, "xz")
+    assert empty.liquids == ()
+
+
+def test_a_scene_never_changes():
+    with pytest.raises(ValidationError, match="frozen"):
+        WATER.scale = 3
+
+
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [
+        ({"wake": {"length": 11, "scaling": 10}}, "the wake would outrun the body"),
+        ({"effects": ("drag", "wake")}, "its table"),
+        ({"effects": ("wake",), "wake": {"length": 1, "scaling": 1}}, "name both"),
+        ({"effects": ("drag", "drag")}, "twice"),
+        ({"effects": ("drag", "magnet")}, "'drag', 'wake', 'local_wake'"),
+        ({"density_kg_m3": float("nan")}, "finite"),
+        ({"density_kg_m3": 0}, "greater than or equal to 0.01"),
+        ({"viscosity": 1}, "Extra inputs are not permitted"),
+        ({"effects": ("drag", "local_wake")}, "its table"),
+        ({"effects": ("drag", "current")}, 'kind = "uniform", "channel" or "vortex"'),
+        ({"effects": ("current",), "current": {"kind": "vortex", "core_m": 1, "peak_mps": 1}}, "name both"),
+        ({"effects": ("drag", "wake", "local_wake"), "wake": SHORT, "local_wake": SHORT}, "two models of the same"),
+        ({"local_wake": {"length": 11, "scaling": 10}}, "the wake would outrun the body"),
+        ({"drag": {"law": "brown-lawler"}}, "needs the liquid's viscosity_pa_s"),
+        ({"effects": ("history",)}, "needs the liquid's viscosity_pa_s"),
+        ({"effects": ("surface",)}, "needs a region with a top"),
+        ({"effects": "automatic"}, "'auto'"),
+        ({"id": "a-b"}, "should match pattern"),
+        ({"region": {"kind": "sphere"}}, "'everywhere', 'box', 'cylinder'"),
+        ({"region": {"kind": "box", "size_m": (1, 0, 1)}}, "greater than or equal to 0.001"),
+    ],
+)
+def test_a_liquid_that_makes_no_sense_is_refused_with_a_reason(fields, message):
+    with pytest.raises(ValidationError, match=message):
+        Liquid(**{"id": "x", "density_kg_m3": 1000, **fields})
+
+
+def test_any_effect_may_be_called_for_where_its_table_stands():
+    assert Liquid(**dict(POOL)).effects == POOL.effects
+    assert Liquid(**dict(PLACES)).effects == PLACES.effects
+    floating = Liquid(id="x", density_kg_m3=1000, effects=("buoyancy",), drag={"law": "brown-lawler"})
+    assert floating.drag.law == "brown-lawler"  # a table that is not called for means nothing
+
+
+def test_a_liquid_may_leave_the_choice_to_the_gate():
+    left = Liquid(id="x", density_kg_m3=1000, viscosity_pa_s=1e-3, effects="auto")
+    assert left.effects == "auto"
+    assert pack(Scene(liquids=(left,))).liquids[0].effects & EFFECT_DRAG
+
+
+@pytest.mark.parametrize(
+    ("region", "depth_m"),
+    [
+        ({"kind": "everywhere"}, None),
+        ({"kind": "box", "centre_m": (0, 0.1, 0), "size_m": (1, 1, 1)}, (0.6 - 0.12 - 0.3, 0.6 + 0.12 - 0.3)),
+        ({"kind": "cylinder", "radius_m": 1, "height_m": 1}, (0.5 - 0.12 - 0.3, 0.5 + 0.12 - 0.3)),
+    ],
+)
+def test_what_is_known_of_the_motion_follows_from_the_hand_unless_said(region, depth_m):
+    one = liquid(region=region)
+    felt = scene(one, scale=3, origin_m=(0, 0.3, 0))
+    motion = felt.motion_in(one)
+    assert (motion.speed_mps, motion.acceleration_mps2) == pytest.approx((0.9, 9.0))
+    assert motion.depth_m == (None if depth_m is None else pytest.approx(depth_m))
+    said = MotionBox(speed_mps=1, acceleration_mps2=2, depth_m=(-1, 3))
+    assert felt.model_copy(update={"motion": said}).motion_in(one) == said
+
+
+def test_the_least_depth_comes_first():
+    with pytest.raises(ValidationError, match="least depth"):
+        MotionBox(depth_m=(1, 0))
+
+
+def test_a_wake_as_long_as_its_scaling_is_allowed():
+    assert Wake(length=10, scaling=10).length == 10
+
+
+def test_liquids_need_ids_of_their_own_and_a_scene_takes_eight():
+    with pytest.raises(ValidationError, match="share an id"):
+        scene(liquid(id="a"), liquid(id="a"))
+    with pytest.raises(ValidationError, match="at most 8"):
+        scene(*(liquid(id=f"a{i}") for i in range(9)))
+
+
+def test_tables_as_read_from_a_file_become_a_scene():
+    read = Scene.model_validate(
+        {
+            "velocity": {"kind": "given"},
+            "liquids": [
+                {"id": "a", "density_kg_m3": 900, "region": {"kind": "box", "size_m": [1, 2, 3]}},
+                {"id": "b", "density_kg_m3": 900},
+            ],
+        }
+    )
+    assert read.velocity == Given()
+    assert read.liquids[0].region == Box(size_m=(1, 2, 3))
+    assert read.liquids[1].region == Everywhere()

@@ -1,0 +1,162 @@
+"""The desktop's real-time service, played by a thread behind a socket."""
+
+import socket
+import struct
+import sys
+import threading
+
+import pytest
+
+if sys.platform != "linux":
+    pytest.skip("a service of Linux", allow_module_level=True)
+
+import resource
+
+from study_app.haptics.runtime.clocks.rtkit import make_high_priority, make_real_time
+
+
+class Service:
+    """A bus with the service on it: takes calls apart by the specification, and answers each as it is told."""
+
+    def __init__(self, path, *, refuses=(), auth=b"OK 1234deadbeef\r\n"):
+        self.calls = []
+        self.heard = b""
+        self._refuses, self._auth = refuses, auth
+        self._server = socket.socket(socket.AF_UNIX)
+        self._server.bind(str(path))
+        self._server.listen(1)
+        self._thread = threading.Thread(target=self._serve)
+        self._thread.start()
+
+    def end(self):
+        self._thread.join()
+        self._server.close()
+
+    def _serve(self):
+        connection, _ = self._server.accept()
+        with connection, connection.makefile("rwb") as stream:
+            self.heard = stream.readline()
+            stream.write(self._auth)
+            stream.flush()
+            if stream.readline() != b"BEGIN\r\n":
+                return
+            while head := stream.read(16):
+                endian, kind, _flags, version, length, serial, fields = struct.unpack("<cBBBIII", head)
+                assert (endian, kind, version) == (b"l", 1, 1)
+                named = self._fields(stream.read(fields))
+                stream.read(-fields % 8)
+                self.calls.append((named, stream.read(length)))
+                self._answer(stream, serial, named[3])
+                stream.flush()
+
+    @staticmethod
+    def _fields(data):
+        at, named = 0, {}
+        while at < len(data):
+            at += -at % 8
+            code, kind = data[at], data[at + 2 : at + 3]
+            at += 4
+            if kind == b"g":
+                size, at = data[at], at + 1
+            else:
+                assert at % 4 == 0
+                size, at = struct.unpack_from("<I", data, at)[0], at + 4
+            named[code] = data[at : at + size].decode()
+            assert data[at + size] == 0
+            at += size + 1
+        return named
+
+    def _answer(self, stream, serial, member):
+        signal = struct.pack("<cBBBIII", b"l", 4, 1, 1, 4, 7, 0) + b"news"
+        stream.write(signal)
+        body = b""
+        if member == "Get":
+            asked = self.calls[-1][1].rstrip(b"\0").rsplit(b"\0", 1)[-1]
+            if b"MaxRealtimePriority" in asked:
+                body = b"\x01i\0\0" + struct.pack("<i", 15)
+            elif b"MinNiceLevel" in asked:
+                body = b"\x01i\0\0" + struct.pack("<i", -7)
+            else:
+                body = b"\x01x\0\0\0\0\0\0" + struct.pack("<q", 200_000)
+        kind = 3 if member in self._refuses else 2
+        fields = struct.pack("<BB2sI", 5, 1, b"u", serial)
+        stream.write(struct.pack("<cBBBIII", b"l", kind, 1, 1, len(body), 9, len(fields)) + fields + body)
+
+
+@pytest.fixture
+def limits(monkeypatch):
+    """Keep this process' own limits; return what was asked for."""
+    asked = []
+    monkeypatch.setattr(resource, "setrlimit", lambda kind, limit: asked.append((kind, limit)))
+    return asked
+
+
+@pytest.fixture
+def serve(tmp_path):
+    made = []
+
+    def begin(**how):
+        made.append(Service(tmp_path / "bus", **how))
+        return made[-1], str(tmp_path / "bus")
+
+    yield begin
+    for service in made:
+        service.end()
+
+
+def test_the_service_is_asked_for_what_it_grants_at_most(serve, limits):
+    service, path = serve()
+    assert make_real_time(4711, path) == 15
+    assert service.heard.startswith(b"\0AUTH EXTERNAL ")
+    assert [named[3] for named, _ in service.calls] == ["Hello", "Get", "Get", "MakeThreadRealtime"]
+    named, body = service.calls[-1]
+    assert named == {
+        1: "/org/freedesktop/RealtimeKit1",
+        2: "org.freedesktop.RealtimeKit1",
+        3: "MakeThreadRealtime",
+        6: "org.freedesktop.RealtimeKit1",
+        8: "tu",
+    }
+    assert struct.unpack("<QI", body) == (4711, 15)
+    assert limits == [(resource.RLIMIT_RTTIME, (200_000, 200_000))]
+
+
+def test_a_refusal_is_an_os_error(serve, limits):
+    _, path = serve(refuses=("MakeThreadRealtime",))
+    with pytest.raises(PermissionError, match="refuses MakeThreadRealtime"):
+        make_real_time(1, path)
+    assert limits
+
+
+def test_a_bus_without_the_service_changes_no_limit(serve, limits):
+    _, path = serve(refuses=("Get",))
+    with pytest.raises(PermissionError, match="refuses Get"):
+        make_real_time(1, path)
+    assert limits == []
+
+
+def test_a_bus_that_refuses_the_user_is_an_os_error(serve):
+    _, path = serve(auth=b"REJECTED EXTERNAL\r\n")
+    with pytest.raises(PermissionError, match="refuses this user"):
+        make_real_time(1, path)
+
+
+def test_no_bus_is_an_os_error(tmp_path, monkeypatch):
+    monkeypatch.setenv("DBUS_SYSTEM_BUS_ADDRESS", f"unix:path={tmp_path / 'none'},guid=0")
+    with pytest.raises(FileNotFoundError):
+        make_real_time(1)
+
+
+def test_a_thread_goes_before_others_as_far_as_the_service_grants_it(serve, limits):
+    service, path = serve()
+    assert make_high_priority(4711, -10, path) == -7
+    named, body = service.calls[-1]
+    assert (named[3], named[8]) == ("MakeThreadHighPriority", "ti")
+    assert struct.unpack("<Qi", body) == (4711, -7)
+    assert limits == [], "it may compute as long as it likes: it is not real-time"
+
+
+def test_a_thread_that_may_not_go_before_others_is_an_os_error(serve):
+    _, path = serve(refuses=("MakeThreadHighPriority",))
+    with pytest.raises(PermissionError, match="refuses MakeThreadHighPriority"):
+        make_high_priority(1, -10, path)
