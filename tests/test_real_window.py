@@ -21,9 +21,9 @@ from study_app.gui.operator.strip import Strip
 from study_app.gui.pages.questionnaire import QuestionnaireWidget
 from study_app.gui.participant import ParticipantWindow
 from study_app.gui.preflight.window import FULL as PREFLIGHT
-from study_app.protocol.files import source_bytes
 from study_app.protocol.load import parse
-from study_app.protocol.words import words
+from study_app.protocol.source.files import source_bytes
+from study_app.protocol.wording.languages import words
 from study_app.store.resume import check_can_go_on
 from tests.compiled import needs_servo
 from tests.gui.small import ManualClock, questionnaire

@@ -20,7 +20,7 @@ from study_app.analysis.figures import plot
 from study_app.errors import StoreError
 from study_app.evaluation.replay import replay
 from study_app.protocol.load import load, shipped
-from study_app.protocol.schedule import build_schedule, stream
+from study_app.protocol.orders.schedule import build_schedule, stream
 from study_app.session.rehearsal import rehearse
 from study_app.store import journal
 from study_app.store.blinding import open_or_draw_key, read_key

@@ -30,7 +30,7 @@ from study_app.gui.pointer import SHARE_OF_SCREEN
 from study_app.gui.preflight import PreflightWindow
 from study_app.gui.preflight.window import FULL as PREFLIGHT
 from study_app.protocol.model import Reach
-from study_app.protocol.words import words
+from study_app.protocol.wording.languages import words
 from study_app.session.pages import QuestionnairePage, TaskPage, TextPage
 from study_app.user_folder import settings_file
 from tests.compiled import needs_servo

@@ -25,10 +25,10 @@ from PySide6.QtWidgets import QApplication, QWidget
 from study_app.gui.operator.health import ServoHealth
 from study_app.gui.operator.progress import SessionProgress, stages
 from study_app.gui.operator.view import OperatorView, Session, operator_view
-from study_app.protocol.files import source_bytes
 from study_app.protocol.load import parse
 from study_app.protocol.model import Explore, Protocol
-from study_app.protocol.schedule import build_schedule, draw_key, stream
+from study_app.protocol.orders.schedule import build_schedule, draw_key, stream
+from study_app.protocol.source.files import source_bytes
 from study_app.session.commands import ShowPage
 from study_app.session.events import Begin, Chosen, Continue, ItemShown, LanguageChosen, Submitted, TaskDone
 from study_app.session.machine import advance, open_session

@@ -9,7 +9,7 @@ import pandas as pd
 from study_app.analysis.questions import Block
 from study_app.analysis.results import Delivered
 from study_app.analysis.tables import Study
-from study_app.protocol.design import Evenness, evenness
+from study_app.protocol.orders.balance import Evenness, evenness
 
 
 def delivered(study: Study) -> tuple[Delivered, ...]:

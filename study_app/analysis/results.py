@@ -21,7 +21,7 @@ from study_app.analysis.statistics.recognition import Recognition
 from study_app.analysis.statistics.threshold import Threshold
 from study_app.analysis.statistics.trend import StepDown
 from study_app.errors import AnalysisError
-from study_app.protocol.design import Evenness
+from study_app.protocol.orders.balance import Evenness
 
 Verdict: TypeAlias = Literal["shown", "suggested", "not shown", "out of reach", "not tested"]
 """What may be said: ``shown`` (primary), ``suggested`` (exploratory), ``not shown``, ``out of reach`` of so few

@@ -32,7 +32,7 @@ from study_app.gui.screens import choose_screens
 from study_app.gui.session_windows import open_windows
 from study_app.gui.theme import LIGHT
 from study_app.protocol.load import parse
-from study_app.protocol.schedule import Schedule, Trial, build_schedule
+from study_app.protocol.orders.schedule import Schedule, Trial, build_schedule
 from study_app.store.open_session import SessionStore
 from study_app.store.recording import read_frames
 

@@ -34,7 +34,7 @@ from study_app.gui.opening import OpeningWindow
 from study_app.gui.screens import choose_screens, place
 from study_app.gui.theme import LIGHT, Theme
 from study_app.protocol.load import parse
-from study_app.protocol.schedule import build_schedule
+from study_app.protocol.orders.schedule import build_schedule
 from study_app.session.preflight import Check, checks, refused
 from study_app.session.resume import FIRST, resume_at
 

@@ -23,8 +23,8 @@ from study_app.gui.theme import Theme
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.scene import Scene
 from study_app.protocol.model import Protocol
-from study_app.protocol.schedule import build_schedule
-from study_app.protocol.tasks import Stroke, fastest_stroke
+from study_app.protocol.orders.schedule import build_schedule
+from study_app.protocol.trials.task import Stroke, fastest_stroke
 from study_app.session.preflight import Facts, checks
 from study_app.store import journal
 from study_app.store.layout import locate

@@ -22,8 +22,8 @@ from study_app.gui.screens import choose_screens, place
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.load import load, load_scene
-from study_app.protocol.tasks import Explore
-from study_app.protocol.words import words
+from study_app.protocol.trials.task import Explore
+from study_app.protocol.wording.languages import words
 from study_app.session.pages import TaskPage
 from study_app.session.tasks import TaskView
 from study_app.session.trial import TankView

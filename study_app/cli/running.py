@@ -49,8 +49,8 @@ def check(protocol: str | None, *, schema: bool) -> None:
 @click.option("--seed", type=SEED, default=1, show_default=True)
 def design(protocol: str, participants: int, seed: int) -> None:
     """Count positions and carry-over of the orders of N participants, before anyone is invited."""
-    from study_app.protocol.design import balance, describe_balance, numbered
     from study_app.protocol.load import load
+    from study_app.protocol.orders.balance import balance, describe_balance, numbered
 
     click.echo(describe_balance(balance(load(protocol), numbered(participants), seed)))
 

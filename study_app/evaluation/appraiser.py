@@ -26,7 +26,7 @@ from study_app.evaluation.appraised import Costs, EffectCost, Errors
 from study_app.evaluation.fastest import withheld_share
 from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
 from study_app.haptics.model.scene import Scene
-from study_app.protocol.tasks import Stroke
+from study_app.protocol.trials.task import Stroke
 
 NICEST: Final = 19
 Told: TypeAlias = tuple[int, Costs | Errors | str]

@@ -13,7 +13,7 @@ from study_app.devices import is_simulated, kind_of
 from study_app.errors import StoreError
 from study_app.protocol.load import parse, source_bytes
 from study_app.protocol.model import Protocol
-from study_app.protocol.schedule import stream
+from study_app.protocol.orders.schedule import stream
 from study_app.session.resume import find_protocol, source_to_resume
 from study_app.store.layout import locate, refuse_never_begun, study_folder
 from study_app.store.progress import progress

@@ -33,7 +33,7 @@ from study_app.gui.pointer import BUTTONS, PointerCapture
 from study_app.gui.scene_view import TankWidget, paint_ahead
 from study_app.gui.screens import place
 from study_app.gui.theme import PARTICIPANT, font, load_fonts, stylesheet
-from study_app.protocol.words import Words, words
+from study_app.protocol.wording.languages import Words, words
 from study_app.session.events import Continue, ForceStopped, PauseAsked
 from study_app.session.pages import (
     EndPage,

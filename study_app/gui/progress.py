@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from study_app.gui.pages.base import page_painter
 from study_app.gui.theme import PARTICIPANT, font
-from study_app.protocol.words import Words
+from study_app.protocol.wording.languages import Words
 from study_app.session.pages import Progress
 
 BEGINNING = int(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)  # Qt mirrors it with the painter

@@ -37,7 +37,7 @@ from study_app.protocol.model import Explore, Reach
 from study_app.session.pages import TaskPage
 
 if TYPE_CHECKING:
-    from study_app.protocol.words import Words
+    from study_app.protocol.wording.languages import Words
     from study_app.session.trial import TankView
 
 # Where the tank lies in the window, in shares of it.

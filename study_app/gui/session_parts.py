@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 from study_app.gui.operator.view import Session
 from study_app.gui.operator.watch import WatchedJournal
-from study_app.protocol.schedule import Schedule
+from study_app.protocol.orders.schedule import Schedule
 from study_app.session.pages import Page
 from study_app.session.ports import RecorderPort, ServoPort
 from study_app.session.resume import FIRST, Start

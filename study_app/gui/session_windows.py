@@ -21,8 +21,8 @@ from study_app.gui.screens import choose_screens, place
 from study_app.gui.session_parts import Parts
 from study_app.protocol.describe import expected_duration_s
 from study_app.protocol.model import Protocol, Reach
-from study_app.protocol.schedule import Schedule, stream
-from study_app.protocol.words import words
+from study_app.protocol.orders.schedule import Schedule, stream
+from study_app.protocol.wording.languages import words
 from study_app.session.pages import Page, TaskPage
 from study_app.session.resume import FIRST, Start
 from study_app.session.simulated import Explorer, Reacher

@@ -10,7 +10,7 @@ from study_app.errors import ProtocolError
 from study_app.haptics.model.scene import Scene
 from study_app.lab.workbench import Setting
 from study_app.protocol.load import load_scene, load_scenes, shipped
-from study_app.protocol.scene_text import for_new_file, scene_text
+from study_app.protocol.scene_file import for_new_file, scene_text
 from study_app.store.atomic import write_file
 from study_app.workspace import workspace
 

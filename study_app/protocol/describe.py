@@ -6,11 +6,11 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from study_app.haptics.model.gate import describe_gate, resolve
 from study_app.haptics.model.scene import Scene
-from study_app.protocol import feeling
+from study_app.protocol import liquid_summary
 from study_app.protocol.model import Block, Explore, Protocol, Questionnaire
-from study_app.protocol.schedule import block_codes
-from study_app.protocol.squares import row_count
-from study_app.protocol.tasks import Task
+from study_app.protocol.orders.latin_squares import row_count
+from study_app.protocol.orders.schedule import block_codes
+from study_app.protocol.trials.task import Task
 
 READING_WORDS_PER_S = 3.0
 PAGE_S = 5.0
@@ -34,7 +34,7 @@ def describe(protocol: Protocol) -> str:
         _titled("Session", _session(protocol, language)),
         *(_block(protocol, block, language) for block in protocol.blocks_in_order),
         _titled("Liquids", _liquids(protocol)),
-        ("Effects in each liquid", *(f"  {line}".rstrip() for line in feeling.effects(protocol))),
+        ("Effects in each liquid", *(f"  {line}".rstrip() for line in liquid_summary.effects(protocol))),
         _titled("Conditions", _conditions(protocol)),
         *(_statements(protocol, name, language) for name in protocol.questionnaires),
         _titled("Decided about the analysis", _analysis(protocol)),
@@ -266,7 +266,7 @@ def _points(points: float) -> str:
 
 def _warned(protocol: Protocol) -> Iterator[Iterable[str]]:
     """Yield what to think over, if there is anything."""
-    if told := feeling.warnings(protocol):
+    if told := liquid_summary.warnings(protocol):
         yield "Warnings", *(f"  {warning}" for warning in told)
 
 

@@ -13,7 +13,7 @@ from study_app.haptics.model.bounds import bounds, fastest_mps, lowered_mps, res
 from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.scene import Box, Everywhere, Liquid, MotionBox, Scene
 from study_app.protocol.model import DeviceNeeds, SceneDefaults
-from study_app.protocol.tasks import Stroke
+from study_app.protocol.trials.task import Stroke
 
 LEAST_N: Final = 0.01
 """Less is not felt: a tenth of the force that a hand at rest notices. [choice]"""

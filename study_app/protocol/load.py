@@ -13,13 +13,13 @@ from pydantic import BaseModel, Field, ValidationError
 
 from study_app.errors import Problem, ProtocolError
 from study_app.haptics.model.scene import Liquid, RateHz, Scene
-from study_app.protocol.checks import check
-from study_app.protocol.document import entries
-from study_app.protocol.files import at_hand, protocol_hash, shipped, source_bytes
-from study_app.protocol.liquid_files import TABLE
+from study_app.protocol.checks.consistency import check
 from study_app.protocol.model import Format, HandForceN, Named, Protocol, SceneDefaults, schema
-from study_app.protocol.places import Places
-from study_app.protocol.problems import Fault, did_you_mean, faults_of
+from study_app.protocol.source.document import entries
+from study_app.protocol.source.files import at_hand, protocol_hash, shipped, source_bytes
+from study_app.protocol.source.line_numbers import Places
+from study_app.protocol.source.liquid_files import TABLE
+from study_app.protocol.source.problems import Fault, did_you_mean, faults_of
 from study_app.protocol.table import Table
 
 __all__ = [

@@ -23,13 +23,13 @@ from pydantic_core import PydanticCustomError
 
 from study_app.haptics.model.ranges import DensityKgM3, DiameterM, DragCoefficient, Metres, within
 from study_app.haptics.model.scene import Accuracy, Body, Estimator, Ewma, Knee, Liquid, MotionBox, Scene, SceneScale
-from study_app.protocol.analysis import Analysis
+from study_app.protocol.analysis_plan import Analysis
 from study_app.protocol.blocks import Block, Compared
-from study_app.protocol.questionnaires import Item, Questionnaire, Scale
+from study_app.protocol.questions.questionnaire import Item, Questionnaire, Scale
 from study_app.protocol.table import Table
-from study_app.protocol.tasks import Explore, Reach, Seconds, Task
 from study_app.protocol.texts import Body as PageBody
 from study_app.protocol.texts import Description, Id, Language, Localised, text_in
+from study_app.protocol.trials.task import Explore, Reach, Seconds, Task
 
 __all__ = [
     "Analysis",

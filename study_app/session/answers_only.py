@@ -14,10 +14,10 @@ from datetime import datetime
 from pathlib import Path
 
 from study_app.errors import SessionError
-from study_app.protocol.answers import Felt, rater
 from study_app.protocol.load import parse, source_bytes
 from study_app.protocol.model import Explore, Protocol, Reach
-from study_app.protocol.schedule import build_schedule, stream
+from study_app.protocol.orders.schedule import build_schedule, stream
+from study_app.protocol.questions.simulated_answers import Felt, rater
 from study_app.session.commands import Command, Finish, ShowPage, StartTrial, Write
 from study_app.session.events import Begin, Chosen, Continue, Event, ItemShown, Submitted, TaskDone
 from study_app.session.feelings import FEELING, Feelings, feelings

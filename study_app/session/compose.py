@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from study_app.protocol.schedule import Trial
-from study_app.protocol.words import Words, words
+from study_app.protocol.orders.schedule import Trial
+from study_app.protocol.wording.languages import Words, words
 from study_app.session.pages import (
     EndPage,
     ItemView,

@@ -24,7 +24,7 @@ from typing import Any, TypeAlias
 
 from study_app.errors import SessionError
 from study_app.protocol.model import Protocol
-from study_app.protocol.schedule import Schedule
+from study_app.protocol.orders.schedule import Schedule
 from study_app.session import moves
 from study_app.session.commands import Command
 from study_app.session.events import (

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any, TypeAlias
 
 from study_app.errors import SessionError
-from study_app.protocol.schedule import Trial
+from study_app.protocol.orders.schedule import Trial
 from study_app.session import compose
 from study_app.session.commands import (
     Command,

@@ -17,7 +17,7 @@ from study_app.haptics.model.limits import refuses
 from study_app.haptics.runtime.clocks.grants import NO_THREAD, Grant
 from study_app.protocol.describe import expected_duration_s
 from study_app.protocol.model import Protocol
-from study_app.protocol.squares import enrolment
+from study_app.protocol.orders.latin_squares import enrolment
 
 if TYPE_CHECKING:
     from study_app.haptics.runtime.telemetry import Timing  # the compiler: whoever measures has loaded it

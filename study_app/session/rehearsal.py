@@ -26,10 +26,10 @@ from study_app.errors import SessionError, StoreError
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.pack import elements_needed
 from study_app.haptics.runtime.servo import Servo
-from study_app.protocol.answers import Felt, rater
 from study_app.protocol.load import parse, source_bytes
 from study_app.protocol.model import Protocol, Reach
-from study_app.protocol.schedule import Schedule, build_schedule, stream
+from study_app.protocol.orders.schedule import Schedule, build_schedule, stream
+from study_app.protocol.questions.simulated_answers import Felt, rater
 from study_app.session.events import Begin, Chosen, Continue, Event, ItemShown, ResumeAsked, Submitted
 from study_app.session.pages import Page, PausePage, QuestionnairePage, TaskPage, TextPage
 from study_app.session.ports import KeptSession, Ports

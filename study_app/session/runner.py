@@ -25,7 +25,7 @@ import numpy as np
 from study_app.errors import SessionError, StoreError, StudyError
 from study_app.haptics.model.layout import BUTTON_STOP
 from study_app.protocol.model import Protocol as Study
-from study_app.protocol.schedule import Schedule
+from study_app.protocol.orders.schedule import Schedule
 from study_app.session import compose
 from study_app.session.commands import (
     CheckFlushed,

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from study_app.devices.hand_orders import HandOrders
-from study_app.protocol.answers import Felt, Rater, rate
 from study_app.protocol.model import Explore, Reach
+from study_app.protocol.questions.simulated_answers import Felt, Rater, rate
 from study_app.session.pages import QuestionnairePage, TextPage
 from study_app.session.strokes import exploration
 from study_app.session.trial import TankView

@@ -9,7 +9,7 @@ from typing import Literal, TypeAlias
 
 from study_app.errors import SessionError
 from study_app.protocol.model import Protocol, Questionnaire
-from study_app.protocol.schedule import PageStep, Schedule, Step, Trial
+from study_app.protocol.orders.schedule import PageStep, Schedule, Step, Trial
 from study_app.session.resume import FIRST, Start
 
 

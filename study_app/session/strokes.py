@@ -12,7 +12,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from study_app.protocol.schedule import shuffle
+from study_app.protocol.orders.schedule import shuffle
 
 Floats: TypeAlias = NDArray[np.float64]
 Draw: TypeAlias = Callable[[], float]

@@ -23,7 +23,7 @@ from typing import Any, Final, Literal, TypeAlias
 
 from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
-from study_app.protocol.schedule import block_codes, draw_key
+from study_app.protocol.orders.schedule import block_codes, draw_key
 from study_app.store import journal, receipt
 from study_app.store.atomic import append_line, create_folder, is_there, read_own
 from study_app.store.events import holds

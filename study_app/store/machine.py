@@ -16,7 +16,7 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from study_app.errors import StoreError
-from study_app.protocol.problems import faults_of
+from study_app.protocol.source.problems import faults_of
 from study_app.store.atomic import cannot_read, cannot_write, write_file
 from study_app.user_folder import FOLDER_VARIABLE, settings_file
 from study_app.workspace import Workspace, setting_of, workspace

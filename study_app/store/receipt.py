@@ -18,7 +18,7 @@ from typing import Any
 import study_app
 from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
-from study_app.protocol.schedule import block_codes
+from study_app.protocol.orders.schedule import block_codes
 from study_app.store.atomic import read_own, study_root, write_file
 from study_app.store.events import holds, shortened
 from study_app.store.journal import plain

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from study_app.errors import StoreError
-from study_app.protocol.reproduce import recorded_trials, reproduce
+from study_app.protocol.orders.reproduce import recorded_trials, reproduce
 from study_app.store import journal, receipt
 from study_app.store.layout import locate
 

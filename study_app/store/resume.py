@@ -13,11 +13,11 @@ from typing import Any
 
 import study_app
 from study_app.errors import StoreError
-from study_app.protocol.diff import CONDITIONS_DIFFER, differences
-from study_app.protocol.liquid_files import bundled, unbundled
+from study_app.protocol.differences import CONDITIONS_DIFFER, differences
 from study_app.protocol.load import protocol_hash
 from study_app.protocol.model import Protocol
-from study_app.protocol.schedule import stream
+from study_app.protocol.orders.schedule import stream
+from study_app.protocol.source.liquid_files import bundled, unbundled
 from study_app.store import journal, receipt
 from study_app.store.atomic import is_there, sweep
 from study_app.store.blinding import Key, open_or_draw_key, read_key, same_conditions

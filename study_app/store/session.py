@@ -10,10 +10,10 @@ from typing import Any
 
 import study_app
 from study_app.errors import StoreError
-from study_app.protocol.liquid_files import unbundled
 from study_app.protocol.load import protocol_hash
 from study_app.protocol.model import Protocol
-from study_app.protocol.schedule import stream
+from study_app.protocol.orders.schedule import stream
+from study_app.protocol.source.liquid_files import unbundled
 from study_app.store import receipt
 from study_app.store.abandoned import sweep_claims, take_over
 from study_app.store.atomic import beside, cannot_write, is_there, sweep_old, sync_folder

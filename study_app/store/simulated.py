@@ -14,9 +14,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from study_app.protocol.liquid_files import unbundled
 from study_app.protocol.model import Protocol
-from study_app.protocol.schedule import stream
+from study_app.protocol.orders.schedule import stream
+from study_app.protocol.source.liquid_files import unbundled
 from study_app.store import tables
 from study_app.store.atomic import cannot_write, create_folder
 from study_app.store.blinding import open_or_draw_key, reveals

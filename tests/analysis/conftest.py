@@ -12,7 +12,7 @@ import pytest
 
 from study_app.protocol.load import load, parse
 from study_app.protocol.model import Protocol
-from study_app.protocol.schedule import Trial, build_schedule
+from study_app.protocol.orders.schedule import Trial, build_schedule
 from study_app.store import blinding, receipt
 from study_app.store.blinding import Key
 from study_app.store.columns import RESPONSES, TRIALS, Column

@@ -29,8 +29,8 @@ from study_app.analysis.validation.studies import (
 )
 from study_app.analysis.validation.study_rates import CLAIMED, LOST, Cell, count, truth
 from study_app.cli import commands
-from study_app.protocol.answers import Felt
 from study_app.protocol.load import load
+from study_app.protocol.questions.simulated_answers import Felt
 
 
 @pytest.fixture(scope="module")

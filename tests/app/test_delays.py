@@ -21,8 +21,8 @@ from study_app.gui.session_parts import Parts
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.load import parse
-from study_app.protocol.schedule import Trial, build_schedule, draw_key, stream
-from study_app.protocol.words import words
+from study_app.protocol.orders.schedule import Trial, build_schedule, draw_key, stream
+from study_app.protocol.wording.languages import words
 from study_app.session.trial import SETTLED_S
 from tests.compiled import needs_servo
 from tests.session.fakes import FakeJournal

@@ -22,7 +22,7 @@ from study_app.gui.theme import LIGHT
 from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
 from study_app.haptics.runtime.telemetry import Timing
 from study_app.protocol.load import load
-from study_app.protocol.tasks import Stroke
+from study_app.protocol.trials.task import Stroke
 from study_app.session.preflight import Facts, Screen
 
 CHOSEN = NewSession("demo", "P001", 1, 7, "AK", "en", "mouse", True, None, Path("nowhere"))

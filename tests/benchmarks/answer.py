@@ -24,8 +24,8 @@ from PySide6.QtWidgets import QApplication
 from study_app.errors import SessionError
 from study_app.gui.participant import ParticipantWindow
 from study_app.protocol.load import load, parse, source_bytes
-from study_app.protocol.schedule import build_schedule
-from study_app.protocol.words import words
+from study_app.protocol.orders.schedule import build_schedule
+from study_app.protocol.wording.languages import words
 from study_app.session.events import Begin, Chosen, Continue, Event, ItemShown, Submitted
 from study_app.session.pages import Page, TaskPage
 from study_app.session.ports import Ports

@@ -21,8 +21,8 @@ from study_app.gui.participant import ParticipantWindow
 from study_app.gui.scene_view import TankWidget
 from study_app.protocol.load import load
 from study_app.protocol.model import Protocol
-from study_app.protocol.tasks import Reach
-from study_app.protocol.words import words
+from study_app.protocol.trials.task import Reach
+from study_app.protocol.wording.languages import words
 from study_app.session.pages import ItemView, Page, PausePage, Progress, QuestionnairePage, TaskPage, TextPage
 from study_app.session.tasks import TaskView
 from study_app.session.trial import TankView

@@ -15,7 +15,7 @@ import numpy as np
 
 from study_app.haptics.model.layout import LIMITER_NAMES, SAMPLE
 from study_app.protocol.load import load, source_bytes
-from study_app.protocol.schedule import build_schedule
+from study_app.protocol.orders.schedule import build_schedule
 from study_app.store.rebuild import rebuild
 from study_app.store.session import SessionStore, begin
 from study_app.store.verify import verify

@@ -26,7 +26,7 @@ from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Ewma, Line, Raw
 from study_app.haptics.runtime.offline import samples_along
 from study_app.protocol.load import load, load_scenes
-from study_app.protocol.tasks import Explore, Reach, Stroke, fastest_stroke
+from study_app.protocol.trials.task import Explore, Reach, Stroke, fastest_stroke
 
 THESIS, PHYSICAL = load_scenes("rek2024"), load_scenes("physical_liquids")
 SHAKE = Stroke(5.0, 0.03)

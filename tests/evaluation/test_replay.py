@@ -18,7 +18,7 @@ from study_app.evaluation.replay import replay
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo
-from study_app.protocol.schedule import build_schedule
+from study_app.protocol.orders.schedule import build_schedule
 from study_app.session.events import Begin, Continue, EndAsked, ForceStopped, PauseAsked, RepeatAsked, ResumeAsked
 from study_app.session.pages import Page, TaskPage
 from study_app.session.ports import Ports

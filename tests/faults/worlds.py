@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from study_app.protocol.schedule import build_schedule
+from study_app.protocol.orders.schedule import build_schedule
 from study_app.session.events import Begin, Chosen, Continue, ItemShown, ResumeAsked, Submitted
 from study_app.session.ports import Ports
 from study_app.session.runner import Runner

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from study_app.protocol.tasks import Explore, Reach
+from study_app.protocol.trials.task import Explore, Reach
 from study_app.session.pages import ItemView, Progress, QuestionnairePage, TaskPage, TextPage
 from study_app.session.tasks import TaskView
 from study_app.session.trial import TankView

@@ -18,7 +18,7 @@ from study_app.gui.participant import ParticipantWindow
 from study_app.gui.plots import Plot
 from study_app.gui.preflight.window import PreflightWindow
 from study_app.gui.sessions.motion import MotionPlot
-from study_app.protocol.words import words
+from study_app.protocol.wording.languages import words
 from tests.gui.small import ManualClock, questionnaire, text_page
 
 

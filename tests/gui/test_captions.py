@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from study_app.gui.tank.captions import Captions
-from study_app.protocol.words import LANGUAGES, words
+from study_app.protocol.wording.languages import LANGUAGES, words
 from tests.gui.small import explore, reach, task_page, view
 
 pytestmark = pytest.mark.usefixtures("qapp")

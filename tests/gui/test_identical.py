@@ -14,8 +14,8 @@ from PySide6.QtWidgets import QApplication
 from study_app.gui.participant import ParticipantWindow
 from study_app.protocol.load import load
 from study_app.protocol.model import Protocol
-from study_app.protocol.schedule import build_schedule, draw_key, stream
-from study_app.protocol.words import words
+from study_app.protocol.orders.schedule import build_schedule, draw_key, stream
+from study_app.protocol.wording.languages import words
 from study_app.session.events import Begin, Chosen, Continue, Submitted, TaskDone
 from study_app.session.pages import Page, QuestionnairePage, TaskPage, TextPage
 from study_app.session.ports import Ports

@@ -21,7 +21,7 @@ from study_app.gui.pages.questionnaire import QuestionnaireWidget
 from study_app.gui.pages.rows import Row
 from study_app.gui.participant import ParticipantWindow
 from study_app.gui.theme import font
-from study_app.protocol.words import Words, words
+from study_app.protocol.wording.languages import Words, words
 from study_app.session.pages import EndPage, Page, PausePage, Progress, QuestionnairePage, TroublePage
 from tests.gui.drawn import Drawn, drawn_by
 from tests.gui.small import STATEMENTS, ManualClock, explore, questionnaire, task_page, text_page, view

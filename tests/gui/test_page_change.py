@@ -17,7 +17,7 @@ from study_app.gui.pages.questionnaire import QuestionnaireWidget
 from study_app.gui.pages.text import TextWidget
 from study_app.gui.participant import ParticipantWindow
 from study_app.gui.tank import backdrop
-from study_app.protocol.words import words
+from study_app.protocol.wording.languages import words
 from study_app.session.events import LanguageChosen
 from study_app.session.pages import EndPage, Page, PausePage, TroublePage
 from tests.gui.small import ManualClock, explore, questionnaire, task_page, text_page, view

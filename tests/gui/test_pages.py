@@ -15,7 +15,7 @@ from study_app.gui.pages.notices import NoticeWidget, PauseWidget
 from study_app.gui.pages.reading import ReadingPage
 from study_app.gui.pages.text import TextWidget
 from study_app.gui.progress import ProgressLine, progress_words
-from study_app.protocol.words import LANGUAGES, words
+from study_app.protocol.wording.languages import LANGUAGES, words
 from study_app.session.events import Continue, ResumeAsked
 from study_app.session.pages import PausePage, Progress, TroublePage
 from tests.gui.small import ManualClock, text_page

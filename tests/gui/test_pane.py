@@ -25,7 +25,7 @@ from PySide6.QtWidgets import QApplication
 from study_app.gui.frames import Frames
 from study_app.gui.graphics import has_card, renderer
 from study_app.gui.scene_view import TankWidget
-from study_app.protocol.words import words
+from study_app.protocol.wording.languages import words
 from tests.gui.small import task_page, view
 from tests.gui.test_scene_view import pixels
 

@@ -17,7 +17,7 @@ from study_app.gui.pages.text import TextWidget
 from study_app.gui.participant import LEAST_SIZE, ParticipantWindow
 from study_app.gui.pointer import NOTCHES, SHARE_OF_SCREEN, PointerCapture
 from study_app.gui.scene_view import TankWidget
-from study_app.protocol.words import words
+from study_app.protocol.wording.languages import words
 from study_app.session.events import Chosen, Continue, ForceStopped, ItemShown, PauseAsked, ResumeAsked, Submitted
 from study_app.session.pages import EndPage, Page, PausePage, TroublePage
 from tests.gui.small import ManualClock, explore, questionnaire, task_page, text_page, view

@@ -15,7 +15,7 @@ from study_app.gui.pages.grid import LEAST_CELL, Asked, grid, holds, parts
 from study_app.gui.pages.questionnaire import QuestionnaireWidget
 from study_app.gui.pages.rows import WRAP_LEFT, Row
 from study_app.gui.theme import font
-from study_app.protocol.words import words
+from study_app.protocol.wording.languages import words
 from study_app.session.events import Chosen, ItemShown, Submitted
 from study_app.session.pages import ItemView, QuestionnairePage
 from tests.gui.small import LABELS, ManualClock, questionnaire

@@ -10,7 +10,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QScroller
 
 from study_app.gui.pages.text import TextWidget
-from study_app.protocol.words import words
+from study_app.protocol.wording.languages import words
 from study_app.session.events import Continue, LanguageChosen
 from study_app.session.pages import TextPage
 from tests.gui.small import text_page

@@ -19,7 +19,7 @@ from study_app.gui.tank.camera import Box, Camera
 from study_app.gui.tank.frame import BallPlacer, changes
 from study_app.gui.tank.onset import OnsetPatch
 from study_app.gui.tank.patch import PATCH
-from study_app.protocol.words import words
+from study_app.protocol.wording.languages import words
 from tests.gui.small import explore, reach, task_page, view
 
 WORKSPACE_M = (0.1, 0.06, 0.06)

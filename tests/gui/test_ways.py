@@ -15,7 +15,7 @@ from study_app.gui.pages import rows as rows_module
 from study_app.gui.pages.questionnaire import QuestionnaireWidget
 from study_app.gui.pages.text import TextWidget
 from study_app.gui.participant import ParticipantWindow
-from study_app.protocol.words import words
+from study_app.protocol.wording.languages import words
 from study_app.session.events import Chosen, Continue, ItemShown, LanguageChosen, ResumeAsked, Submitted
 from study_app.session.pages import PausePage
 from tests.gui.small import STATEMENTS, ManualClock, questionnaire, text_page

@@ -12,7 +12,7 @@ from study_app.errors import ProtocolError
 from study_app.haptics.model.motion import Motion
 from study_app.protocol.felt import LEAST_N, force_n
 from study_app.protocol.load import load, parse, shipped
-from study_app.protocol.tasks import Explore, Stroke, fastest_stroke
+from study_app.protocol.trials.task import Explore, Stroke, fastest_stroke
 from tests.compiled import needs_servo
 from tests.protocol.cases import DECIDED, SOUND
 

@@ -7,10 +7,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from study_app.errors import Problem, ProtocolError
-from study_app.protocol import constrained
 from study_app.protocol.describe import describe
 from study_app.protocol.load import load, load_scene, parse, protocol_hash, shipped, source_bytes
-from study_app.protocol.schedule import build_schedule
+from study_app.protocol.orders import constrained
+from study_app.protocol.orders.schedule import build_schedule
 from tests.protocol.cases import BROKEN, CASES, EVERY_ORDER, ORDER, SOUND, Case
 
 

@@ -12,7 +12,7 @@ import pytest
 from study_app.haptics.model.scene import Body, Ewma, Knee
 from study_app.protocol.load import load
 from study_app.protocol.model import Explore, Reach
-from study_app.protocol.schedule import build_schedule
+from study_app.protocol.orders.schedule import build_schedule
 
 PROTOCOLS = Path(__file__).parents[2] / "protocols"
 NAMES = sorted(path.stem for path in PROTOCOLS.glob("*.toml"))

@@ -8,7 +8,7 @@ import numpy as np
 
 from study_app.haptics.model.layout import SAMPLE
 from study_app.protocol.model import Protocol
-from study_app.protocol.schedule import build_schedule, draw_key, stream
+from study_app.protocol.orders.schedule import build_schedule, draw_key, stream
 from study_app.session.events import Begin, Chosen, Continue, ItemShown, Submitted, TaskDone
 from study_app.session.machine import advance, open_session
 from study_app.session.state import Phase, SessionState

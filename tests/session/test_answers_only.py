@@ -13,8 +13,8 @@ from study_app.analysis.figures import plot
 from study_app.analysis.tables import load_study
 from study_app.cli import commands
 from study_app.errors import StoreError
-from study_app.protocol.answers import Felt
 from study_app.protocol.load import load
+from study_app.protocol.questions.simulated_answers import Felt
 from study_app.session import answers_only
 from study_app.session.answers_only import rehearse_answers
 from study_app.session.feelings import Feelings, feelings

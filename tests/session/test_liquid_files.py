@@ -16,12 +16,12 @@ from study_app.errors import ProtocolError, StoreError
 from study_app.evaluation.replay import replay
 from study_app.gui.choices import resumed
 from study_app.protocol.describe import describe
-from study_app.protocol.feeling import warnings
-from study_app.protocol.liquid_files import unbundled
+from study_app.protocol.liquid_summary import warnings
 from study_app.protocol.load import load, load_scenes, parse, protocol_hash, source_bytes
 from study_app.protocol.model import schema
-from study_app.protocol.orders import block_codes
-from study_app.protocol.schedule import Trial, build_schedule, stream
+from study_app.protocol.orders.block_orders import block_codes
+from study_app.protocol.orders.schedule import Trial, build_schedule, stream
+from study_app.protocol.source.liquid_files import unbundled
 from study_app.session import rehearsal
 from study_app.session.compose import page
 from study_app.session.machine import open_session

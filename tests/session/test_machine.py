@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from study_app.errors import SessionError
 from study_app.protocol.model import Protocol
-from study_app.protocol.schedule import Trial, build_schedule
+from study_app.protocol.orders.schedule import Trial, build_schedule
 from study_app.session.commands import (
     FadeIn,
     Finish,

@@ -12,7 +12,7 @@ from study_app.errors import SessionError
 from study_app.protocol.describe import expected_duration_s
 from study_app.protocol.load import load
 from study_app.protocol.model import Protocol
-from study_app.protocol.schedule import build_schedule, draw_key, stream
+from study_app.protocol.orders.schedule import build_schedule, draw_key, stream
 from study_app.session.commands import ShowPage, Write
 from study_app.session.events import (
     Begin,

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from study_app.errors import SessionError, StoreError
 from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.model import Reach
-from study_app.protocol.schedule import stream
+from study_app.protocol.orders.schedule import stream
 from study_app.session import rehearsal
 from study_app.session.feelings import feelings
 from study_app.session.pages import TextPage

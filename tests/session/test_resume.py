@@ -10,7 +10,7 @@ import pytest
 from study_app.errors import SessionError
 from study_app.protocol.load import protocol_hash, source_bytes
 from study_app.protocol.model import Protocol
-from study_app.protocol.schedule import PageStep, Trial, build_schedule
+from study_app.protocol.orders.schedule import PageStep, Trial, build_schedule
 from study_app.session.commands import FadeIn, ShowPage, StartTrial, Write
 from study_app.session.events import Begin, ResumeAsked
 from study_app.session.machine import advance, open_session

@@ -13,7 +13,7 @@ from study_app.devices.scripted import ScriptedDevice
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.model import Protocol
-from study_app.protocol.schedule import build_schedule, draw_key, stream
+from study_app.protocol.orders.schedule import build_schedule, draw_key, stream
 from study_app.session.events import Begin, Continue, EndAsked, ForceStopped, PauseAsked, RepeatAsked, ResumeAsked
 from study_app.session.pages import PausePage, TaskPage, TroublePage
 from study_app.session.ports import Ports

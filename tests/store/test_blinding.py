@@ -15,7 +15,7 @@ import pytest
 
 from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
-from study_app.protocol.schedule import stream
+from study_app.protocol.orders.schedule import stream
 from study_app.store import blinding
 from study_app.store.blinding import open_or_draw_key, reveal, revealed, revealed_key, reveals, unreadable_reveals
 from study_app.store.session import SessionStore

@@ -9,7 +9,7 @@ import pytest
 
 from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
-from study_app.protocol.schedule import PageStep, build_schedule
+from study_app.protocol.orders.schedule import PageStep, build_schedule
 from study_app.store.progress import Given, Progress, progress, progress_of
 from study_app.store.session import SessionStore
 

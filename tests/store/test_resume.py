@@ -20,7 +20,7 @@ from study_app import __version__
 from study_app.errors import StoreError
 from study_app.protocol.load import load, source_bytes
 from study_app.protocol.model import Protocol
-from study_app.protocol.schedule import Trial, build_schedule
+from study_app.protocol.orders.schedule import Trial, build_schedule
 from study_app.store import journal, receipt
 from study_app.store.opening import is_open
 from study_app.store.rebuild import rebuild

@@ -11,7 +11,7 @@ import pytest
 
 from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
-from study_app.protocol.schedule import build_schedule
+from study_app.protocol.orders.schedule import build_schedule
 from study_app.store import blinding, journal, receipt
 from study_app.store.abandoned import never_begun
 from study_app.store.columns import TABLES

@@ -10,10 +10,10 @@ from typing import Any
 
 import pytest
 
-from study_app.protocol.answers import Felt
 from study_app.protocol.load import load
 from study_app.protocol.model import Protocol
-from study_app.protocol.schedule import build_schedule
+from study_app.protocol.orders.schedule import build_schedule
+from study_app.protocol.questions.simulated_answers import Felt
 from study_app.session.answers_only import rehearse_answers
 from study_app.session.rehearsal import rehearse
 from study_app.store.session import SessionStore, begin

@@ -10,10 +10,10 @@ from study_app.analysis import decided
 from study_app.analysis.decided import Decided
 from study_app.analysis.questions import Item, Kind, spoken, text_in
 from study_app.errors import AnalysisError
-from study_app.protocol.answers import OPINIONS, Felt
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
-from study_app.protocol.questionnaires import POINTS
+from study_app.protocol.questions.questionnaire import POINTS
+from study_app.protocol.questions.simulated_answers import OPINIONS, Felt
 
 Feelings: TypeAlias = Mapping[tuple[str, str], Sequence[Felt]]
 """(Block, condition) → what was felt there in rehearsed trials."""

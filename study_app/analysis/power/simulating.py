@@ -14,7 +14,7 @@ import numpy as np
 
 from study_app.analysis.measures import Array
 from study_app.analysis.power.planned import HIGHEST, LOWEST, Plan, Planned
-from study_app.protocol.answers import Rater, opinions, rater
+from study_app.protocol.questions.simulated_answers import Rater, opinions, rater
 
 UNIFORM = 12
 """The answer model's noise is the sum of so many uniform numbers, less six."""

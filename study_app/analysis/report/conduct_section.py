@@ -13,7 +13,7 @@ from study_app.analysis.report.page import bullets, heading, paragraph, table
 from study_app.analysis.report.words import counted, listed, ms, name, number, settings_noun
 from study_app.analysis.results import BlockFound, Delivered, Results
 from study_app.analysis.tables import Study
-from study_app.protocol.design import Evenness
+from study_app.protocol.orders.balance import Evenness
 from study_app.store.exclusions import named
 
 UNITS: Final = {"s": "s", "m": "m", "mm": "mm", "n": "N", "percent": "%"}

@@ -15,7 +15,7 @@ from study_app.evaluation.identify.parameters import Parameter
 from study_app.evaluation.output import make_folder
 from study_app.haptics.model import motion
 from study_app.haptics.runtime.offline import Table
-from study_app.protocol.scene_text import for_new_file, scene_text
+from study_app.protocol.scene_file import for_new_file, scene_text
 from study_app.store.atomic import write_file
 
 COLUMNS: Final = tuple(f"{kind}_{axis}_n" for kind in ("measured", "fitted", "residual") for axis in "xyz")

@@ -13,7 +13,7 @@ from study_app.gui.sessions.facts import SessionFacts, counted, started_words
 from study_app.protocol.describe import expected_duration_s
 from study_app.protocol.load import at_hand, is_scene_file, load
 from study_app.protocol.model import Protocol
-from study_app.protocol.schedule import PageStep, Schedule, build_schedule
+from study_app.protocol.orders.schedule import PageStep, Schedule, build_schedule
 from study_app.session.resume import find_protocol, is_rehearsal, resume_at, source_to_resume
 from study_app.store import journal, receipt
 from study_app.store.layout import locate

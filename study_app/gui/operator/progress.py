@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, TypeAlias
 
 from study_app.protocol.model import Protocol
-from study_app.protocol.schedule import PageStep, Schedule, Trial
+from study_app.protocol.orders.schedule import PageStep, Schedule, Trial
 from study_app.store.columns import SEALED
 from study_app.store.tables import beyond_limits
 

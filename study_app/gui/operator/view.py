@@ -13,7 +13,7 @@ from study_app.gui.operator.forces import ForceFigures
 from study_app.gui.operator.health import Vitals
 from study_app.gui.operator.progress import NoteLine, SessionProgress, Stage, operator_language
 from study_app.protocol.model import Explore, Protocol, Reach
-from study_app.protocol.schedule import Trial
+from study_app.protocol.orders.schedule import Trial
 
 State = Literal["preparing", "running", "paused", "force off", "trouble", "ended"]
 Verdict = Literal["ok", "late", "open"]

@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QWidget
 from study_app.gui.theme import PARTICIPANT
 
 if TYPE_CHECKING:
-    from study_app.protocol.words import Words
+    from study_app.protocol.wording.languages import Words
 
 DESIGNED_FOR = (1366.0, 768.0)
 MOST_SCALE = 2.4

@@ -10,7 +10,7 @@ from study_app.gui.icons import draw_icon
 from study_app.gui.keys import KEYBOARD
 from study_app.gui.pages.base import page_painter
 from study_app.gui.theme import PARTICIPANT, RADIUS_CONTROL, font
-from study_app.protocol.words import words
+from study_app.protocol.wording.languages import words
 
 CENTRE = int(Qt.AlignmentFlag.AlignCenter)
 LEAST_HEIGHT = 44

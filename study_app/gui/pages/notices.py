@@ -16,7 +16,7 @@ from study_app.session.events import ResumeAsked
 from study_app.session.pages import EndPage, PausePage, TroublePage
 
 if TYPE_CHECKING:
-    from study_app.protocol.words import Words
+    from study_app.protocol.wording.languages import Words
 
 VEIL = 0.80  # how much of the page under a pause is hidden
 

@@ -22,7 +22,7 @@ from study_app.session.events import Chosen, ItemShown, Submitted
 from study_app.session.pages import QuestionnairePage
 
 if TYPE_CHECKING:
-    from study_app.protocol.words import Words
+    from study_app.protocol.wording.languages import Words
 
 LEFT = int(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
 CENTRE = int(Qt.AlignmentFlag.AlignCenter)

@@ -18,7 +18,7 @@ from study_app.gui.progress import ProgressLine
 from study_app.gui.theme import PARTICIPANT, font
 
 if TYPE_CHECKING:
-    from study_app.protocol.words import Words
+    from study_app.protocol.wording.languages import Words
 
 COLUMN = 700.0  # a line that reads well [logical px at scale 1]
 LINE_PERCENT = 140

@@ -18,7 +18,7 @@ from study_app.gui.theme import PARTICIPANT, font
 from study_app.session.pages import ItemView
 
 if TYPE_CHECKING:
-    from study_app.protocol.words import Words
+    from study_app.protocol.wording.languages import Words
 
 LINE = int(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
 SHRINKING = (1.0, 0.94, 0.88, 0.82, 0.76)  # of words that are larger than they must be, in a window that is too small

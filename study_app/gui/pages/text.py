@@ -19,7 +19,7 @@ from study_app.session.events import Continue, EndAsked, LanguageChosen
 from study_app.session.pages import TextPage
 
 if TYPE_CHECKING:
-    from study_app.protocol.words import Words
+    from study_app.protocol.wording.languages import Words
 
 ICONS = {"consent": "pen", "instructions": "drop", "break": "clock", "debrief": "check"}
 TICK_MS = 200

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from study_app.gui.operator.progress import SessionProgress, operator_language, progress_after
 from study_app.protocol.describe import expected_duration_s
 from study_app.protocol.model import Protocol
-from study_app.protocol.schedule import Schedule, Trial
+from study_app.protocol.orders.schedule import Schedule, Trial
 from study_app.session.preflight import Check, Facts
 from study_app.session.resume import resume_at
 from study_app.store.journal import Line

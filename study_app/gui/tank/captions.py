@@ -17,7 +17,7 @@ from study_app.protocol.model import Explore, Reach
 from study_app.session.pages import TaskPage
 
 if TYPE_CHECKING:
-    from study_app.protocol.words import Words
+    from study_app.protocol.wording.languages import Words
 
 DESIGNED_FOR = (1920, 1080)
 LEAST_SCALE = 0.72

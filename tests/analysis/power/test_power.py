@@ -30,8 +30,8 @@ from study_app.analysis.power.writing import write
 from study_app.analysis.statistics.trend import step_down
 from study_app.cli import commands
 from study_app.errors import AnalysisError
-from study_app.protocol.answers import Felt
 from study_app.protocol.load import load, parse
+from study_app.protocol.questions.simulated_answers import Felt
 from study_app.store.cells import problems
 from tests.analysis.conftest import SMALL
 

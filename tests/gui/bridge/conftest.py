@@ -17,8 +17,8 @@ from study_app.gui.operator.watch import WatchedJournal
 from study_app.gui.participant import ParticipantWindow
 from study_app.gui.session_parts import Parts
 from study_app.protocol.load import load
-from study_app.protocol.schedule import build_schedule, draw_key, stream
-from study_app.protocol.words import words
+from study_app.protocol.orders.schedule import build_schedule, draw_key, stream
+from study_app.protocol.wording.languages import words
 from tests.gui.bridge.world import World
 
 

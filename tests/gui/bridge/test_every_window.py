@@ -17,7 +17,7 @@ from study_app.gui.bridge import SessionBridge
 from study_app.gui.operator.progress import SessionProgress
 from study_app.gui.operator.watch import WatchedJournal
 from study_app.protocol.load import load
-from study_app.protocol.schedule import build_schedule
+from study_app.protocol.orders.schedule import build_schedule
 from study_app.session.events import Continue
 from study_app.session.pages import PausePage, TaskPage
 from tests.compiled import needs_servo

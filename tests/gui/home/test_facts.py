@@ -16,7 +16,7 @@ from study_app.gui.home.facts import (
 )
 from study_app.gui.sessions.facts import sessions, started_words
 from study_app.protocol.load import load, source_bytes
-from study_app.protocol.schedule import PageStep, build_schedule
+from study_app.protocol.orders.schedule import PageStep, build_schedule
 from study_app.session.resume import REHEARSED_SCREENS
 from study_app.store.exclusions import exclude
 from study_app.store.opening import open_alone

@@ -14,7 +14,7 @@ from study_app.gui.operator.view import OperatorView, Session, operator_view
 from study_app.haptics.model.layout import SAMPLE, records
 from study_app.protocol.load import load
 from study_app.protocol.model import Protocol
-from study_app.protocol.schedule import Schedule, build_schedule
+from study_app.protocol.orders.schedule import Schedule, build_schedule
 
 
 @dataclass

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from study_app.gui.operator.progress import SessionProgress, progress_after, stages
 from study_app.protocol.load import load
-from study_app.protocol.schedule import build_schedule
+from study_app.protocol.orders.schedule import build_schedule
 from study_app.store.tables import within_limits
 
 

@@ -17,7 +17,7 @@ from study_app.gui.theme import DARK
 from study_app.haptics.runtime.clocks.grants import Grant
 from study_app.haptics.runtime.telemetry import Timing
 from study_app.protocol.load import load
-from study_app.protocol.schedule import build_schedule
+from study_app.protocol.orders.schedule import build_schedule
 from study_app.session.preflight import Facts, Screen, checks
 
 NOW = datetime(2026, 3, 2, 14, 20)

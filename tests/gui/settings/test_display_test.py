@@ -13,7 +13,7 @@ from study_app.gui.settings.display_test import FIRST_MS, DisplayTest, figures_w
 from study_app.gui.settings.offset import offset_words
 from study_app.gui.settings.patterns import GREYS, GreyRamp, LineField, lines, steps
 from study_app.gui.tank.patch import PATCH
-from study_app.protocol.words import words
+from study_app.protocol.wording.languages import words
 from study_app.store.machine import DisplayOffset
 from tests.gui.small import task_page
 

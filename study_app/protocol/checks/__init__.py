@@ -1,0 +1,1 @@
+"""Checks of a protocol: cross-references and consistency."""

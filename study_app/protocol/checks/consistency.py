@@ -1,0 +1,227 @@
+"""What only sound tables together can show: targets inside the tank, liquids that are felt and differ, codes in order.
+
+The checks work on a :class:`Draft` of every entry that is sound by itself, so that one broken table does not hide what
+is wrong between the others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict
+
+from study_app.haptics.model.scene import MAX_LIQUIDS, Scene
+from study_app.protocol.analysis_plan import decisions
+from study_app.protocol.checks.cross_references import alike, items, languages, references, repeats, sequence
+from study_app.protocol.felt import LEAST_N, force_n, numbers, within_tank
+from study_app.protocol.model import (
+    Block,
+    Condition,
+    DeviceNeeds,
+    Named,
+    PageText,
+    Reach,
+    SceneDefaults,
+    StudyLiquid,
+    compared,
+    scene_with,
+)
+from study_app.protocol.source.document import Path, names
+from study_app.protocol.source.problems import Fault
+from study_app.protocol.trials.task import Task, fastest_stroke
+
+_TABLES = ("liquids", "conditions", "tasks", "pages", "blocks")
+
+
+class Draft(BaseModel):
+    """The sound entries of a document; ``whole`` says that no block had to be left out."""
+
+    model_config = ConfigDict(frozen=True, extra="ignore")
+
+    device: DeviceNeeds | None = None
+    scene: SceneDefaults | None = None
+    liquids: Named[StudyLiquid] = {}
+    conditions: dict[str, Condition] = {}
+    tasks: dict[str, Task] = {}
+    pages: dict[str, PageText] = {}
+    blocks: Named[Block] = {}
+    sequence: tuple[str, ...] = ()
+    whole: bool = True
+
+    def scene_of(self, condition: Condition) -> Scene | None:
+        """Return what is felt in a condition, if all of it is sound."""
+        liquids = [self.liquids[name] for name in condition.liquid_ids if name in self.liquids]
+        if (
+            self.device is None
+            or self.scene is None
+            or not 0 < len(liquids) == len(set(condition.liquid_ids)) <= MAX_LIQUIDS
+        ):
+            return None
+        return scene_with(self.scene, self.device, liquids)
+
+
+def draft(document: Mapping[str, Any], broken: Iterable[Path]) -> Draft:
+    """Return what of ``document`` is sound; ``broken`` are the paths of the problems already found."""
+    sound = {key: dict(value) if isinstance(value, Mapping) else value for key, value in document.items()}
+    for path in filter(None, broken):
+        section = str(path[0])
+        if section in _TABLES and len(path) > 1:
+            sound.get(section, {}).pop(path[1], None)
+        else:
+            sound.pop(section, None)
+    sound.setdefault("scene", None if "scene" in document else {})
+    whole = len(names(document, "blocks")) == len(names(sound, "blocks"))
+    return Draft.model_validate({**sound, "whole": whole}, strict=True)
+
+
+def check(document: Mapping[str, Any], broken: Iterable[Path]) -> Iterator[Fault]:
+    """Yield every problem between the tables of ``document``, whose ``broken`` places are known already."""
+    for of_names in (references, sequence, repeats, items, alike, languages, decisions):
+        yield from of_names(document)
+    parts = draft(document, broken)
+    for of_tables in (balls, targets, crowded, outside, unfelt, equal_liquids, equal_conditions):
+        yield from of_tables(parts)
+    for of_tables in (codes, compares, breaks, counted_parts):
+        yield from of_tables(parts)
+
+
+def balls(parts: Draft) -> Iterator[Fault]:
+    """Check that the liquids of a condition have one ball: it is one body that moves through all of them."""
+    if parts.scene is None:
+        return
+    for name, condition in parts.conditions.items():
+        liquids = [parts.liquids[liquid] for liquid in condition.liquid_ids if liquid in parts.liquids]
+        if len({liquid.body_in(parts.scene) for liquid in liquids}) > 1:
+            message = "its liquids have different balls, and one ball moves through all of them"
+            yield Fault(("conditions", name, "liquids"), message, "give them the same body")
+
+
+def targets(parts: Draft) -> Iterator[Fault]:
+    """Check that every target lies inside the tank with its whole radius."""
+    if parts.device is None:
+        return
+    half = tuple(size / 2 for size in parts.device.workspace_mm)
+    for name, task in parts.tasks.items():
+        if not isinstance(task, Reach):
+            continue
+        for index, target in enumerate(task.targets_mm):
+            for axis, place, room in zip("xyz", target, half, strict=True):
+                if abs(place) + task.radius_mm > room:
+                    yield Fault(
+                        ("tasks", name, "targets_mm", index),
+                        f"{axis} = {place:g} mm with radius {task.radius_mm:g} mm leaves the tank",
+                        f"device.workspace_mm reaches to {room:g} mm on either side",
+                    )
+
+
+def crowded(parts: Draft) -> Iterator[Fault]:
+    """Check that no condition has more liquids than a scene holds."""
+    for name, condition in parts.conditions.items():
+        if len(condition.liquids) > MAX_LIQUIDS:
+            yield Fault(
+                ("conditions", name, "liquids"), f"has more than {MAX_LIQUIDS} liquids", "a scene holds no more"
+            )
+
+
+def outside(parts: Draft) -> Iterator[Fault]:
+    """Check that the ball meets every liquid of a condition somewhere in the tank."""
+    if parts.device is None or parts.scene is None:
+        return
+    for name, condition in parts.conditions.items():
+        for liquid in condition.liquid_ids:
+            if liquid in parts.liquids and not within_tank(parts.liquids[liquid], parts.scene, parts.device):
+                message = f'the region of "{liquid}" lies outside the tank, where no hand meets it'
+                yield Fault(("conditions", name), message, "move or enlarge the region, or scene.origin_m")
+
+
+def unfelt(parts: Draft) -> Iterator[Fault]:
+    """Check that every condition exerts a force in the fastest stroke of its block's task."""
+    for name, block in parts.blocks.items():
+        task = parts.tasks.get(block.task)
+        if task is None or parts.device is None:
+            continue
+        stroke = fastest_stroke(task, parts.device.workspace_m)
+        for index, condition in enumerate(block.conditions):
+            scene = parts.scene_of(parts.conditions[condition]) if condition in parts.conditions else None
+            if scene is not None and (exerted_n := force_n(scene, stroke)) < LEAST_N:
+                yield Fault(
+                    ("blocks", name, "conditions", index),
+                    f'"{condition}" exerts {exerted_n:.2g} N in the fastest stroke of task "{block.task}" '
+                    f"({stroke.speed_mps:.2g} m/s), less than {LEAST_N:g} N: nothing is felt",
+                    "call for effects such as drag, or raise density, scale or the ball's diameter",
+                )
+
+
+def equal_liquids(parts: Draft) -> Iterator[Fault]:
+    """Check that no two liquids have the same numbers."""
+    first: dict[str, str] = {}
+    for name, liquid in parts.liquids.items():
+        if (earlier := first.setdefault(repr(numbers(liquid)), name)) != name:
+            yield Fault(("liquids", name), f'has the same numbers as "{earlier}"', "change it, or use that one twice")
+
+
+def equal_conditions(parts: Draft) -> Iterator[Fault]:
+    """Check that the conditions of a block differ, unless the block says that some are replicates."""
+    for name, block in parts.blocks.items():
+        presented = {one: parts.conditions[one] for one in block.conditions if one in parts.conditions}
+        delays = compared(list(presented.values())) == "delays"  # which the analysis pools
+        first: dict[tuple[tuple[str, ...], float], str] = {}
+        for index, condition in enumerate(() if delays and block.replicates else block.conditions):
+            if (one := presented.get(condition)) is None:
+                continue
+            earlier = first.setdefault((one.liquid_ids, one.delay_ms), condition)
+            if earlier != condition:
+                message = f'"{condition}" presents the same as "{earlier}"'
+                hint = "change it, or use repetitions" + (", or write replicates = true" if delays else "")
+                yield Fault(("blocks", name, "conditions", index), message, hint)
+
+
+def codes(parts: Draft) -> Iterator[Fault]:
+    """Check that the codes of different blocks differ."""
+    owners: dict[str, str] = {}
+    for name, block in parts.blocks.items():
+        if block.code_prefix is not None and owners.setdefault(block.code_prefix, name) != name:
+            message = f'block "{owners[block.code_prefix]}" has the prefix "{block.code_prefix}" too'
+            yield Fault(("blocks", name, "code_prefix"), message, "choose another letter")
+
+
+def compares(parts: Draft) -> Iterator[Fault]:
+    """Check that the conditions of a main block differ in one thing, which is what the block says that it compares."""
+    for name, block in parts.blocks.items():
+        presented = [parts.conditions[one] for one in block.conditions if one in parts.conditions]
+        if block.phase != "main" or len(presented) < len(block.conditions):
+            continue
+        liquids, delays = len({one.liquid_ids for one in presented}), len({one.delay_ms for one in presented})
+        if liquids > 1 and delays > 1:
+            message = "its conditions differ in liquid and in delay, whose effects the analysis cannot tell apart"
+            yield Fault(("blocks", name, "conditions"), message, "vary one of them, or use a block for each")
+        elif block.compares is not None and {"liquids": delays, "delays": liquids}[block.compares] > 1:
+            message = f'is "{block.compares}", and its conditions differ in {compared(presented)}'
+            yield Fault(("blocks", name, "compares"), message, "correct it, or leave it out")
+
+
+def breaks(parts: Draft) -> Iterator[Fault]:
+    """Check that a break is a page of that kind."""
+    for name, block in parts.blocks.items():
+        page = parts.pages.get(block.break_page or "")
+        if page is not None and page.kind != "break":
+            message = f'page "{block.break_page}" is of kind "{page.kind}"'
+            yield Fault(("blocks", name, "break_page"), message, 'a break needs a page with kind = "break"')
+
+
+def counted_parts(parts: Draft) -> Iterator[Fault]:
+    """Check that parts count 1, 2, … in the order of the sequence, and that something is analysed."""
+    if not (parts.whole and parts.blocks):
+        return
+    if all(block.phase != "main" for block in parts.blocks.values()):
+        yield Fault(("blocks",), "there is no main block", 'one needs phase = "main"')
+    latest = 0
+    for name in dict.fromkeys(parts.sequence):
+        part = parts.blocks[name].part if name in parts.blocks else None
+        if part is None:
+            continue
+        if part not in {latest, latest + 1}:
+            expected = f"{latest} or {latest + 1}" if latest else "1"
+            yield Fault(("blocks", name, "part"), f"is {part}, must be {expected} at its place in sequence")
+        latest = max(latest, part)

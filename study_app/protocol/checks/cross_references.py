@@ -1,0 +1,160 @@
+"""Names that must fit together: references to tables, the sequence, lists without repeats, items, languages.
+
+These checks read the document itself, so that they also see the sound keys of tables that are broken elsewhere.
+"""
+
+from __future__ import annotations
+
+import unicodedata
+from collections.abc import Collection, Iterator, Mapping
+from typing import Any
+
+from study_app.protocol.source.document import Path, entries, names
+from study_app.protocol.source.problems import Fault, did_you_mean
+from study_app.protocol.wording.languages import LANGUAGES
+
+REFERENCES = {
+    "conditions.*.liquid": "liquids",
+    "conditions.*.liquids.*": "liquids",
+    "questionnaires.*.scale": "scales",
+    "blocks.*.conditions.*": "conditions",
+    "blocks.*.task": "tasks",
+    "blocks.*.questionnaire": "questionnaires",
+    "blocks.*.break_page": "pages",
+}
+
+TEXTS = (
+    "study.title",
+    "tasks.*.instruction",
+    "scales.*.labels",
+    "scales.*.cannot_judge",
+    "questionnaires.*.title",
+    "questionnaires.*.intro",
+    "questionnaires.*.items.*.text",
+    "questionnaires.*.items.*.short",
+    "pages.*.title",
+    "pages.*.body",
+    "pages.*.button",
+    "blocks.*.title",
+    "blocks.*.setting_label",
+)
+
+WITHOUT_REPEATS = ("study.languages", "conditions.*.liquids", "blocks.*.conditions")
+
+Document = Mapping[str, Any]
+
+
+def _unknown(path: Path, name: Any, kind: str, known: Collection[str]) -> Iterator[Fault]:
+    if isinstance(name, str) and name not in known:
+        yield Fault(path, f'there is no {kind} "{name}"', did_you_mean(name, known))
+
+
+def references(document: Document) -> Iterator[Fault]:
+    """Check that every name that stands for a table names one."""
+    for pattern, section in REFERENCES.items():
+        known = names(document, section)
+        for path, name in entries(document, pattern):
+            yield from _unknown(path, name, section.removesuffix("s"), known)
+
+
+def sequence(document: Document) -> Iterator[Fault]:
+    """Check that the sequence names pages and blocks, each block once, and leaves none out but pages of breaks."""
+    pages, blocks = names(document, "pages"), names(document, "blocks")
+    for name in pages:
+        if name in blocks:
+            yield Fault(("blocks", name), "a page has this name too", "sequence could not tell them apart")
+    steps = list(entries(document, "sequence.*"))
+    if not steps:
+        return
+    seen: set[str] = set()
+    for path, name in steps:
+        yield from _unknown(path, name, "page or block", {*pages, *blocks})
+        if name in blocks and name in seen:
+            yield Fault(path, f'block "{name}" comes twice', "give the block repetitions")
+        seen.add(str(name))
+    breaks = [page for _, page in entries(document, "blocks.*.break_page")]
+    for section, tables in (("pages", pages), ("blocks", blocks)):
+        for name in tables:
+            if name not in seen and not (section == "pages" and name in breaks):
+                yield Fault((section, name), "comes nowhere in sequence", "add it there, or take it out")
+
+
+def repeats(document: Document) -> Iterator[Fault]:
+    """Check that no list names a thing twice."""
+    for pattern in WITHOUT_REPEATS:
+        for path, listed in entries(document, pattern):
+            if isinstance(listed, tuple):
+                for index, entry in enumerate(listed):
+                    if entry in listed[:index]:
+                        yield Fault((*path, index), f'"{entry}" is there twice')
+
+
+def items(document: Document) -> Iterator[Fault]:
+    """Check that an item's id is its own, and the same statement wherever two questionnaires share one."""
+    statements: dict[str, Any] = {}
+    seen: set[tuple[Any, str]] = set()
+    for path, item in entries(document, "questionnaires.*.items.*"):
+        name = item.get("id") if isinstance(item, Mapping) else None
+        if not isinstance(name, str):
+            continue
+        if (path[1], name) in seen:
+            yield Fault((*path, "id"), f'a second item "{name}" in this questionnaire', "every item needs its own id")
+        elif statements.setdefault(name, item.get("text")) != item.get("text"):
+            message = f'item "{name}" has another text in another questionnaire'
+            yield Fault((*path, "id"), message, "give it another id")
+        seen.add((path[1], name))
+
+
+def alike(document: Document) -> Iterator[Fault]:
+    """Check that statements of a questionnaire, their short names and the points of a scale differ."""
+    for name in names(document, "questionnaires"):
+        for key in ("text", "short"):
+            yield from _alike(list(entries(document, f"questionnaires.{name}.items.*.{key}")), "item")
+    for path, labels in entries(document, "scales.*.labels.*"):
+        points = [((*path, index), label) for index, label in enumerate(labels if isinstance(labels, tuple) else ())]
+        for _, off in entries(document, f"scales.{path[1]}.cannot_judge"):
+            points.append(((*path[:2], "cannot_judge"), off.get(path[-1]) if isinstance(off, Mapping) else off))
+        yield from _alike(points, "label")
+
+
+def _alike(found: list[tuple[Path, Any]], kind: str) -> Iterator[Fault]:
+    """Yield a fault for every text that reads as an earlier one does; an entry may hold a text per language."""
+    seen: set[tuple[str, str]] = set()
+    for path, entry in found:
+        texts = entry if isinstance(entry, Mapping) else {"": entry}
+        read = {(language, _read(text)) for language, text in texts.items() if isinstance(text, str)}
+        if read & seen:
+            yield Fault(path, f"reads as an earlier {kind} does", "people could not tell the two apart: change one")
+        seen |= read
+
+
+def _read(text: str) -> str:
+    """Return a text as people tell texts apart: not by case, width or white space."""
+    return " ".join(unicodedata.normalize("NFKC", text).casefold().split())
+
+
+def languages(document: Document) -> Iterator[Fault]:
+    """Check that every text exists in every language of the study and in no other."""
+    wanted = tuple(name for _, name in entries(document, "study.languages.*") if isinstance(name, str))
+    for path, name in entries(document, "study.languages.*"):
+        if isinstance(name, str) and name not in LANGUAGES:
+            hint = f"known: {', '.join(LANGUAGES)}"
+            yield Fault(path, f'the program has no words in "{name}"', hint)
+    if not wanted:
+        return
+    for pattern in TEXTS:
+        for path, text in entries(document, pattern):
+            yield from _translations(path, text, wanted)
+
+
+def _translations(path: Path, text: Any, wanted: tuple[str, ...]) -> Iterator[Fault]:
+    if isinstance(text, str) and len(wanted) > 1:
+        listed = ", ".join(f'{language} = "…"' for language in wanted)
+        yield Fault(path, "is in one language, the study in several", f"write {{ {listed} }}")
+    elif isinstance(text, Mapping):
+        for language in wanted:
+            if language not in text:
+                yield Fault(path, f'is missing in "{language}"', "every text exists in every language of the study")
+        for language in text:
+            if language not in wanted:
+                yield Fault((*path, language), "is not a language of the study", f"these are: {', '.join(wanted)}")

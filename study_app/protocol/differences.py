@@ -1,0 +1,104 @@
+"""How one protocol differs from another, for a session that is to go on under a changed file.
+
+What blinding hides is compared and never shown: of the conditions, the liquids and the blocks' lists of conditions it
+is said only that they differ.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from study_app.protocol.model import Protocol
+from study_app.protocol.orders.block_orders import block_codes
+from study_app.protocol.source.problems import shown
+
+CONDITIONS_DIFFER = "conditions differ"
+
+_HIDDEN = ("conditions", "liquids")
+
+
+def differences(old: Protocol | Mapping[str, Any], new: Protocol | Mapping[str, Any]) -> tuple[str, ...]:
+    """Return a sentence for each place where two protocols differ; nothing if they are alike.
+
+    A mapping is a protocol as a receipt holds it: JSON values, without conditions, blocks with their codes. Conditions
+    are compared as far as both sides have them: add ``conditions`` and ``liquids`` from the opened key, or compare
+    hashes.
+    """
+    before, after = _tables(old), _tables(new)
+    _drop_unknown_comparisons(before, after)
+    hidden = [_take_hidden(tables) for tables in (before, after)]
+    found = list(_differences("", before, after))
+    if any(hidden[0][place] != hidden[1][place] for place in hidden[0].keys() & hidden[1].keys()):
+        found.append(CONDITIONS_DIFFER)
+    return tuple(found)
+
+
+def _tables(protocol: Protocol | Mapping[str, Any]) -> dict[str, Any]:
+    """Return the tables as JSON values in dictionaries of our own, blocks with their codes."""
+    if isinstance(protocol, Protocol):
+        tables = protocol.model_dump(mode="json")
+        for name, block in protocol.blocks.items():
+            tables["blocks"][name]["codes"] = list(block_codes(block))
+            tables["blocks"][name]["compares"] = protocol.compared_in(name)
+        return tables
+    blocks = {name: dict(block) for name, block in protocol.get("blocks", {}).items()}
+    return {**protocol, "blocks": blocks}
+
+
+def _drop_unknown_comparisons(before: dict[str, Any], after: dict[str, Any]) -> None:
+    """Take out what a block compares where one side, a receipt of an earlier version, does not say it."""
+    for name in before["blocks"].keys() & after["blocks"].keys():
+        sides = before["blocks"][name], after["blocks"][name]
+        if not all("compares" in block for block in sides):
+            for block in sides:
+                block.pop("compares", None)
+
+
+def _take_hidden(tables: dict[str, Any]) -> dict[str, Any]:
+    """Take out what blinding hides, and return it by its place."""
+    hidden = {name: tables.pop(name) for name in _HIDDEN if name in tables}
+    for name, block in tables["blocks"].items():
+        if "conditions" in block:
+            hidden[f"blocks.{name}"] = block.pop("conditions")
+    return hidden
+
+
+def _differences(place: str, old: Any, new: Any) -> Iterator[str]:
+    """Yield the differences below a place; a key that is None is as good as missing."""
+    if _by_id(old) and _by_id(new):
+        yield from _listed(place, old, new)
+    elif isinstance(old, Mapping) and isinstance(new, Mapping):
+        for key in dict.fromkeys((*old, *new)):
+            yield from _differences(f"{place}.{key}".lstrip("."), old.get(key), new.get(key))
+    elif isinstance(old, list) and isinstance(new, list):
+        yield from _entries(place, old, new)
+    elif old is None and new is not None:
+        yield f"{place}: new, {shown(new)}"
+    elif new is None and old is not None:
+        yield f"{place}: gone, it was {shown(old)}"
+    elif old != new:
+        before, after = shown(old), shown(new)
+        yield f"{place}: {before} before, {after} now" if before != after else f"{place}: another text or number"
+
+
+def _by_id(value: Any) -> bool:
+    """Whether it is a list of tables with ids."""
+    return isinstance(value, list) and all(isinstance(entry, Mapping) and "id" in entry for entry in value)
+
+
+def _listed(place: str, old: Sequence[Mapping[str, Any]], new: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    """Compare tables with ids by their ids, and then the order of those that stayed."""
+    before, after = ({entry["id"]: entry for entry in entries} for entries in (old, new))
+    yield from _differences(place, before, after)
+    stayed = before.keys() & after.keys()
+    if [name for name in before if name in stayed] != [name for name in after if name in stayed]:
+        yield f"{place}: in another order"
+
+
+def _entries(place: str, old: Sequence[Any], new: Sequence[Any]) -> Iterator[str]:
+    if len(old) == len(new):
+        for number, (before, after) in enumerate(zip(old, new, strict=True), start=1):
+            yield from _differences(f"{place}.{number}", before, after)
+    else:
+        yield f"{place}: {len(old)} entries before, {len(new)} now"

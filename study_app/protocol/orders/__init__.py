@@ -1,0 +1,1 @@
+"""Orders of conditions and trials, and the schedule."""

@@ -1,0 +1,258 @@
+"""How even the orders of many participants are, before anyone is invited: positions and first-order carry-over.
+
+``liquid-study design`` prints it.
+
+Counted are codes: which condition a code stands for is drawn once per study, and evenness does not depend on it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import count, pairwise
+from typing import Literal, TypeAlias
+
+from study_app.errors import StudyError
+from study_app.protocol.blocks import Order
+from study_app.protocol.model import Protocol
+from study_app.protocol.orders.block_orders import BlockOrder, orders_of
+from study_app.protocol.orders.constrained import longest_run, shortest_distance
+from study_app.protocol.orders.latin_squares import borders_even, enrolment, row_count
+from study_app.protocol.orders.schedule import codes_of
+
+Table: TypeAlias = tuple[tuple[int, ...], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Evenness:
+    """Orders of one set of codes, counted.
+
+    Attributes
+    ----------
+    positions
+        How often each code (column) came in each position (row).
+    follows
+        How often each code (column) came right after each code (row), breaks and borders of repetitions not minded.
+    longest_run, shortest_distance
+        The most of a kind in a row, and the fewest trials from one to the next of its kind (None: each came once).
+    """
+
+    codes: tuple[str, ...]
+    orders: int
+    positions: Table
+    follows: Table
+    longest_run: int
+    shortest_distance: int | None
+
+    @property
+    def positions_even(self) -> bool:
+        """Whether each code came in each position equally often."""
+        return _even(count for line in self.positions for count in line)
+
+    @property
+    def follows_even(self) -> bool:
+        """Whether each code followed each other one equally often."""
+        return _even(self.after_another)
+
+    @property
+    def balanced(self) -> bool:
+        """Whether both are so."""
+        return self.positions_even and self.follows_even
+
+    @property
+    def after_another(self) -> tuple[int, ...]:
+        """How often each code followed each other one."""
+        return tuple(
+            count for first, line in enumerate(self.follows) for then, count in enumerate(line) if first != then
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class BlockBalance:
+    """A block's evenness, with what its order depends on; ``unnumbered`` are participants whose id has no number."""
+
+    id: str
+    title: str
+    order: Order
+    repetitions: int
+    evenness: Evenness
+    unnumbered: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Balance:
+    """The blocks with more than one code, in the order of the session."""
+
+    study: str
+    participants: int
+    seed: int
+    blocks: tuple[BlockBalance, ...]
+
+    @property
+    def balanced(self) -> bool:
+        """Whether every block is even in position and carry-over."""
+        return all(block.evenness.balanced for block in self.blocks)
+
+
+def numbered(count: int) -> tuple[str, ...]:
+    """Return the ids that a study suggests from its first participant on: P001, P002 and so on."""
+    return tuple(f"P{number:03d}" for number in range(1, count + 1))
+
+
+def evenness(codes: Sequence[str], orders: Iterable[Sequence[str]]) -> Evenness:
+    """Count ``orders`` of ``codes``, planned or as they were run; all of one length."""
+    place = {code: index for index, code in enumerate(codes)}
+    shown = [[place[code] for code in order] for order in orders]
+    positions = [[0] * len(place) for _ in range(max(map(len, shown), default=0))]
+    follows = [[0] * len(place) for _ in place]
+    for order in shown:
+        for position, code in enumerate(order):
+            positions[position][code] += 1
+        for first, then in pairwise(order):
+            follows[first][then] += 1
+    return Evenness(
+        codes=tuple(codes),
+        orders=len(shown),
+        positions=tuple(map(tuple, positions)),
+        follows=tuple(map(tuple, follows)),
+        longest_run=max(map(longest_run, shown), default=0),
+        shortest_distance=min((near for near in map(shortest_distance, shown) if near is not None), default=None),
+    )
+
+
+def balance(protocol: Protocol, participants: Sequence[str], seed: int) -> Balance:
+    """Return how even the orders of ``participants`` (ids) would be, all of them under ``seed``.
+
+    In a study each session has a seed of its own; to orders dealt from a square the seed makes no difference.
+
+    Raises
+    ------
+    StudyError
+        There are no participants.
+    """
+    if not participants:
+        raise StudyError("no participants: a design is judged over at least one")
+    orders = orders_of(protocol)
+    language = protocol.study.languages[0]
+    return Balance(
+        study=orders.study,
+        participants=len(participants),
+        seed=seed,
+        blocks=tuple(
+            _balance(orders.study, block, protocol.text(protocol.blocks[block.id].title, language), participants, seed)
+            for block in orders.blocks
+            if len(block.codes) > 1
+        ),
+    )
+
+
+def _balance(study: str, block: BlockOrder, title: str, participants: Sequence[str], seed: int) -> BlockBalance:
+    drawn = [codes_of(study, block, participant, seed) for participant in participants]
+    return BlockBalance(
+        id=block.id,
+        title=title,
+        order=block.order,
+        repetitions=block.repetitions,
+        evenness=evenness(block.codes, drawn),
+        unnumbered=tuple(participant for participant in participants if enrolment(participant) is None),
+    )
+
+
+def _even(counts: Iterable[int]) -> bool:
+    return len(set(counts)) <= 1
+
+
+def describe_balance(judged: Balance) -> str:
+    """Return the tables of every block, and what they mean."""
+    people = "1 participant" if judged.participants == 1 else f"{judged.participants} participants"
+    head = f"{judged.study}: the orders of {people}, each with seed {judged.seed}"
+    if not judged.blocks:
+        return f"{head}\n\nNo block has more than one code: there is nothing to balance."
+    return "\n\n".join((head, *("\n".join(_section(block)) for block in judged.blocks)))
+
+
+def _section(block: BlockBalance) -> Iterator[str]:
+    counted = block.evenness
+    times = "" if block.repetitions == 1 else f", each {block.repetitions} times"
+    yield f"{block.title} (block {block.id}): {len(counted.codes)} codes{times}, order {block.order}"
+    yield ""
+    yield from _table("position", [str(number) for number in range(1, len(counted.positions) + 1)], block, "positions")
+    yield ""
+    yield from _table("after", counted.codes, block, "follows")
+    yield ""
+    yield from (f"  {sentence}" for sentence in (*_verdict(counted), *_advice(block)))
+
+
+def _table(
+    corner: str, names: Sequence[str], block: BlockBalance, which: Literal["positions", "follows"]
+) -> Iterator[str]:
+    """Yield a table of counts, a row for each name and a column for each code."""
+    codes, counts = block.evenness.codes, getattr(block.evenness, which)
+    width = max(len(str(cell)) for cell in (*codes, *(count for line in counts for count in line)))
+    first = len("position")
+    yield f"  {corner:<{first}}  {'  '.join(f'{code:>{width}}' for code in codes)}"
+    for name, line in zip(names, counts, strict=True):
+        yield f"  {name:<{first}}  {'  '.join(f'{count:>{width}}' for count in line)}"
+
+
+def _verdict(counted: Evenness) -> Iterator[str]:
+    cells = [count for line in counted.positions for count in line]
+    if counted.positions_even:
+        yield f"Positions are balanced: each code comes in each position {_times(cells[0])}."
+    else:
+        yield f"Positions are uneven: a code comes in a position {_range(cells)}."
+    after = counted.after_another
+    if counted.follows_even:
+        yield f"Carry-over is balanced: each code follows each other one {_times(after[0])}."
+    else:
+        yield f"Carry-over is uneven: a code follows another one {_range(after)}."
+    if counted.shortest_distance is not None:
+        least = f"the least distance from one to the next of its kind is {counted.shortest_distance}"
+        yield f"At most {counted.longest_run} of a kind come in a row; {least}."
+
+
+def _advice(block: BlockBalance) -> Iterator[str]:
+    """Yield what the order can promise, and what to change for more."""
+    codes, repetitions = len(block.evenness.codes), block.repetitions
+    match block.order:
+        case "fixed":
+            yield "Everyone gets the same order: what a condition does cannot be told from what its position does."
+        case "shuffled" | "constrained":
+            yield "Drawn anew in every session: even on average only, and every seed gives other tables."
+            if repetitions == 1:
+                rows = row_count("williams", codes)
+                yield f'order = "williams" would be even exactly, for every {rows} participants.'
+        case "williams" | "latin" as square:
+            yield from _rounds(block, row_count(square, codes))
+            if square == "williams" and not borders_even(codes, repetitions):
+                enough = next(more for more in count(repetitions) if borders_even(codes, more))
+                yield f"From one repetition to the next carry-over cannot be even; with {enough} repetitions it can."
+            if square == "latin" and codes > 2:
+                yield 'A Latin square evens out positions alone; order = "williams" evens out carry-over too.'
+
+
+def _rounds(block: BlockBalance, rows: int) -> Iterator[str]:
+    """Yield whether the participants fill whole rounds of rows, and how many would."""
+    codes, people = len(block.evenness.codes), block.evenness.orders
+    if block.unnumbered:
+        yield f"No number in the id: {', '.join(block.unnumbered)}. Their rows are drawn, even on average only."
+    elif people % rows == 0 and block.evenness.positions_even:
+        rounds = people // rows
+        yield f"{people} participants are {'a full round' if rounds == 1 else f'{rounds} full rounds'} of {rows} rows."
+    elif people % rows == 0:
+        yield f"A full round is the numbers 1 to {rows}, {rows + 1} to {2 * rows} and so on: these ids miss some."
+    else:
+        enough = people + -people % rows
+        then = f"each code then comes in each position {_times(enough // codes)}"
+        if block.order == "williams" and borders_even(codes, block.repetitions):
+            follows = enough * (codes * block.repetitions - 1) // (codes * (codes - 1))
+            then += f" and follows each other one {_times(follows)}"
+        yield f"A full round is {rows} participants, the next number that fills one is {enough}: {then}."
+
+
+def _times(number: int) -> str:
+    return {1: "once", 2: "twice"}.get(number, f"{number} times")
+
+
+def _range(counts: Sequence[int]) -> str:
+    return f"{min(counts)} to {max(counts)} times, {sum(counts) / len(counts):.3g} on average"

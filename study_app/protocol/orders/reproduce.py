@@ -1,0 +1,115 @@
+"""Orders made again from a receipt, and compared with those that were run: a proof that needs no key.
+
+The receipt holds the protocol without its conditions, and that is all an order is made of besides seed and participant.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from study_app.protocol.orders.block_orders import orders_of_receipt
+from study_app.protocol.orders.schedule import Trial, build_schedule
+
+_TOLD = ("block", "phase", "part", "index", "of", "code")
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedTrial:
+    """One attempt at a trial as a session recorded it; ``items`` in the order shown, None if nothing was answered."""
+
+    number: int
+    block: str
+    phase: str
+    part: int | None
+    index: int
+    of: int
+    code: str
+    items: tuple[str, ...] | None = None
+
+
+def recorded_trials(lines: Iterable[Mapping[str, Any]]) -> tuple[RecordedTrial, ...]:
+    """Return what the lines of a journal say was presented: every attempt, in the order of time.
+
+    Raises
+    ------
+    KeyError
+        A line lacks what lines of its event hold, or answers a trial that never started.
+    """
+    attempts: list[RecordedTrial] = []
+    place: dict[tuple[int, int], int] = {}
+    for line in lines:
+        if line["event"] == "trial_started":
+            place[line["trial"], line["attempt"]] = len(attempts)
+            attempts.append(RecordedTrial(line["trial"], *(line[name] for name in _TOLD)))
+        elif line["event"] == "responses":
+            rows = sorted(line["items"], key=lambda row: int(row["number"]))
+            index = place[line["trial"], line["attempt"]]
+            attempts[index] = replace(attempts[index], items=tuple(row["item"] for row in rows))
+    return tuple(attempts)
+
+
+def reproduce(
+    protocol: Mapping[str, Any],
+    seed: int,
+    participant: str,
+    recorded: Iterable[RecordedTrial],
+    *,
+    complete: bool,
+) -> tuple[str, ...]:
+    """Return how the trials that were run differ from those that receipt, seed and participant give.
+
+    Parameters
+    ----------
+    protocol : mapping
+        The protocol as the receipt holds it: without conditions, blocks with their codes.
+    recorded : iterable of RecordedTrial
+        What was run, in the order of time.
+    complete : bool
+        Whether the session went to its end, so that no trial may be missing.
+
+    Raises
+    ------
+    StudyError
+        The receipt's protocol does not tell the orders.
+    """
+    planned = {trial.number: trial for trial in build_schedule(orders_of_receipt(protocol), participant, seed).trials}
+    attempts = tuple(recorded)
+    found = [sentence for trial in attempts for sentence in _against(planned.get(trial.number), trial)]
+    found += _progress([trial.number for trial in attempts], len(planned), complete=complete)
+    return tuple(dict.fromkeys(found))
+
+
+def _against(planned: Trial | None, run: RecordedTrial) -> Iterator[str]:
+    """Yield how one recorded trial differs from the planned one of its number."""
+    if planned is None:
+        yield f"trial {run.number}: recorded, but the seed gives no such trial"
+        return
+    for name in _TOLD:
+        ours, theirs = getattr(planned, name), getattr(run, name)
+        if ours != theirs:
+            yield f"trial {run.number}: {name} {_named(theirs)} recorded, the seed gives {_named(ours)}"
+    if run.items is not None and run.items != planned.items:
+        yield f"trial {run.number}: items {_listed(run.items)} recorded, the seed gives {_listed(planned.items)}"
+
+
+def _progress(numbers: list[int], planned: int, *, complete: bool) -> Iterator[str]:
+    """Yield where the trials did not come one after the other, each attempt after the one before."""
+    before = 0
+    for number in numbers:
+        if number not in {before, before + 1}:
+            after = f"after trial {before}" if before else "first"
+            yield f"trial {number}: came {after}, where trial {before + 1} was due"
+        before = number
+    if complete and before < planned:
+        missing = f"trial {planned} was" if before + 1 == planned else f"trials {before + 1} to {planned} were"
+        yield f"{missing} not recorded, though the session is complete"
+
+
+def _named(value: object) -> str:
+    return "none" if value is None else str(value)
+
+
+def _listed(items: tuple[str, ...]) -> str:
+    return ", ".join(items) if items else "none"

@@ -1,0 +1,157 @@
+"""What comes when: protocol, participant and seed give the session's steps, the same on every machine.
+
+Orders are orders of codes; what a code stands for is drawn once per study by :func:`draw_key` and sealed. So a schedule
+gives nothing away, and a receipt, which holds no conditions, is enough to make it again (see ``orders``).
+
+==============  ========================================================================================================
+order           the codes of a block
+==============  ========================================================================================================
+fixed           as written, again in each repetition
+shuffled        in a random order, another in each repetition; from stream "order/PARTICIPANT/BLOCK/REPETITION"
+constrained     all trials in one random order within max_repeats and min_distance (see ``constrained``); from stream
+                "order/PARTICIPANT/BLOCK"
+williams latin  a row of a square, dealt by the number in the participant's id, whatever the seed (see ``squares``)
+==============  ========================================================================================================
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from study_app.protocol.blocks import Phase
+from study_app.protocol.model import Protocol
+from study_app.protocol.orders.block_orders import BlockOrder, Orders, block_codes, orders_of
+from study_app.protocol.orders.constrained import Constraint, arrange
+from study_app.protocol.orders.latin_squares import row, row_count, row_of
+from study_app.protocol.streams import Draw, shuffle, stream
+
+__all__ = [
+    "PageStep",
+    "Schedule",
+    "Trial",
+    "block_codes",
+    "build_schedule",
+    "codes_of",
+    "draw_key",
+    "shuffle",
+    "stream",
+]
+
+Key: TypeAlias = dict[str, dict[str, str]]
+
+
+@dataclass(frozen=True, slots=True)
+class PageStep:
+    """A page to read."""
+
+    page_id: str
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """One presentation and its answers.
+
+    ``number`` counts from 1 over the session, ``index`` from 1 within the block of ``of`` trials; ``items`` are item
+    ids in the order shown.
+    """
+
+    number: int
+    block: str
+    phase: Phase
+    part: int | None
+    index: int
+    of: int
+    code: str
+    items: tuple[str, ...]
+
+    def label(self, protocol: Protocol, language: str) -> str:
+        """Return the neutral name of the trial: "Liquid setting 1", or just "Practice" where a block has one trial."""
+        name = protocol.text(protocol.blocks[self.block].setting_label, language)
+        return name if self.phase != "main" and self.of == 1 else f"{name} {self.index}"
+
+
+Step: TypeAlias = PageStep | Trial
+
+
+@dataclass(frozen=True, slots=True)
+class Schedule:
+    """The steps of one participant's session, in order."""
+
+    participant: str
+    seed: int
+    steps: tuple[Step, ...]
+
+    @property
+    def trials(self) -> tuple[Trial, ...]:
+        """The trials alone, in order."""
+        return tuple(step for step in self.steps if isinstance(step, Trial))
+
+
+def build_schedule(protocol: Protocol | Orders, participant: str, seed: int) -> Schedule:
+    """Return the session of ``participant``: a pure function of its arguments."""
+    orders = orders_of(protocol) if isinstance(protocol, Protocol) else protocol
+    steps: list[Step] = []
+    number = 1
+    for step in orders.steps:
+        if isinstance(step, str):
+            steps.append(PageStep(step))
+            continue
+        for trial in _trials(orders.study, step, participant, seed, number):
+            steps.append(trial)
+            if step.break_page is not None and step.break_after(trial.index):
+                steps.append(PageStep(step.break_page))
+        number += step.trials
+    return Schedule(participant, seed, tuple(steps))
+
+
+def codes_of(study: str, block: BlockOrder, participant: str, seed: int) -> tuple[str, ...]:
+    """Return the codes of a block's trials, in the order in which ``participant`` meets them."""
+    codes, times = block.codes, block.repetitions
+    match block.order:
+        case "fixed":
+            return codes * times
+        case "shuffled":
+            streams = [stream(seed, f"order/{participant}/{block.id}/{number}") for number in range(1, times + 1)]
+            return tuple(code for drawn in streams for code in shuffle(codes, drawn.random))
+        case "constrained":
+            constraint = Constraint(block.max_repeats, block.min_distance)
+            return arrange(codes, times, constraint, stream(seed, f"order/{participant}/{block.id}").random)
+        case "williams" | "latin" as square:
+            taken = row_of(study, block.id, row_count(square, len(codes)), participant)
+            return tuple(codes[number] for number in row(square, len(codes), taken, times))
+
+
+def _trials(study: str, block: BlockOrder, participant: str, seed: int, first: int) -> list[Trial]:
+    return [
+        Trial(
+            number=first + index - 1,
+            block=block.id,
+            phase=block.phase,
+            part=block.part,
+            index=index,
+            of=block.trials,
+            code=code,
+            items=_items(block, participant, seed, index),
+        )
+        for index, code in enumerate(codes_of(study, block, participant, seed), start=1)
+    ]
+
+
+def _items(block: BlockOrder, participant: str, seed: int, index: int) -> tuple[str, ...]:
+    if block.item_order == "fixed":
+        return block.items
+    return shuffle(block.items, stream(seed, f"items/{participant}/{block.id}/{index}").random)
+
+
+def draw_key(protocol: Protocol, draw: Draw) -> Key:
+    """Return block → code → condition, drawn with ``draw`` (uniform numbers in [0, 1)).
+
+    A block in fixed order keeps its order, as the protocol asks, so its codes name its conditions in the order written:
+    whoever reads the protocol can tell them.
+    """
+    key: Key = {}
+    for block in protocol.blocks_in_order:
+        conditions = block.conditions if block.order == "fixed" else shuffle(block.conditions, draw)
+        key[block.id] = dict(zip(block_codes(block), conditions, strict=True))
+    return key

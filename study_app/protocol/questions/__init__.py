@@ -1,0 +1,1 @@
+"""Questionnaires, rating scales and their simulated answers."""

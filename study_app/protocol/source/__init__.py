@@ -1,0 +1,1 @@
+"""The protocol file: where it is, its lines and its problems."""

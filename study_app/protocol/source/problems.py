@@ -1,0 +1,199 @@
+"""What pydantic found wrong, as sentences for the author of the file: thing, value, what is permitted, what to do."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
+
+from pydantic import ValidationError
+from pydantic_core import ErrorDetails
+
+from study_app.errors import Problem
+from study_app.haptics.model.ranges import REASON
+from study_app.protocol.source.document import Path, has
+from study_app.protocol.source.line_numbers import Places
+
+Schema = Mapping[str, Any]
+
+
+class Fault(NamedTuple):
+    """A problem before its line is known; indices in ``path`` count from 0."""
+
+    path: Path
+    message: str
+    hint: str = ""
+    counts_entries: bool = False
+
+    def located(self, places: Places) -> Problem:
+        """Return the problem with its line; in the place that people read, entries count from 1."""
+        place = ".".join(str(step + 1) if isinstance(step, int) else step for step in self.path)
+        return Problem(place or "file", self.message, places.line(self.path), self.hint)
+
+
+_PATTERNS = {
+    r"^[a-z][a-z0-9_]*$": "small letters, digits and underscores, a letter first",
+    r"^[a-z][a-z0-9]*$": "small letters and digits, a letter first, no underscore",
+    r"^[a-z]{2}$": "a language of two small letters, such as en",
+    r"^[A-Z]$": "one capital letter",
+    r"^[0-9A-Za-z.+-]+$": "letters, digits, dots, plus and minus",
+}
+
+_KINDS = {
+    "string_type": "a string",
+    "int_type": "a whole number",
+    "int_from_float": "a whole number",
+    "float_type": "a number",
+    "bool_type": "true or false",
+    "tuple_type": "an array",
+    "dict_type": "a table",
+    "model_type": "a table",
+    "model_attributes_type": "a table",
+    "finite_number": "a finite number",
+}
+
+_BOUNDS = {
+    "greater_than": ("gt", "more than"),
+    "greater_than_equal": ("ge", "at least"),
+    "less_than": ("lt", "less than"),
+    "less_than_equal": ("le", "at most"),
+}
+
+
+def shown(value: Any) -> str:
+    """Return a value as it would be written in the file, shortened."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str):
+        return f'"{value}"' if len(value) <= 40 else f'"{value[:37]}…"'
+    if isinstance(value, int | float):
+        return f"{value:g}"
+    return "a table" if isinstance(value, Mapping) else "an array" if isinstance(value, Sequence) else str(value)
+
+
+def did_you_mean(word: str, permitted: Iterable[str]) -> str:
+    """Return "did you mean …?" for the nearest permitted word, or the list of them if none is near."""
+    words = sorted(permitted)
+    near = difflib.get_close_matches(word, words, n=1, cutoff=0.6)
+    if near:
+        return f'did you mean "{near[0]}"?'
+    return f"known: {', '.join(words)}" if words else ""
+
+
+def faults_of(error: ValidationError, document: Mapping[str, Any], schema: Schema) -> list[Fault]:
+    """Return pydantic's findings about ``document``; ``schema`` is the JSON Schema of what it should be."""
+    found = [_fault(details, document, schema) for details in error.errors(include_url=False)]
+    return [fault for fault in found if not (fault.counts_entries and _has_inner(fault, found))]
+
+
+def _has_inner(fault: Fault, found: Sequence[Fault]) -> bool:
+    """Return whether an entry of the array is broken: pydantic then counts the sound ones only."""
+    depth = len(fault.path)
+    return any(len(other.path) > depth and other.path[:depth] == fault.path for other in found)
+
+
+def _fault(details: ErrorDetails, document: Mapping[str, Any], schema: Schema) -> Fault:
+    kind, value, context = details["type"], details["input"], details.get("ctx", {})
+    path = _path_in(document, details["loc"], keep_last=kind in {"missing", "extra_forbidden"})
+    if "place" in context:
+        path = (*path, context["place"])
+    if kind == "missing":
+        last = path[-1]
+        return Fault(path, f"entry {last + 1} is missing" if isinstance(last, int) else "is missing")
+    if kind == "extra_forbidden":
+        return Fault(path, "unknown key", did_you_mean(str(path[-1]), _keys_at(document, path[:-1], schema)))
+    if kind == "union_tag_not_found":
+        return Fault((*path, _tag_key(context)), "is missing", f"one of {context.get('expected_tags', '')}".strip())
+    if kind == "union_tag_invalid":
+        tags = str(context["expected_tags"]).replace("'", '"')
+        return Fault((*path, _tag_key(context)), f'"{context["tag"]}" is not one of {tags}')
+    sentence, hint = _sentence(kind, value, context, details["msg"])
+    if kind in _BOUNDS:
+        hint = next((node[REASON] for node in _nodes_at(document, path, schema) if REASON in node), "")
+    return Fault(path, sentence, hint, counts_entries=kind == "too_short")
+
+
+def _sentence(kind: str, value: Any, context: Mapping[str, Any], message: str) -> tuple[str, str]:
+    if kind in _KINDS:
+        return f"must be {_KINDS[kind]}, not {shown(value)}", ""
+    if kind in _BOUNDS:
+        key, words = _BOUNDS[kind]
+        return f"is {shown(value)}, must be {words} {shown(context[key])}", ""
+    if kind == "literal_error":
+        permitted = str(context["expected"]).replace("'", '"')
+        near = difflib.get_close_matches(str(value), permitted.replace('"', "").replace(" or ", ", ").split(", "), n=1)
+        return f"{shown(value)} is not {permitted}", f'did you mean "{near[0]}"?' if near else ""
+    if kind == "string_pattern_mismatch":
+        rule = _PATTERNS.get(str(context["pattern"]), f"text that matches {context['pattern']}")
+        return f"{shown(value)} is not permitted: {rule}", ""
+    if kind == "too_short":
+        return f"has {context['actual_length']} entries, needs at least {context['min_length']}", ""
+    if kind == "too_long":
+        return f"has {context['actual_length']} entries, more than {context['max_length']}", ""
+    if kind == "string_too_long":
+        return f"{shown(value)} is longer than {context['max_length']} characters", ""
+    return message.removeprefix("Value error, "), ""
+
+
+def _tag_key(context: Mapping[str, Any]) -> str:
+    return str(context["discriminator"]).strip("'")
+
+
+def _path_in(document: Any, loc: tuple[str | int, ...], *, keep_last: bool) -> Path:
+    """Return ``loc`` without what is no key or index of the document: tags of unions, names of validators."""
+    path: list[str | int] = []
+    node = document
+    for position, step in enumerate(loc):
+        if has(node, step):
+            node = node[step]
+        elif not (keep_last and position == len(loc) - 1):
+            continue
+        path.append(step)
+    return tuple(path)
+
+
+def _keys_at(document: Any, path: Path, schema: Schema) -> set[str]:
+    """Return the keys that the schema permits in the table at ``path``."""
+    return {key for node in _nodes_at(document, path, schema) for key in node.get("properties", {})}
+
+
+def _nodes_at(document: Any, path: Path, schema: Schema) -> list[Schema]:
+    """Return what the schema says of the place at ``path``: several alternatives where it permits them."""
+    nodes = list(_alternatives(schema, schema, document))
+    for step in path:
+        document = document[step]
+        nodes = [
+            alternative
+            for node in nodes
+            for child in _children(node, step)
+            for alternative in _alternatives(child, schema, document)
+        ]
+    return nodes
+
+
+def _children(node: Schema, step: str | int) -> Iterator[Schema]:
+    if isinstance(step, int):
+        fixed = node.get("prefixItems", ())
+        if step < len(fixed):
+            yield fixed[step]
+        elif "items" in node:
+            yield node["items"]
+    elif step in node.get("properties", {}):
+        yield node["properties"][step]
+    else:
+        yield from node.get("patternProperties", {}).values()
+
+
+def _alternatives(node: Schema, schema: Schema, value: Any) -> Iterator[Schema]:
+    """Follow references and unions; of several tables those are left whose fixed keys (kind, law) are the value's."""
+    if "$ref" in node:
+        yield from _alternatives(schema["$defs"][node["$ref"].rsplit("/", 1)[-1]], schema, value)
+    elif branches := node.get("anyOf") or node.get("oneOf"):
+        for branch in branches:
+            yield from _alternatives(branch, schema, value)
+    elif all(
+        part["const"] == value.get(key, part["const"])
+        for key, part in node.get("properties", {}).items()
+        if "const" in part and isinstance(value, Mapping)
+    ):
+        yield node

@@ -1,0 +1,29 @@
+"""The interface's own words on the participant's pages, by language."""
+
+from __future__ import annotations
+
+from study_app.errors import StudyError
+from study_app.protocol.source.problems import did_you_mean
+from study_app.protocol.wording.arabic import ARABIC
+from study_app.protocol.wording.dutch import DUTCH
+from study_app.protocol.wording.english import ENGLISH
+from study_app.protocol.wording.french import FRENCH
+from study_app.protocol.wording.german import GERMAN
+from study_app.protocol.wording.words import Words
+
+__all__ = ["LANGUAGES", "Words", "words"]
+
+LANGUAGES = {words.language: words for words in (ENGLISH, DUTCH, GERMAN, FRENCH, ARABIC)}
+
+
+def words(language: str) -> Words:
+    """Return the words of a language.
+
+    Raises
+    ------
+    StudyError
+        There are none in this language.
+    """
+    if language not in LANGUAGES:
+        raise StudyError(f'no words for the participant\'s pages in "{language}" ({did_you_mean(language, LANGUAGES)})')
+    return LANGUAGES[language]

@@ -1,0 +1,256 @@
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from fractions import Fraction
+from itertools import permutations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from study_app.protocol.orders.constrained import (
+    PROPOSALS,
+    Constraint,
+    _Left,
+    arrange,
+    longest_run,
+    propose,
+    shortest_distance,
+)
+from study_app.protocol.streams import stream
+
+Order = tuple[int, ...]
+
+# Codes, repetitions, constraint: small enough to list every order that keeps it.
+SMALL = [
+    (2, 3, Constraint(max_repeats=2)),
+    (2, 6, Constraint(max_repeats=2)),
+    (3, 2, Constraint(max_repeats=1)),
+    (3, 3, Constraint(max_repeats=1)),
+    (3, 3, Constraint(min_distance=2)),
+    (4, 2, Constraint(min_distance=3)),
+    (4, 2, Constraint(min_distance=4)),
+    (2, 4, Constraint(max_repeats=3, min_distance=1)),
+    (3, 3, Constraint(max_repeats=2, min_distance=2)),
+]
+SIZES = st.tuples(st.integers(1, 12), st.integers(1, 12))
+CONSTRAINTS = st.builds(Constraint, st.one_of(st.none(), st.integers(1, 12)), st.one_of(st.none(), st.integers(1, 12)))
+
+
+class Counting:
+    """A stream that counts its draws."""
+
+    def __init__(self, seed: int, name: str = "any") -> None:
+        self._draw = stream(seed, name).random
+        self.draws = 0
+
+    def __call__(self) -> float:
+        self.draws += 1
+        return self._draw()
+
+
+def every_order(codes: int, repetitions: int, constraint: Constraint) -> Iterator[Order]:
+    """List by brute force what keeps a constraint."""
+
+    def longer(order: Order) -> Iterator[Order]:
+        if len(order) == codes * repetitions:
+            yield order
+            return
+        for code in range(codes):
+            if order.count(code) < repetitions and constraint.holds((*order, code)):
+                yield from longer((*order, code))
+
+    return longer(())
+
+
+def slow_run(order: Order) -> int:
+    return max(
+        (end - start for start in range(len(order)) for end in range(start + 1, len(order) + 1)
+         if len(set(order[start:end])) == 1),
+        default=0,
+    )  # fmt: skip
+
+
+def slow_distance(order: Order) -> int | None:
+    return min(
+        (late - early for late in range(len(order)) for early in range(late) if order[early] == order[late]),
+        default=None,
+    )
+
+
+@given(st.lists(st.integers(0, 3), max_size=12).map(tuple))
+def test_runs_and_distances_are_measured(order: Order):
+    assert longest_run(order) == slow_run(order)
+    assert shortest_distance(order) == slow_distance(order)
+
+
+@given(SIZES, CONSTRAINTS, st.integers(0, 2**64))
+def test_an_order_keeps_its_constraint_or_is_impossible(size: tuple[int, int], constraint: Constraint, seed: int):
+    codes, repetitions = size
+    draw = Counting(seed)
+    if constraint.impossible(codes, repetitions) is not None:
+        with pytest.raises(ValueError, match="is possible"):
+            arrange(range(codes), repetitions, constraint, draw)
+        assert draw.draws == 0
+        return
+    order = arrange(range(codes), repetitions, constraint, draw)
+    assert constraint.holds(order)
+    assert Counter(order) == dict.fromkeys(range(codes), repetitions)
+    assert draw.draws <= (codes * repetitions + 1) * PROPOSALS + codes
+
+
+@pytest.mark.parametrize("codes", range(1, 5))
+@pytest.mark.parametrize("repetitions", range(1, 4))
+def test_impossible_is_exactly_what_no_order_keeps(codes: int, repetitions: int):
+    for runs in (None, 1, 2, 3, 4):
+        for distance in (None, 1, 2, 3, 4, 5, 6):
+            constraint = Constraint(runs, distance)
+            told = constraint.impossible(codes, repetitions)
+            assert (told is None) == any(map(bool, every_order(codes, repetitions, constraint))), constraint
+
+
+@pytest.mark.parametrize(
+    ("codes", "repetitions", "constraint", "told"),
+    [
+        (3, 2, Constraint(min_distance=4), "min_distance is 4, but with 3 conditions only 1 to 3 is possible"),
+        (1, 2, Constraint(min_distance=2), "min_distance is 2, but with one condition only 1 is possible"),
+        (
+            1,
+            5,
+            Constraint(max_repeats=4),
+            "max_repeats is 4, but with one condition 5 times only 5 or more is possible",
+        ),
+    ],
+)
+def test_what_would_be_possible_is_said(codes: int, repetitions: int, constraint: Constraint, told: str):
+    assert " ".join(constraint.impossible(codes, repetitions) or ()) == told
+
+
+def proposals(codes: int, repetitions: int, constraint: Constraint) -> dict[Order, Fraction]:
+    """Draw proposals until every order was proposed, and return each with its chance."""
+    wanted = set(every_order(codes, repetitions, constraint))
+    draw = stream(1, "proposals").random
+    found: dict[Order, Fraction] = {}
+    for _ in range(100 * len(wanted) + 1000):
+        proposal = propose(codes, repetitions, constraint, draw)
+        assert proposal is not None
+        order, weight = proposal
+        assert found.setdefault(order, 1 / weight) == 1 / weight
+        if len(found) == len(wanted):
+            break
+    assert found.keys() == wanted
+    return found
+
+
+@pytest.mark.parametrize(("codes", "repetitions", "constraint"), SMALL)
+def test_every_order_is_proposed_none_is_lost_in_a_dead_end(codes: int, repetitions: int, constraint: Constraint):
+    """The chances that proposals claim for themselves are those of all orders, and sum to exactly one."""
+    chances = proposals(codes, repetitions, constraint)
+    assert sum(chances.values()) == 1
+
+
+def dead_ends(codes: int, repetitions: int, apart: int, run: int) -> int:
+    """Visit every state that proposals can reach, alike but for the names of codes, and count those without a next."""
+    waiting: list[Order] = [()]
+    seen: set[object] = set()
+    dead = 0
+    while waiting:
+        order = waiting.pop()
+        left = _Left(codes, repetitions, apart, run)
+        for code in order:
+            left.take(code)
+        recent = order[len(order) - (apart - 1) :] if apart > 1 else order[-1:]
+        counts = tuple(left.count[code] for code in recent)
+        others = tuple(sorted(left.count[code] for code in range(codes) if code not in recent))
+        in_a_row = next((run for run in range(len(order)) if order[-run - 1] != order[-1]), len(order))
+        state = (counts, others, in_a_row if apart == 1 else 0)
+        if state in seen:
+            continue
+        seen.add(state)
+        longer = [(*order, code) for code in left.may_come()]
+        dead += not longer and len(order) < codes * repetitions
+        waiting += longer
+    return dead
+
+
+@pytest.mark.parametrize("codes", range(2, 6))
+@pytest.mark.parametrize("repetitions", range(2, 5))
+def test_no_state_that_can_be_reached_is_a_dead_end(codes: int, repetitions: int):
+    for apart in range(2, codes + 1):
+        assert dead_ends(codes, repetitions, apart, codes * repetitions) == 0, apart
+    for run in range(1, repetitions + 1):
+        assert dead_ends(codes, repetitions, 1, run) == 0, run
+
+
+@pytest.mark.parametrize(("codes", "repetitions", "constraint"), SMALL)
+def test_the_chain_ends_close_to_all_orders_being_equally_likely(codes: int, repetitions: int, constraint: Constraint):
+    """Follow the exact chances of the chain: it starts from one proposal and sees PROPOSALS − 1 more."""
+    chances = sorted(float(chance) for chance in proposals(codes, repetitions, constraint).values())
+    now = list(chances)
+    for _ in range(PROPOSALS - 1):
+        later = [0.0] * len(now)
+        for here, chance in enumerate(now):
+            moved = 0.0
+            for there, proposed in enumerate(chances):
+                accepted = proposed * min(1.0, chances[here] / proposed)
+                later[there] += chance * accepted
+                moved += accepted
+            later[here] += chance * (1 - moved)
+        now = later
+    assert sum(abs(chance - 1 / len(now)) for chance in now) / 2 < 1e-4
+
+
+@pytest.mark.parametrize(
+    ("codes", "repetitions", "constraint", "bound"),
+    [
+        (3, 2, Constraint(max_repeats=1), 58.3),  # 30 orders: χ², 29 degrees of freedom, p = 0.001
+        (2, 3, Constraint(max_repeats=2), 34.5),  # 14 orders: 13 degrees of freedom
+        (4, 2, Constraint(min_distance=4), 49.7),  # 24 orders: 23 degrees of freedom
+    ],
+)
+def test_orders_of_many_participants_are_even(codes: int, repetitions: int, constraint: Constraint, bound: float):
+    orders = set(every_order(codes, repetitions, constraint))
+    each = 40
+    draws = (stream(7, f"order/P{number}").random for number in range(each * len(orders)))
+    counts = Counter(arrange(range(codes), repetitions, constraint, draw) for draw in draws)
+    assert counts.keys() == orders
+    assert sum((count - each) ** 2 / each for count in counts.values()) < bound
+
+
+@pytest.mark.parametrize(
+    ("codes", "repetitions", "constraint"),
+    [
+        (12, 10, Constraint(min_distance=11)),
+        (12, 10, Constraint(max_repeats=1)),
+        (2, 100, Constraint(max_repeats=2)),
+        (30, 4, Constraint(min_distance=29)),
+        (7, 20, Constraint(min_distance=5)),
+        (5, 40, Constraint(min_distance=5)),
+    ],
+)
+def test_large_and_tight_blocks_meet_no_dead_end(codes: int, repetitions: int, constraint: Constraint):
+    draw = stream(1, "large").random
+    for _ in range(10):
+        proposal = propose(codes, repetitions, constraint, draw)
+        assert proposal is not None
+        assert constraint.holds(proposal[0])
+        assert Counter(proposal[0]) == dict.fromkeys(range(codes), repetitions)
+
+
+def test_a_dead_end_is_told_and_costs_no_more_than_the_rest():
+    draw = Counting(1)
+    assert propose(2, 2, Constraint(min_distance=3), draw) is None
+    assert draw.draws <= 4
+
+
+def test_the_same_draws_give_the_same_order_on_every_machine():
+    order = arrange(["L1", "L2", "L3"], 4, Constraint(max_repeats=1), stream(1, "order/P001/liquids").random)
+    assert " ".join(order) == "L1 L3 L2 L1 L2 L3 L1 L3 L1 L2 L3 L2"
+    order = arrange("abcde", 3, Constraint(min_distance=4), stream(1, "order/P001/liquids").random)
+    assert "".join(order) == "cdebadceabdeacb"
+
+
+def test_with_a_distance_of_all_codes_the_first_round_decides():
+    seen = {arrange("abc", 4, Constraint(min_distance=3), stream(seed, "any").random) for seed in range(200)}
+    assert seen == {order * 4 for order in permutations("abc")}

@@ -1,0 +1,141 @@
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from study_app.protocol.load import load, parse
+from study_app.protocol.model import Protocol
+from study_app.protocol.orders.reproduce import RecordedTrial, recorded_trials, reproduce
+from study_app.protocol.orders.schedule import Trial, build_schedule
+from study_app.store.receipt import without_conditions
+from tests.protocol.cases import ORDER, SOUND
+
+REK = load("rek2024")
+SHUFFLED = parse(SOUND.replace('scale = "agreement"', 'scale = "agreement"\nitem_order = "shuffled"').encode(), "small")
+ORDERS = [
+    ORDER,
+    'order = "constrained"\nmax_repeats = 1\nrepetitions = 3',
+    'order = "williams"\nrepetitions = 3',
+    'order = "latin"',
+]
+
+
+def kept(protocol: Protocol) -> dict[str, Any]:
+    """Return the protocol as it comes back from a receipt on disk."""
+    return json.loads(json.dumps(without_conditions(protocol)))  # type: ignore[no-any-return]
+
+
+def run(protocol: Protocol, participant: str, seed: int) -> list[RecordedTrial]:
+    """Return what a whole session records."""
+    names = ("number", "block", "phase", "part", "index", "of", "code", "items")
+    return [
+        RecordedTrial(**{name: getattr(trial, name) for name in names})
+        for trial in build_schedule(protocol, participant, seed).trials
+    ]
+
+
+@given(st.integers(0, 2**64), st.sampled_from(["P001", "P007", "anna"]), st.sampled_from(ORDERS))
+def test_an_untouched_session_is_reproduced(seed: int, participant: str, order: str):
+    for protocol in (REK, SHUFFLED, parse(SOUND.replace(ORDER, order).encode(), "small")):
+        recorded = run(protocol, participant, seed)
+        assert reproduce(kept(protocol), seed, participant, recorded, complete=True) == ()
+
+
+def swapped(trials: list[RecordedTrial]) -> list[RecordedTrial]:
+    """Swap the codes of trials 2 and 3."""
+    two, three = trials[1], trials[2]
+    return [trials[0], replace(two, code=three.code), replace(three, code=two.code), *trials[3:]]
+
+
+def test_a_tampered_order_is_found():
+    recorded = swapped(run(REK, "P001", 1))
+    assert [trial.code for trial in recorded[1:4]] == ["L1", "L2", "L3"]
+    assert reproduce(kept(REK), 1, "P001", recorded, complete=True) == (
+        "trial 2: code L1 recorded, the seed gives L2",
+        "trial 3: code L2 recorded, the seed gives L1",
+    )
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        (lambda trials: [*trials[:1], replace(trials[1], block="look"), *trials[2:]],
+         "trial 2: block look recorded, the seed gives feel"),
+        (lambda trials: [*trials[:1], replace(trials[1], part=None), *trials[2:]],
+         "trial 2: part none recorded, the seed gives 1"),
+        (lambda trials: [*trials[:1], replace(trials[1], items=trials[1].items[::-1]), *trials[2:]],
+         "trial 2: items cold, warm recorded, the seed gives warm, cold"),
+        (lambda trials: [*trials[:1], replace(trials[1], items=()), *trials[2:]],
+         "trial 2: items none recorded, the seed gives warm, cold"),
+        (lambda trials: [*trials, replace(trials[-1], number=8)],
+         "trial 8: recorded, but the seed gives no such trial"),
+        (lambda trials: trials[:-1], "trial 7 was not recorded, though the session is complete"),
+        (lambda trials: trials[:-3], "trials 5 to 7 were not recorded, though the session is complete"),
+        (lambda trials: [], "trials 1 to 7 were not recorded, though the session is complete"),
+        (lambda trials: trials[:2] + trials[3:], "trial 4: came after trial 2, where trial 3 was due"),
+        (lambda trials: trials[1:], "trial 2: came first, where trial 1 was due"),
+    ],
+)  # fmt: skip
+def test_whatever_was_changed_is_named(change: Callable[[list[RecordedTrial]], list[RecordedTrial]], expected: str):
+    recorded = change(run(SHUFFLED, "P001", 3))
+    assert reproduce(kept(SHUFFLED), 3, "P001", recorded, complete=True) == (expected,)
+
+
+@pytest.mark.parametrize(("seed", "participant"), [(2, "P001"), (1, "P002")])
+def test_another_seed_or_participant_is_found(seed: int, participant: str):
+    assert len(reproduce(kept(REK), seed, participant, run(REK, "P001", 1), complete=True)) > 5
+
+
+def test_a_changed_receipt_is_found():
+    receipt = kept(REK)
+    receipt["blocks"]["liquids"]["order"] = "fixed"
+    assert reproduce(receipt, 1, "P001", run(REK, "P001", 1), complete=True) == (
+        "trial 2: code L2 recorded, the seed gives L1",
+        "trial 3: code L1 recorded, the seed gives L2",
+    )
+
+
+@pytest.mark.parametrize("trials", range(8))
+def test_a_session_that_ended_early_is_reproduced_as_far_as_it_went(trials: int):
+    assert reproduce(kept(SHUFFLED), 3, "P001", run(SHUFFLED, "P001", 3)[:trials], complete=False) == ()
+
+
+def test_repeated_and_unanswered_attempts_are_reproduced():
+    one, two, *rest = run(SHUFFLED, "P001", 3)
+    recorded = [one, replace(two, items=None), replace(two, items=None), two, *rest]
+    assert reproduce(kept(SHUFFLED), 3, "P001", recorded, complete=True) == ()
+
+
+def journal(trials: tuple[Trial, ...]) -> Iterator[dict[str, Any]]:
+    """The lines of a session whose third trial was repeated, and whose fourth was broken off and never answered."""
+    yield {"n": 1, "event": "session_started", "participant": "P001"}
+    for trial in trials[:4]:
+        for attempt in (1, 2) if trial.number == 3 else (1,):
+            which = {"trial": trial.number, "attempt": attempt}
+            names = ("block", "phase", "part", "index", "of", "code")
+            yield {"event": "trial_started", **which, **{name: getattr(trial, name) for name in names}}
+            yield {"event": "trial_ended", **which, "outcome": "complete"}
+            if trial.items and trial.number < 4:
+                rows = [{"item": item, "number": number, "value": 4} for number, item in enumerate(trial.items, 1)]
+                yield {"event": "responses", **which, "items": rows[::-1]}
+
+
+def test_what_was_run_is_read_from_a_journal():
+    trials = build_schedule(SHUFFLED, "P001", 3).trials
+    recorded = recorded_trials(journal(trials))
+    assert [(trial.number, trial.code) for trial in recorded] == [
+        (trial.number, trial.code) for trial in (*trials[:3], trials[2], trials[3])
+    ]
+    assert [trial.items for trial in recorded] == [None, trials[1].items, trials[2].items, trials[2].items, None]
+    assert reproduce(kept(SHUFFLED), 3, "P001", recorded, complete=False) == ()
+
+
+def test_a_line_that_is_none_of_a_journal_is_refused():
+    with pytest.raises(KeyError):
+        recorded_trials([{"event": "responses", "trial": 1, "attempt": 1, "items": []}])

@@ -1,0 +1,332 @@
+from __future__ import annotations
+
+import hashlib
+from collections import Counter
+from itertools import pairwise
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from study_app.protocol.load import load, parse
+from study_app.protocol.model import Protocol
+from study_app.protocol.orders.block_orders import orders_of
+from study_app.protocol.orders.constrained import Constraint
+from study_app.protocol.orders.schedule import (
+    PageStep,
+    Schedule,
+    Trial,
+    block_codes,
+    build_schedule,
+    draw_key,
+    shuffle,
+    stream,
+)
+from tests.protocol.cases import ORDER, SOUND
+
+REK = load("rek2024")
+SMALL = parse(SOUND.encode(), "small.toml")
+
+seeds = st.integers(min_value=0, max_value=2**64)
+participants = st.text(st.sampled_from("ABCP0123456789"), min_size=1, max_size=6)
+
+
+def codes(schedule: Schedule, block: str) -> list[str]:
+    return [trial.code for trial in schedule.trials if trial.block == block]
+
+
+@pytest.mark.parametrize(
+    ("participant", "seed", "liquids", "delays"),
+    [
+        ("P001", 1, "L2 L1 L3", "D5 D4 D3 D6 D7 D2 D1"),
+        ("P002", 1, "L1 L3 L2", "D7 D4 D2 D1 D5 D3 D6"),
+        ("P007", 20240601, "L2 L1 L3", "D7 D6 D3 D4 D5 D1 D2"),
+    ],
+)
+def test_the_order_is_the_same_on_every_machine(participant: str, seed: int, liquids: str, delays: str):
+    schedule = build_schedule(REK, participant, seed)
+    assert codes(schedule, "liquids") == liquids.split()
+    assert codes(schedule, "delays") == delays.split()
+
+
+@pytest.mark.parametrize(
+    ("protocol", "digest"),
+    [
+        (REK, "08b72e46b51b155f8cb86e772c184005ad2a337472d24aa2b19ddee27eb8a3e5"),
+        (load("demo"), "8d431528c58487158a5636ff2869637763a4e9b7920ef8303a105ecee7aeae4e"),
+        (
+            parse(
+                SOUND.replace('scale = "agreement"', 'scale = "agreement"\nitem_order = "shuffled"').encode(), "small"
+            ),
+            "1642d21b6cad98edcbdc8c14b36100cd67d3ba12f82c525c7f3d7740ce9e51f1",
+        ),
+    ],
+    ids=["rek2024", "demo", "small"],
+)
+def test_whole_schedules_stay_what_they_were(protocol: Protocol, digest: str):
+    """Sessions under way and receipts on disk rely on it: a change here needs another name of stream or order."""
+    steps = [
+        repr(build_schedule(protocol, f"P{number:03d}", seed).steps)
+        for number in range(1, 51)
+        for seed in (0, 1, 20240601, 2**64)
+    ]
+    assert hashlib.sha256("\n".join(steps).encode()).hexdigest() == digest
+
+
+def test_the_key_of_a_rehearsal_is_the_same_on_every_machine():
+    key = draw_key(REK, stream(1, "key").random)
+    assert list(key["liquids"].values()) == ["light_oil", "honey", "water"]
+    assert key["delays"] == {
+        "D1": "delay_75",
+        "D2": "delay_0",
+        "D3": "delay_150",
+        "D4": "delay_125",
+        "D5": "delay_200",
+        "D6": "delay_100",
+        "D7": "delay_50",
+    }
+
+
+def test_streams_are_pinned():
+    assert [stream(1, "a").random(), stream(1, "b").random(), stream(2, "a").random()] == [
+        0.31728946267335123,
+        0.17021420984483582,
+        0.08061825961078872,
+    ]
+
+
+@given(seeds, participants)
+def test_each_condition_comes_once(seed: int, participant: str):
+    schedule = build_schedule(REK, participant, seed)
+    assert sorted(codes(schedule, "liquids")) == ["L1", "L2", "L3"]
+    assert sorted(codes(schedule, "delays")) == ["D1", "D2", "D3", "D4", "D5", "D6", "D7"]
+    assert codes(schedule, "practice") == ["practice"]
+    assert codes(schedule, "baseline") == ["baseline"]
+
+
+@given(seeds, participants)
+def test_each_condition_comes_once_in_each_repetition(seed: int, participant: str):
+    order = codes(build_schedule(SMALL, participant, seed), "feel")
+    assert sorted(order[:2]) == sorted(order[2:]) == ["L1", "L2"]
+
+
+@given(seeds, participants)
+def test_steps_follow_the_sequence_and_are_counted(seed: int, participant: str):
+    schedule = build_schedule(SMALL, participant, seed)
+    assert (schedule.participant, schedule.seed) == (participant, seed)
+    assert schedule.steps[0] == PageStep("hello")
+    trials = schedule.trials
+    assert [trial.number for trial in trials] == list(range(1, 1 + 1 + 4 + 2))
+    assert [(trial.block, trial.index, trial.of) for trial in trials] == [
+        ("warm_up", 1, 1),
+        *(("feel", index, 4) for index in (1, 2, 3, 4)),
+        *(("look", index, 2) for index in (1, 2)),
+    ]
+    assert [trial.phase for trial in trials] == ["practice"] + 6 * ["main"]
+    assert [trial.part for trial in trials] == [None, 1, 1, 1, 1, 2, 2]
+
+
+@given(seeds, participants)
+def test_the_same_arguments_give_the_same_schedule(seed: int, participant: str):
+    assert build_schedule(REK, participant, seed) == build_schedule(REK, participant, seed)
+
+
+def test_orders_of_many_participants_are_even():
+    """6 orders of 3 liquids, 600 participants: each order about 100 times (χ², 5 degrees of freedom, p = 0.001)."""
+    counts = Counter(tuple(codes(build_schedule(REK, f"P{number}", 7), "liquids")) for number in range(600))
+    assert len(counts) == 6
+    assert sum((count - 100) ** 2 / 100 for count in counts.values()) < 20.5
+
+
+def test_orders_of_the_parts_are_independent():
+    """First liquid (3) and first delay (7) of 2100 participants, a 3 × 7 table: χ², 12 degrees of freedom, p 0.001."""
+    table: Counter[tuple[str, str]] = Counter()
+    for number in range(2100):
+        schedule = build_schedule(REK, f"P{number}", 3)
+        table[codes(schedule, "liquids")[0], codes(schedule, "delays")[0]] += 1
+    rows, columns = Counter(), Counter()
+    for (liquid, delay), count in table.items():
+        rows[liquid] += count
+        columns[delay] += count
+    expected = {(row, column): rows[row] * columns[column] / 2100 for row in rows for column in columns}
+    assert sum((table[cell] - mean) ** 2 / mean for cell, mean in expected.items()) < 32.9
+
+
+def edited(old: str, new: str):
+    assert SOUND.count(old) == 1
+    return parse(SOUND.replace(old, new).encode(), "small.toml")
+
+
+@given(seeds)
+def test_a_draw_more_in_one_stream_moves_no_other(seed: int):
+    before = build_schedule(SMALL, "P1", seed)
+    more_repetitions = build_schedule(edited("repetitions = 2", "repetitions = 3"), "P1", seed)
+    assert codes(more_repetitions, "feel")[:4] == codes(before, "feel")
+    assert codes(more_repetitions, "look") == codes(before, "look")
+    shuffled_items = build_schedule(
+        edited('scale = "agreement"', 'scale = "agreement"\nitem_order = "shuffled"'), "P1", seed
+    )
+    assert [trial.code for trial in shuffled_items.trials] == [trial.code for trial in before.trials]
+    assert {trial.items for trial in before.trials} == {(), ("warm", "cold")}
+    assert {tuple(sorted(trial.items)) for trial in shuffled_items.trials} == {(), ("cold", "warm")}
+
+
+def test_item_orders_vary_between_trials_where_they_are_shuffled():
+    shuffled = edited('scale = "agreement"', 'scale = "agreement"\nitem_order = "shuffled"')
+    orders = {trial.items for number in range(10) for trial in build_schedule(shuffled, f"P{number}", 1).trials}
+    assert orders == {(), ("warm", "cold"), ("cold", "warm")}
+
+
+def test_a_fixed_order_is_as_written():
+    fixed = edited('order = "shuffled"\nrepetitions = 2', "repetitions = 2")
+    for seed in range(20):
+        assert codes(build_schedule(fixed, "P1", seed), "feel") == ["L1", "L2", "L1", "L2"]
+        assert draw_key(fixed, stream(seed, "key").random)["feel"] == {"L1": "is_thin", "L2": "is_thick"}
+
+
+@given(seeds)
+def test_the_key_is_a_bijection(seed: int):
+    for protocol in (REK, SMALL):
+        key = draw_key(protocol, stream(seed, "key").random)
+        assert set(key) == set(protocol.blocks)
+        for name, block in protocol.blocks.items():
+            assert tuple(key[name]) == block_codes(block)
+            assert sorted(key[name].values()) == sorted(block.conditions)
+
+
+def test_every_key_is_drawn():
+    keys = Counter(tuple(draw_key(REK, stream(seed, "key").random)["liquids"].values()) for seed in range(600))
+    assert len(keys) == 6
+    assert sum((count - 100) ** 2 / 100 for count in keys.values()) < 20.5
+
+
+@given(st.lists(st.integers(), max_size=20), seeds)
+def test_a_shuffle_keeps_what_it_shuffles(items: list[int], seed: int):
+    assert Counter(shuffle(items, stream(seed, "any").random)) == Counter(items)
+
+
+def test_a_shuffle_reaches_both_ends_of_the_draw():
+    assert shuffle("abc", lambda: 0.0) == ("b", "c", "a")
+    assert shuffle("abc", lambda: 1 - 2**-53) == ("a", "b", "c")
+    assert shuffle("", lambda: 0.0) == ()
+
+
+def test_labels_are_neutral_and_in_the_participants_language():
+    trials = build_schedule(REK, "P001", 1).trials
+    labels = [trial.label(REK, "en") for trial in trials]
+    assert labels == [
+        "Practice",
+        *(f"Liquid setting {index}" for index in (1, 2, 3)),
+        "Baseline",
+        *(f"Delay setting {index}" for index in range(1, 8)),
+    ]
+    assert trials[1].label(REK, "nl") == "Vloeistofinstelling 1"
+
+
+def test_a_schedule_names_no_condition():
+    schedule = build_schedule(REK, "P001", 1)
+    blinded = [trial for trial in schedule.trials if trial.phase == "main"]
+    for name in (*REK.conditions, *REK.liquids):
+        for trial in blinded:
+            assert name not in repr(trial).replace("like_" + name, "")
+
+
+def test_trials_are_values():
+    trial = build_schedule(REK, "P001", 1).trials[0]
+    assert isinstance(trial, Trial)
+    assert trial in {trial}
+
+
+def of_six(order: str, more: str = "") -> Protocol:
+    """The small protocol with six conditions, their blocks' order, and what else the block says."""
+    names = [f"c{number}" for number in range(6)]
+    tables = "".join(f'[conditions.{name}]\nliquid = "thin"\ndelay_ms = {ms}\n' for ms, name in enumerate(names))
+    listed = ", ".join(f'"{name}"' for name in names)
+    text = SOUND.replace('["is_thin", "is_thick"]', f"[{listed}]").replace(
+        "[tasks.explore]", f"{tables}[tasks.explore]"
+    )
+    return parse(text.replace(ORDER, f'order = "{order}"\n{more}').encode(), "six.toml")
+
+
+@pytest.mark.parametrize("order", ["williams", "latin"])
+@given(seed=seeds)
+def test_rows_do_not_depend_on_the_seed(order: str, seed: int):
+    protocol = of_six(order)
+    assert codes(build_schedule(protocol, "P007", seed), "feel") == codes(build_schedule(protocol, "P007", 1), "feel")
+
+
+def test_six_participants_meet_each_code_in_each_place_and_after_each_other():
+    protocol = of_six("williams")
+    shown = [codes(build_schedule(protocol, f"P{number:03d}", number), "feel") for number in range(7, 13)]
+    assert all(len(set(place)) == 6 for place in zip(*shown, strict=True))
+    assert len({pair for order in shown for pair in pairwise(order)}) == 6 * 5
+
+
+def test_dealt_orders_are_the_same_on_every_machine():
+    shown = [codes(build_schedule(of_six("williams"), f"P00{number}", 1), "feel") for number in (1, 2)]
+    assert [" ".join(order) for order in shown] == ["L4 L5 L3 L6 L2 L1", "L6 L1 L5 L2 L4 L3"]
+    assert " ".join(codes(build_schedule(of_six("latin"), "P001", 1), "feel")) == "L4 L5 L6 L1 L2 L3"
+
+
+@given(seeds, participants)
+def test_constrained_orders_keep_their_constraint_over_all_repetitions(seed: int, participant: str):
+    protocol = of_six("constrained", "repetitions = 3\nmin_distance = 4")
+    order = codes(build_schedule(protocol, participant, seed), "feel")
+    assert Counter(order) == dict.fromkeys(("L1", "L2", "L3", "L4", "L5", "L6"), 3)
+    assert Constraint(min_distance=4).holds(order)
+
+
+def test_constrained_orders_differ_between_participants_and_seeds():
+    protocol = of_six("constrained", "repetitions = 3\nmin_distance = 4")
+    orders = {tuple(codes(build_schedule(protocol, f"P{n}", seed), "feel")) for n in range(10) for seed in range(10)}
+    assert len(orders) == 100
+
+
+BREAKS = """
+[pages.pause]
+kind = "break"
+title = { en = "Rest", nl = "Rust" }
+body = { en = "Let go.", nl = "Laat los." }
+
+[blocks.warm_up]
+"""
+
+
+def with_breaks(every: int) -> Protocol:
+    text = SOUND.replace(ORDER, f'{ORDER}\nbreak_every = {every}\nbreak_page = "pause"')
+    return parse(text.replace("[blocks.warm_up]\n", BREAKS).encode(), "small.toml")
+
+
+@pytest.mark.parametrize(
+    ("every", "expected"),
+    [
+        (1, "1 pause 2 pause 3 pause 4"),
+        (2, "1 2 pause 3 4"),
+        (3, "1 2 3 pause 4"),
+    ],
+)
+def test_breaks_come_between_trials_and_not_after_the_last(every: int, expected: str):
+    protocol = with_breaks(every)
+    steps = build_schedule(protocol, "P001", 1).steps
+    in_block = [
+        step.page_id if isinstance(step, PageStep) else str(step.index)
+        for step in steps
+        if step == PageStep("pause") or (isinstance(step, Trial) and step.block == "feel")
+    ]
+    assert in_block == expected.split()
+    assert in_block.count("pause") == protocol.blocks["feel"].breaks
+    assert build_schedule(protocol, "P001", 1).trials == build_schedule(SMALL, "P001", 1).trials
+
+
+def test_a_page_of_breaks_can_stand_in_the_sequence_too():
+    text = SOUND.replace(ORDER, f'{ORDER}\nbreak_every = 2\nbreak_page = "pause"').replace(
+        '"feel", ', '"feel", "pause", '
+    )
+    protocol = parse(text.replace("[blocks.warm_up]\n", BREAKS).encode(), "small.toml")
+    assert build_schedule(protocol, "P001", 1).steps.count(PageStep("pause")) == 2
+
+
+@given(seeds, participants)
+def test_a_schedule_needs_no_more_than_its_orders(seed: int, participant: str):
+    for protocol in (REK, SMALL):
+        assert build_schedule(orders_of(protocol), participant, seed) == build_schedule(protocol, participant, seed)

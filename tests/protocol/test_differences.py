@@ -1,0 +1,134 @@
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+
+from study_app.protocol.differences import CONDITIONS_DIFFER, differences
+from study_app.protocol.load import load, parse
+from study_app.protocol.model import Protocol
+from study_app.store.receipt import without_conditions
+from tests.protocol.cases import ORDER, SOUND
+
+SMALL = parse(SOUND.encode(), "small")
+
+
+def edited(*edits: tuple[str, str]) -> Protocol:
+    text = SOUND
+    for old, new in edits:
+        assert text.count(old) == 1, old
+        text = text.replace(old, new)
+    return parse(text.encode(), "small")
+
+
+def kept(protocol: Protocol) -> dict[str, Any]:
+    """Return the protocol as it comes back from a receipt on disk."""
+    return json.loads(json.dumps(without_conditions(protocol)))  # type: ignore[no-any-return]
+
+
+@pytest.mark.parametrize("protocol", [SMALL, load("rek2024"), load("demo")])
+def test_a_protocol_does_not_differ_from_itself_nor_from_its_receipt(protocol: Protocol):
+    assert differences(protocol, protocol) == ()
+    assert differences(kept(protocol), protocol) == ()
+    assert differences(protocol, kept(protocol)) == ()
+    assert differences(kept(protocol), kept(protocol)) == ()
+
+
+def test_a_receipt_that_does_not_say_what_a_block_compares_differs_in_nothing():
+    earlier = kept(SMALL)
+    for block in earlier["blocks"].values():
+        del block["compares"]
+    assert differences(earlier, SMALL) == ()
+    assert differences(earlier, kept(SMALL)) == ()
+
+
+def test_comments_and_layout_are_no_difference():
+    assert differences(SMALL, edited(("format = 1", "# anew\nformat   =   1"))) == ()
+
+
+@pytest.mark.parametrize(
+    ("edits", "expected"),
+    [
+        ([("repetitions = 2", "repetitions = 3")], ["blocks.feel.repetitions: 2 before, 3 now"]),
+        ([("force_limit_n = 8", "force_limit_n = 7.5")], ["device.force_limit_n: 8 before, 7.5 now"]),
+        ([("dwell_s = 0.5", "dwell_s = 0.5000001")], ["tasks.reach.dwell_s: another text or number"]),
+        ([('en = "Read this."', 'en = "Read that."')], ['pages.hello.body.en: "Read this." before, "Read that." now']),
+        (
+            [(ORDER, 'order = "constrained"\nmax_repeats = 1\nrepetitions = 2')],
+            ['blocks.feel.order: "shuffled" before, "constrained" now', "blocks.feel.max_repeats: new, 1"],
+        ),
+        ([("[30, 0, 0]", "[31, 0, 0]")], ["tasks.reach.targets_mm.2.1: 30 before, 31 now"]),
+        ([("[30, 0, 0],", "[30, 0, 0], [0, 20, 0],")], ["tasks.reach.targets_mm: 2 entries before, 3 now"]),
+        ([('"hello", "warm_up"', '"warm_up", "hello"')], [
+            'sequence.1: "hello" before, "warm_up" now',
+            'sequence.2: "warm_up" before, "hello" now',
+        ]),
+        ([('id = "cold"', 'id = "tepid"')], [
+            "questionnaires.short.items.cold: gone, it was a table",
+            "questionnaires.short.items.tepid: new, a table",
+        ]),
+        ([('en = "It is cold."', 'en = "It is icy."')], [
+            'questionnaires.short.items.cold.text.en: "It is cold." before, "It is icy." now',
+        ]),
+    ],
+)  # fmt: skip
+def test_what_differs_is_named_with_its_place(edits: list[tuple[str, str]], expected: list[str]):
+    assert list(differences(SMALL, edited(*edits))) == expected
+    assert list(differences(kept(SMALL), kept(edited(*edits)))) == expected
+
+
+def test_items_in_another_order_are_said_to_be_just_that():
+    before, warm, cold = SOUND.split("[[questionnaires.short.items]]\n")
+    cold, after = cold.split("[pages.hello]", 1)
+    parts = (before, cold, warm, f"\n[pages.hello]{after}")
+    turned = "[[questionnaires.short.items]]\n".join(parts[:3]) + parts[3]
+    assert differences(SMALL, parse(turned.encode(), "small")) == ("questionnaires.short.items: in another order",)
+
+
+SECRET = SOUND.replace("1400", "1013.7").replace("is_thick", "spinach").replace("delay_ms = 120", "delay_ms = 137")
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("density_kg_m3 = 1013.7", "density_kg_m3 = 1013.8"),
+        ("delay_ms = 137", "delay_ms = 138"),
+        ('["is_thin", "spinach"]', '["spinach", "is_thin"]'),
+        ('conditions = ["on_time", "both"]', 'conditions = ["both", "on_time"]'),
+        ("[liquids.other]", "[liquids.more]\ndensity_kg_m3 = 137\n[liquids.other]"),
+    ],
+)
+def test_of_conditions_nothing_is_told_but_that_they_differ(old: str, new: str):
+    assert SECRET.count(old) == 1
+    before, after = (parse(text.encode(), "secret") for text in (SECRET, SECRET.replace(old, new)))
+    assert differences(before, after) == (CONDITIONS_DIFFER,)
+    assert differences(kept(before), after) == ()
+
+
+def test_conditions_of_an_opened_key_are_compared():
+    tables = SMALL.model_dump(mode="json", include={"conditions", "liquids"})
+    opened = {**kept(SMALL), **tables}
+    assert differences(opened, SMALL) == ()
+    assert differences(opened, edited(("delay_ms = 120", "delay_ms = 121"))) == (CONDITIONS_DIFFER,)
+
+
+def test_a_condition_more_is_told_by_its_code():
+    more = edited(('["is_thin", "is_thick"]', '["is_thin", "is_thick", "on_time"]'))
+    assert differences(SMALL, more) == ("blocks.feel.codes: 2 entries before, 3 now", CONDITIONS_DIFFER)
+    assert differences(kept(SMALL), more) == ("blocks.feel.codes: 2 entries before, 3 now",)
+
+
+def test_keys_that_an_older_receipt_does_not_know_are_no_difference_while_unused():
+    older = kept(SMALL)
+    for block in older["blocks"].values():
+        for key in ("max_repeats", "min_distance", "break_every", "break_page"):
+            del block[key]
+    assert differences(older, SMALL) == ()
+
+
+def test_the_arguments_are_left_as_they_were():
+    receipt = {**kept(SMALL), **SMALL.model_dump(mode="json", include={"conditions", "liquids"})}
+    before = json.dumps(receipt)
+    differences(receipt, SMALL)
+    assert json.dumps(receipt) == before

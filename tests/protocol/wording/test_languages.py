@@ -1,0 +1,68 @@
+from __future__ import annotations
+
+import dataclasses
+import string
+
+import pytest
+
+from study_app.errors import StudyError
+from study_app.protocol.wording.languages import LANGUAGES, Words, words
+
+
+def slots(text: str) -> set[str]:
+    return {name for _, name, _, _ in string.Formatter().parse(text) if name is not None}
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_every_word_is_there_in_every_language(language: str):
+    assert words(language).language == language
+    for field in dataclasses.fields(Words):
+        value = getattr(words(language), field.name)
+        assert value, field.name
+        assert all(part == part.strip() and part for part in ([value] if isinstance(value, str) else value))
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_templates_have_the_same_slots_in_every_language(language: str):
+    for field in dataclasses.fields(Words):
+        if field.type == "str":
+            assert slots(getattr(words(language), field.name)) == slots(getattr(words("en"), field.name)), field.name
+
+
+def test_only_languages_written_so_run_from_right_to_left():
+    assert {language for language in LANGUAGES if words(language).right_to_left} == {"ar"}
+
+
+def test_translations_differ():
+    same = {f.name for f in dataclasses.fields(Words) if getattr(words("en"), f.name) == getattr(words("nl"), f.name)}
+    assert same == {"enter_key", "escape_key"}
+
+
+@pytest.mark.parametrize(
+    ("language", "numbers", "sentence"),
+    [
+        ("en", [5], "One statement still needs an answer: 5."),
+        ("en", [5, 8], "Two statements still need an answer: 5 and 8."),
+        ("en", [1, 2, 9], "Three statements still need an answer: 1, 2 and 9."),
+        ("en", list(range(1, 12)), "11 statements still need an answer: 1, 2, 3, 4, 5, 6, 7, 8, 9, 10 and 11."),
+        ("nl", [5], "Eén uitspraak heeft nog een antwoord nodig: 5."),
+        ("nl", [5, 8], "Twee uitspraken hebben nog een antwoord nodig: 5 en 8."),
+        ("de", [5, 8], "Zwei Aussagen brauchen noch eine Antwort: 5 und 8."),
+        ("fr", [5], "Une affirmation attend encore une réponse : 5."),
+    ],
+)
+def test_the_sentence_about_missing_answers(language: str, numbers: list[int], sentence: str):
+    assert words(language).missing(numbers) == sentence
+
+
+def test_templates_fill():
+    english = words("en")
+    assert english.part.format(part=1, parts=2) == "Part 1 of 2"
+    assert english.setting.format(label="Liquid setting 1", of=3) == "Liquid setting 1 of 3"
+    assert english.answered.format(done=7, of=9) == "7 of 9 answered"
+    assert english.joined([]) == ""
+
+
+def test_a_language_without_words_is_refused():
+    with pytest.raises(StudyError, match=r'in "sv" \(known: ar, de, en, fr, nl\)'):
+        words("sv")
