@@ -16,6 +16,7 @@ from PySide6.QtCore import QEventLoop, QTimer
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QApplication
 
+from study_app.devices.rig import open_machine
 from study_app.errors import SessionError, StudyError
 from study_app.evaluation.accuracy.race import machine as machine_here
 from study_app.evaluation.timing.delays import BESIDE, DELAYS_S, VIRTUAL_HZ, Delayed, Shown
@@ -27,7 +28,6 @@ from study_app.gui.choices import NewSession
 from study_app.gui.collector import collecting_here
 from study_app.gui.ending import ended_from_outside
 from study_app.gui.graphics import WITHOUT_OPENGL
-from study_app.gui.machine import open_machine
 from study_app.gui.screens import choose_screens
 from study_app.gui.session_windows import open_windows
 from study_app.gui.theme import LIGHT

@@ -22,6 +22,7 @@ from study_app.app.crash_trace import CrashTrace
 from study_app.app.devices import diagnosis
 from study_app.app.machine import described, screen_number, settings_here, text_scale_on
 from study_app.devices import is_falcon, kind_of
+from study_app.devices.rig import Machine, open_machine
 from study_app.errors import SessionError, StudyError
 from study_app.gui.application import application_here
 from study_app.gui.beginning import Ready, measured, open_store
@@ -29,7 +30,6 @@ from study_app.gui.choices import NewSession
 from study_app.gui.collector import collecting_here
 from study_app.gui.dialogs import Notice
 from study_app.gui.ending import ended_from_outside
-from study_app.gui.machine import Machine, open_machine
 from study_app.gui.opening import OpeningWindow
 from study_app.gui.screens import choose_screens, place
 from study_app.gui.theme import LIGHT, Theme

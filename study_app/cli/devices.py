@@ -18,10 +18,10 @@ import click
 from study_app.cli.words import EXIT_FOUND
 
 if TYPE_CHECKING:
-    from study_app.devices.falcon.calibration import Calibration
     from study_app.devices.falcon.device import FalconDevice
-    from study_app.devices.falcon.emulator.face import Emulator
-    from study_app.devices.falcon.weighing import Ask, Notes
+    from study_app.devices.falcon.doctor.weighing import Ask, Notes
+    from study_app.devices.falcon.emulator.emulator import Emulator
+    from study_app.devices.falcon.mechanics.calibration import Calibration
 
 _WIDTH = 100
 _PREPARING = "Preparing …"
@@ -61,8 +61,8 @@ def doctor(name: str, firmware: Path | None, faults: tuple[str, ...], to: Path |
     file holds this report, versions, settings, log and last error; no participant's id, no answer, no liquid's value.
     """
     click.echo(_PREPARING)  # what is imported and compiled next takes long the first time
-    from study_app.devices.falcon.doctor import examine
-    from study_app.devices.falcon.findings import lines, report
+    from study_app.devices.falcon.doctor.examine import examine
+    from study_app.devices.falcon.doctor.failure_report import lines, report
 
     found = report(examine(name, firmware=firmware, faults=faults, tell=click.echo))
     for line in lines(found):
@@ -91,8 +91,9 @@ def calibrate(name: str, firmware: Path | None, grams: float | None, *, scale: b
     if scale == (grams is not None):
         raise click.UsageError("calibrate needs either --grams G, a weight to hang on the grip, or --scale")
     click.echo(_PREPARING)
-    from study_app.devices.falcon import calibration, weighing
-    from study_app.devices.falcon.geometry import DEFAULT_GEOMETRY, geometry_named
+    from study_app.devices.falcon.doctor import weighing
+    from study_app.devices.falcon.mechanics import calibration
+    from study_app.devices.falcon.mechanics.geometry import DEFAULT_GEOMETRY, geometry_named
 
     measures = geometry_named(geometry or DEFAULT_GEOMETRY)
     device, emulator = _falcon(name, firmware, grams)
@@ -119,7 +120,7 @@ def _falcon(name: str, firmware: Path | None, grams: float | None) -> tuple[Falc
     from study_app.devices import kind_of
     from study_app.devices.falcon.device import FalconDevice
     from study_app.devices.falcon.emulated import EmulatedFalcon
-    from study_app.devices.falcon.emulator.face import Emulator
+    from study_app.devices.falcon.emulator.emulator import Emulator
     from study_app.errors import DeviceError
 
     kind = kind_of(name)
@@ -136,7 +137,7 @@ def _falcon(name: str, firmware: Path | None, grams: float | None) -> tuple[Falc
 
 def _calibrated(found: Calibration, notes: Notes) -> list[str]:
     """Return what was found, and what it leaves of each rest."""
-    from study_app.devices.falcon.calibration import UNCALIBRATED_UNITS_PER_NM, left_over
+    from study_app.devices.falcon.mechanics.calibration import UNCALIBRATED_UNITS_PER_NM, left_over
 
     lines = ["", "rest  load [N]  unexplained x, y, z [N]"]
     for number, (load, left) in enumerate(

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import click
 
 if TYPE_CHECKING:
-    from study_app.devices.falcon.emulator.face import Emulator
+    from study_app.devices.falcon.emulator.emulator import Emulator
 
 
 @click.command("emulate-falcon")
@@ -30,12 +30,12 @@ def emulate_falcon(
     """Serve an emulated Falcon to other programs, in real time, until Ctrl-C.
 
     It answers as the USB bridge does, from the boot loader on, in the framing that
-    study_app/devices/falcon/framing.py describes; --device falcon-socket:PATH puts our own driver there.
+    study_app/devices/falcon/transport/socket_frames.py describes; --device falcon-socket:PATH puts our own driver there.
     Lights, homing and torques are printed as they change, on a terminal only.
     """
-    from study_app.devices.falcon.emulator.face import Emulator
-    from study_app.devices.falcon.emulator.server import EmulatorServer
-    from study_app.devices.falcon.geometry import DEFAULT_GEOMETRY
+    from study_app.devices.falcon.emulator.emulator import Emulator
+    from study_app.devices.falcon.emulator.socket_server import EmulatorServer
+    from study_app.devices.falcon.mechanics.geometry import DEFAULT_GEOMETRY
 
     random = Random(seed)  # noqa: S311 - tremor and faults keep no secrets
     emulator = Emulator(random, geometry=geometry or DEFAULT_GEOMETRY, running=running, serial=serial)
@@ -64,9 +64,9 @@ def _teller(emulator: Emulator) -> Callable[[], None]:
 
 def state_of(emulator: Emulator) -> str:
     """Return lights, homing and torques in a line."""
-    from study_app.devices.falcon import wire
+    from study_app.devices.falcon.wire import constants
 
-    names = {wire.FLAG_RED: "red", wire.FLAG_GREEN: "green", wire.FLAG_BLUE: "blue"}
+    names = {constants.FLAG_RED: "red", constants.FLAG_GREEN: "green", constants.FLAG_BLUE: "blue"}
     lights = ", ".join(name for flag, name in names.items() if emulator.lights & flag) or "none"
     torques = ", ".join(str(torque) for torque in emulator.torques)
     if not emulator.powered:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 _DEVICES = {
     "mouse": ("study_app.devices.mouse", "MouseDevice"),
     "falcon": ("study_app.devices.falcon.device", "FalconDevice"),
-    "spacemouse": ("study_app.devices.spacemouse", "SpaceMouseDevice"),
+    "spacemouse": ("study_app.devices.spacemouse.device", "SpaceMouseDevice"),
     "scripted": ("study_app.devices.scripted", "ScriptedDevice"),
     "falcon-emulated": ("study_app.devices.falcon.emulated", "EmulatedFalcon"),
 }

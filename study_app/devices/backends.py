@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any, Final
 
-from study_app.devices.falcon.diagnosis import BY_ID
+from study_app.devices.falcon.failure_modes import BY_ID
 from study_app.errors import DeviceError
 
 READY: Final = "ready"
@@ -60,7 +60,7 @@ def _falcon(usb: Any, platform: str) -> Backend:
     can = "felt, up to 8 N; needs its firmware after it was switched on, and homing"
     import libusb_package  # noqa: PLC0415 - loads libusb
 
-    from study_app.devices.falcon.transport import find_falcons, serial_of  # noqa: PLC0415 - likewise
+    from study_app.devices.falcon.transport.transport import find_falcons, serial_of  # noqa: PLC0415 - likewise
 
     by = f"libusb {_version('libusb-package')}"
     usb = usb if usb is not None else libusb_package.get_libusb1_backend()
@@ -82,7 +82,7 @@ def _falcon_by_ftdi(d2xx: Any, platform: str) -> Backend:
     if platform != "win32":
         return Backend("falcon", "ftd2xx", NOT_HERE, can, "for Windows alone, where drivers keep libusb out")
     from study_app.devices.falcon.failures import UsbFailure  # noqa: PLC0415 - not needed elsewhere
-    from study_app.devices.falcon.transport_ftdi import load_d2xx  # noqa: PLC0415 - likewise
+    from study_app.devices.falcon.transport.ftdi import load_d2xx  # noqa: PLC0415 - likewise
 
     try:
         load_d2xx() if d2xx is None else d2xx
@@ -93,7 +93,7 @@ def _falcon_by_ftdi(d2xx: Any, platform: str) -> Backend:
 
 def _spacemouse(hid: Any) -> Backend:
     can = "seen, not felt: how far its cap is pushed is how fast the ball is drawn along"
-    from study_app.devices.spacemouse_hid import find_space_mice, load_hid  # noqa: PLC0415 - loads numpy
+    from study_app.devices.spacemouse.hid import find_space_mice, load_hid  # noqa: PLC0415 - loads numpy
 
     by = f"hidapi {_version('hidapi')}"
     try:

@@ -7,8 +7,8 @@ free space it follows smoothly, 20 ms behind (two low-passes of 10 ms, which mak
 
 from __future__ import annotations
 
-from study_app.devices.hand import POINT
-from study_app.devices.simulated import SimulatedDevice
+from study_app.devices.simulated.hand import POINT
+from study_app.devices.simulated.simulated_device import SimulatedDevice
 from study_app.haptics.kernels.plant import new_handle
 
 MASS_KG = 0.2

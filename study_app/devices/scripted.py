@@ -5,7 +5,7 @@ from __future__ import annotations
 from random import Random
 from typing import Any
 
-from study_app.devices.simulated import SimulatedDevice
+from study_app.devices.simulated.simulated_device import SimulatedDevice
 from study_app.haptics.kernels.plant import new_handle
 
 MASS_KG = 0.2

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from study_app.devices import is_falcon, is_simulated, kind_of
+from study_app.devices.rig import Machine
 from study_app.errors import DeviceError, SessionError
 from study_app.gui.choices import NewSession
-from study_app.gui.machine import Machine
 from study_app.protocol.model import Protocol
 from study_app.session.preflight import Facts, Screen
 from study_app.store.clock import SessionClock

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from study_app.devices import is_simulated, kind_of, moves_by_itself
-from study_app.devices.hand_orders import HandOrders, hand_of
 from study_app.devices.mouse import MouseDevice
+from study_app.devices.simulated.hand_commands import HandOrders, hand_of
 from study_app.gui.bridge import SessionBridge
 from study_app.gui.devices.view import TITLES
 from study_app.gui.graphics import has_card
@@ -31,8 +31,8 @@ from study_app.store.sealing import opened
 
 if TYPE_CHECKING:
     from study_app.devices.base import Device
+    from study_app.devices.rig import Machine
     from study_app.gui.choices import NewSession
-    from study_app.gui.machine import Machine
     from study_app.gui.theme import Theme
     from study_app.haptics.runtime.servo import Servo
     from study_app.store.open_session import SessionStore

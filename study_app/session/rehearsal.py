@@ -21,7 +21,7 @@ from typing import Any, Self
 import numpy as np
 
 from study_app.devices import moves_by_itself, open_device
-from study_app.devices.hand_orders import hand_of
+from study_app.devices.simulated.hand_commands import hand_of
 from study_app.errors import SessionError, StoreError
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.pack import elements_needed

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from study_app.devices.hand_orders import HandOrders
+from study_app.devices.simulated.hand_commands import HandOrders
 from study_app.protocol.model import Explore, Reach
 from study_app.protocol.questions.simulated_answers import Felt, Rater, rate
 from study_app.session.pages import QuestionnairePage, TextPage

@@ -14,13 +14,13 @@ from typing import Any
 
 import numpy as np
 
-from study_app.devices.falcon.bulk import BULK, BulkCalls
 from study_app.devices.falcon.exchange import exchange_functions, new_exchange
-from study_app.devices.falcon.geometry import GEOMETRIES, SAFE_BOX_M, WORKSPACE_M
-from study_app.devices.falcon.kinematics import angles, forward, inverse, new_mechanism
-from study_app.devices.falcon.packets import FLAGS_AT, PARSER, STATUS, feed, pack, strip
+from study_app.devices.falcon.mechanics.geometry import GEOMETRIES, SAFE_BOX_M, WORKSPACE_M
+from study_app.devices.falcon.mechanics.kinematics import angles, forward, inverse, new_mechanism
 from study_app.devices.falcon.sending import push
-from study_app.devices.falcon.wire import ENDPOINT_IN, PACKET, ZERO
+from study_app.devices.falcon.transport.bulk_calls import BULK, BulkCalls
+from study_app.devices.falcon.wire.constants import ENDPOINT_IN, PACKET, ZERO
+from study_app.devices.falcon.wire.packets import FLAGS_AT, PARSER, STATUS, feed, pack, strip
 from study_app.haptics.kernels.c_functions import READ, WRITE, c_function, call_at, record_at
 from study_app.haptics.kernels.compiled import kernel
 from study_app.haptics.model.layout import new_command, new_reading, records

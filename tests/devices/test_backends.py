@@ -8,7 +8,7 @@ import pytest
 from study_app.devices import list_devices
 from study_app.devices.backends import NONE, NOT_HERE, READY, backends
 from study_app.devices.falcon.failures import UsbFailure
-from study_app.devices.spacemouse_reports import MODELS
+from study_app.devices.spacemouse.reports import MODELS
 
 
 def hid(*models):
@@ -17,7 +17,7 @@ def hid(*models):
 
 
 def bus(*emulators):
-    from study_app.devices.falcon.emulator.backend import EmulatedBackend
+    from study_app.devices.falcon.emulator.usb_backend import EmulatedBackend
 
     return EmulatedBackend(*emulators)
 
@@ -43,7 +43,7 @@ def test_without_hardware_each_says_what_is_missing():
 
 
 def test_what_is_connected_is_named():
-    from study_app.devices.falcon.emulator.face import Emulator
+    from study_app.devices.falcon.emulator.emulator import Emulator
 
     listed = by_name(usb=bus(Emulator(serial="FT1"), Emulator(serial="FT2")), hid=hid(MODELS[1], MODELS[1]))
     assert listed["falcon", "libusb"].state == "connected: FT1, FT2"
@@ -55,7 +55,7 @@ def test_what_is_connected_is_named():
     ("platform", "words"), [("linux", "this account"), ("win32", "driver"), ("darwin", "driver of FTDI")]
 )
 def test_one_that_does_not_tell_its_number_says_why_that_may_be(platform, words):
-    from study_app.devices.falcon.emulator.face import Emulator
+    from study_app.devices.falcon.emulator.emulator import Emulator
 
     emulator = Emulator()
     emulator.faults.on("access_denied")
@@ -72,12 +72,12 @@ def test_ftdis_driver_is_for_windows(monkeypatch):
     def missing():
         raise UsbFailure("no-ftd2xx", "loading FTDI's driver library")
 
-    monkeypatch.setattr("study_app.devices.falcon.transport_ftdi.load_d2xx", missing)
+    monkeypatch.setattr("study_app.devices.falcon.transport.ftdi.load_d2xx", missing)
     assert "install FTDI's D2XX driver" in by_name(platform="win32")["falcon", "ftd2xx"].why
 
 
 def test_a_hidapi_that_does_not_load_is_told(monkeypatch):
-    from study_app.devices import spacemouse_hid
+    from study_app.devices.spacemouse import hid as spacemouse_hid
 
     def missing(name):
         raise OSError(f"no {name}")

@@ -16,10 +16,10 @@ if numba.config.DISABLE_JIT:
 from study_app.cli import commands
 from study_app.cli.devices import _Terminal
 from study_app.devices import list_devices
-from study_app.devices.falcon.calibration import calibration_file, load
-from study_app.devices.falcon.diagnosis import MODES, UDEV_RULE
-from study_app.devices.falcon.doctor import examine
-from study_app.devices.falcon.emulator.face import Emulator
+from study_app.devices.falcon.doctor.examine import examine
+from study_app.devices.falcon.emulator.emulator import Emulator
+from study_app.devices.falcon.failure_modes import MODES, UDEV_RULE
+from study_app.devices.falcon.mechanics.calibration import calibration_file, load
 
 
 def liquid_study(*words, **options):
@@ -96,7 +96,7 @@ class TestDoctor:
 @pytest.mark.skipif(os.name == "nt", reason="no Unix sockets")
 class TestDoctorOverASocket:
     def serving(self, tmp_path, *faults):
-        from study_app.devices.falcon.emulator.server import EmulatorServer
+        from study_app.devices.falcon.emulator.socket_server import EmulatorServer
 
         emulator = Emulator(running=True)
         for fault in faults:
@@ -164,7 +164,7 @@ class TestCalibrate:
 
     @pytest.mark.skipif(os.name == "nt", reason="no Unix sockets")
     def test_an_operator_who_goes_away_ends_it_without_torque(self, tmp_path):
-        from study_app.devices.falcon.emulator.server import EmulatorServer
+        from study_app.devices.falcon.emulator.socket_server import EmulatorServer
 
         emulator = Emulator(running=True)
         with EmulatorServer(emulator, tmp_path / "falcon"):

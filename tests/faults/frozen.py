@@ -17,9 +17,9 @@ from pathlib import Path
 
 from study_app import app
 from study_app.app import live_session
+from study_app.devices.rig import Machine
 from study_app.gui import beginning
 from study_app.gui.application import application_here
-from study_app.gui.machine import Machine
 from study_app.gui.operator import OperatorWindow
 from study_app.gui.participant import ParticipantWindow
 from study_app.session.pages import PausePage, QuestionnairePage, TaskPage, TextPage

@@ -19,10 +19,10 @@ from PySide6.QtWidgets import QLabel
 
 from study_app import app
 from study_app.app import live_session
+from study_app.devices.rig import Machine
 from study_app.gui import beginning
 from study_app.gui.application import application_here
 from study_app.gui.dialogs import Notice
-from study_app.gui.machine import Machine
 from study_app.gui.operator import OperatorWindow
 from study_app.gui.operator.rail import StepLine
 from study_app.gui.participant import ParticipantWindow

@@ -13,9 +13,9 @@ from PySide6.QtTest import QTest
 
 from study_app import app
 from study_app.app import live_session
+from study_app.devices.rig import Machine
 from study_app.errors import StudyError
 from study_app.gui import beginning
-from study_app.gui.machine import Machine
 from study_app.gui.operator import OperatorWindow
 from study_app.gui.participant import ParticipantWindow
 from study_app.session.pages import PausePage, TaskPage

@@ -12,12 +12,12 @@ from typing import Final
 
 import numpy as np
 
-from study_app.devices.falcon import wire
-from study_app.devices.falcon.diagnosis import BY_ID, OPEN, Facts
+from study_app.devices.falcon.failure_modes import BY_ID, OPEN, Facts
 from study_app.devices.falcon.failures import FalconFailure, UsbFailure
 from study_app.devices.falcon.firmware import Firmware, check
-from study_app.devices.falcon.packets import PARSER, STATUS, feed, strip
-from study_app.devices.falcon.transport import Transport
+from study_app.devices.falcon.transport.transport import Transport
+from study_app.devices.falcon.wire import constants
+from study_app.devices.falcon.wire.packets import PARSER, STATUS, feed, strip
 from study_app.haptics.model.layout import records
 
 ATTEMPTS: Final = 10
@@ -69,7 +69,7 @@ class _Line:
 
     def __init__(self, transport: Transport) -> None:
         self._transport = transport
-        self._memory = np.zeros(wire.USB_PACKET, np.uint8)
+        self._memory = np.zeros(constants.USB_PACKET, np.uint8)
         self._parser, self._status = records(PARSER, 1), records(STATUS, 1)
 
     def until(self, complete: Callable[[bytes], bool], timeout_s: float, came: bytes = b"") -> bytes:
@@ -82,7 +82,7 @@ class _Line:
     def answers(self, timeout_s: float) -> bool:
         """Send a quiet packet; return whether a packet came back in time."""
         try:
-            self._transport.write(wire.quiet_packet(wire.FLAG_HOMING), timeout_s)
+            self._transport.write(constants.quiet_packet(constants.FLAG_HOMING), timeout_s)
         except UsbFailure as failure:
             if failure.kind == "timeout":
                 return False
@@ -94,7 +94,7 @@ class _Line:
         return False
 
     def _read(self, timeout_s: float) -> int:
-        raw = self._transport.read(wire.USB_PACKET, timeout_s)
+        raw = self._transport.read(constants.USB_PACKET, timeout_s)
         self._memory[: len(raw)] = np.frombuffer(raw, np.uint8)
         return int(strip(self._memory, len(raw), self._memory))
 
@@ -102,14 +102,14 @@ class _Line:
 def configure(transport: Transport) -> None:
     """Set the bridge as a Falcon that runs needs it, and forget what is in it."""
     _purge(transport)
-    transport.control(wire.REQUEST_LATENCY, wire.LATENCY_RUN_MS)
-    _set_line(transport, wire.BAUD_1500000)
+    transport.control(constants.REQUEST_LATENCY, constants.LATENCY_RUN_MS)
+    _set_line(transport, constants.BAUD_1500000)
     _purge(transport)
 
 
 def set_event_character(transport: Transport, on: bool) -> None:
     """Let the bridge send what it has as soon as a packet's last byte is in, or only when its timer runs out."""
-    transport.control(wire.REQUEST_EVENT_CHARACTER, wire.STOP | (wire.EVENT_ENABLED if on else 0))
+    transport.control(constants.REQUEST_EVENT_CHARACTER, constants.STOP | (constants.EVENT_ENABLED if on else 0))
 
 
 def is_running(transport: Transport) -> bool:
@@ -182,16 +182,16 @@ def _ping(transport: Transport) -> None:
     """Reset the processor by an edge of DTR, and call until its loader answers."""
     _purge(transport)
     set_event_character(transport, on=False)
-    transport.control(wire.REQUEST_LATENCY, wire.LATENCY_BOOT_MS)
-    _set_line(transport, wire.BAUD_9600)
-    for level in (wire.RTS_LOW, wire.DTR_LOW, wire.DTR_HIGH):
-        transport.control(wire.REQUEST_MODEM, level)
+    transport.control(constants.REQUEST_LATENCY, constants.LATENCY_BOOT_MS)
+    _set_line(transport, constants.BAUD_9600)
+    for level in (constants.RTS_LOW, constants.DTR_LOW, constants.DTR_HIGH):
+        transport.control(constants.REQUEST_MODEM, level)
     line = _Line(transport)
     came = b""
     for _ in range(PINGS):
-        _send(transport, wire.PING, "ping")
-        came = line.until(lambda data: wire.PONG in data, _PING_S, came)
-        if wire.PONG in came:
+        _send(transport, constants.PING, "ping")
+        came = line.until(lambda data: constants.PONG in data, _PING_S, came)
+        if constants.PONG in came:
             return
     heard = f"answers with {came[:8].hex(' ')}" if came else "does not answer"
     raise _Ended("ping", f"its boot loader {heard}", silent=not came)
@@ -199,12 +199,12 @@ def _ping(transport: Transport) -> None:
 
 def _time(transport: Transport) -> None:
     """Let the loader find the speed of the upload by the bits of an 'A'."""
-    transport.control(wire.REQUEST_MODEM, wire.DTR_LOW)
-    transport.control(wire.REQUEST_BAUD, wire.BAUD_142857)
+    transport.control(constants.REQUEST_MODEM, constants.DTR_LOW)
+    transport.control(constants.REQUEST_BAUD, constants.BAUD_142857)
     _purge(transport)
-    _send(transport, wire.AUTOBAUD, "autobaud")
-    came = _Line(transport).until(lambda data: data.endswith(wire.AUTOBAUD), _STEP_S)
-    if not came.endswith(wire.AUTOBAUD):
+    _send(transport, constants.AUTOBAUD, "autobaud")
+    came = _Line(transport).until(lambda data: data.endswith(constants.AUTOBAUD), _STEP_S)
+    if not came.endswith(constants.AUTOBAUD):
         heard = f"answers with {came[:8].hex(' ')}" if came else "does not answer"
         raise _Ended("autobaud", f"its boot loader {heard} to the byte that tells it the speed")
 
@@ -212,8 +212,8 @@ def _time(transport: Transport) -> None:
 def _upload(transport: Transport, firmware: bytes) -> None:
     """Send the firmware in pieces, and hear each come back as it went."""
     line = _Line(transport)
-    for at in range(0, len(firmware), wire.CHUNK):
-        chunk = firmware[at : at + wire.CHUNK]
+    for at in range(0, len(firmware), constants.CHUNK):
+        chunk = firmware[at : at + constants.CHUNK]
         _send(transport, chunk, "echo")
         _expect_echo(line, chunk, at)
 
@@ -239,12 +239,12 @@ def _send(transport: Transport, data: bytes, step: str) -> None:
 
 
 def _set_line(transport: Transport, divisor: int) -> None:
-    transport.control(wire.REQUEST_BAUD, divisor)
-    transport.control(wire.REQUEST_LINE, wire.LINE_8N1)
-    transport.control(wire.REQUEST_FLOW, 0)
+    transport.control(constants.REQUEST_BAUD, divisor)
+    transport.control(constants.REQUEST_LINE, constants.LINE_8N1)
+    transport.control(constants.REQUEST_FLOW, 0)
 
 
 def _purge(transport: Transport) -> None:
     """Forget what waits in the bridge, both ways."""
-    transport.control(wire.REQUEST_RESET, wire.PURGE_RX)
-    transport.control(wire.REQUEST_RESET, wire.PURGE_TX)
+    transport.control(constants.REQUEST_RESET, constants.PURGE_RX)
+    transport.control(constants.REQUEST_RESET, constants.PURGE_TX)

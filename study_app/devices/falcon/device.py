@@ -11,18 +11,19 @@ from typing import Any, Final, Self
 import numpy as np
 
 from study_app.devices.base import Device
-from study_app.devices.falcon import boot, calibration
-from study_app.devices.falcon.bulk import BulkCalls
-from study_app.devices.falcon.diagnosis import OPEN, Facts, sentence
+from study_app.devices.falcon import boot
 from study_app.devices.falcon.exchange import COUNTERS, LEAST_MASS_KG, exchange_functions, new_exchange
+from study_app.devices.falcon.failure_modes import OPEN, Facts, sentence
 from study_app.devices.falcon.failures import ProgramMissing, usb_failure
 from study_app.devices.falcon.firmware import check
-from study_app.devices.falcon.geometry import DEFAULT_GEOMETRY, WORKSPACE_M, geometry_named
 from study_app.devices.falcon.guard import Guard, quiet
 from study_app.devices.falcon.homing import PATIENCE_S, home
-from study_app.devices.falcon.kinematics import REACHED, count_at, inverse, new_mechanism
-from study_app.devices.falcon.transport import Transport, open_transport
-from study_app.devices.falcon.wire import ERROR_NO_DEVICE
+from study_app.devices.falcon.mechanics import calibration
+from study_app.devices.falcon.mechanics.geometry import DEFAULT_GEOMETRY, WORKSPACE_M, geometry_named
+from study_app.devices.falcon.mechanics.kinematics import REACHED, count_at, inverse, new_mechanism
+from study_app.devices.falcon.transport.bulk_calls import BulkCalls
+from study_app.devices.falcon.transport.transport import Transport, open_transport
+from study_app.devices.falcon.wire.constants import ERROR_NO_DEVICE
 from study_app.errors import DeviceError, DeviceLost
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.layout import new_command, new_reading

@@ -12,10 +12,10 @@ from random import Random
 from typing import Any
 
 from study_app.devices.falcon.device import FORCE_LIMIT_N, FalconDevice
-from study_app.devices.falcon.emulator.backend import EmulatedBackend
-from study_app.devices.falcon.emulator.face import Emulator
-from study_app.devices.falcon.geometry import WORKSPACE_M
-from study_app.devices.falcon.transport import PyUsbTransport, Transport
+from study_app.devices.falcon.emulator.emulator import Emulator
+from study_app.devices.falcon.emulator.usb_backend import EmulatedBackend
+from study_app.devices.falcon.mechanics.geometry import WORKSPACE_M
+from study_app.devices.falcon.transport.transport import PyUsbTransport, Transport
 
 _STILL_TURNS = 10  # between two strokes of homing it moves again sooner
 

@@ -15,13 +15,11 @@ import numpy as np
 from numba import types
 from numba.extending import intrinsic
 
-from study_app.devices.falcon.bulk import BULK, BulkCalls
-from study_app.devices.falcon.geometry import OUT_STROKE_M, Geometry
-from study_app.devices.falcon.kinematics import MECHANISM, REACHED, START_M, angles, forward
-from study_app.devices.falcon.packets import PARSER, STATUS, feed, pack, strip
-from study_app.devices.falcon.replies import believe, give_up_measurement, settle, trust
+from study_app.devices.falcon.mechanics.geometry import OUT_STROKE_M, Geometry
+from study_app.devices.falcon.mechanics.kinematics import MECHANISM, REACHED, START_M, angles, forward
 from study_app.devices.falcon.sending import may_wait, push
-from study_app.devices.falcon.wire import (
+from study_app.devices.falcon.transport.bulk_calls import BULK, BulkCalls
+from study_app.devices.falcon.wire.constants import (
     ENDPOINT_IN,
     ENDPOINT_OUT,
     ERROR_NO_DEVICE,
@@ -34,6 +32,8 @@ from study_app.devices.falcon.wire import (
     SUCCESS,
     USB_PACKET,
 )
+from study_app.devices.falcon.wire.packets import PARSER, STATUS, feed, pack, strip
+from study_app.devices.falcon.wire.replies import believe, give_up_measurement, settle, trust
 from study_app.haptics.kernels.c_functions import (
     READ,
     READ_LOST,

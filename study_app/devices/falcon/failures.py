@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from typing import Final
 
-from study_app.devices.falcon import wire
-from study_app.devices.falcon.diagnosis import Facts, sentence
+from study_app.devices.falcon.failure_modes import Facts, sentence
+from study_app.devices.falcon.wire import constants
 from study_app.errors import DeviceError, DeviceLost, DeviceNotFound
 
 KINDS: Final = {
-    wire.ERROR_IO: "io",
-    wire.ERROR_ACCESS: "access",
-    wire.ERROR_NO_DEVICE: "no-device",
-    wire.ERROR_NOT_FOUND: "not-found",
-    wire.ERROR_BUSY: "busy",
-    wire.ERROR_TIMEOUT: "timeout",
-    wire.ERROR_OVERFLOW: "overflow",
-    wire.ERROR_PIPE: "pipe",
-    wire.ERROR_NOT_SUPPORTED: "not-supported",
+    constants.ERROR_IO: "io",
+    constants.ERROR_ACCESS: "access",
+    constants.ERROR_NO_DEVICE: "no-device",
+    constants.ERROR_NOT_FOUND: "not-found",
+    constants.ERROR_BUSY: "busy",
+    constants.ERROR_TIMEOUT: "timeout",
+    constants.ERROR_OVERFLOW: "overflow",
+    constants.ERROR_PIPE: "pipe",
+    constants.ERROR_NOT_SUPPORTED: "not-supported",
 }
 FURTHER_KINDS: Final = ("kernel-driver", "no-backend", "no-ftd2xx")
 """What keeps it from being opened before libusb has a code for it."""

@@ -13,9 +13,9 @@ import struct
 from dataclasses import dataclass
 from typing import Final
 
-from study_app.devices.falcon.diagnosis import Facts
+from study_app.devices.falcon.failure_modes import Facts
 from study_app.devices.falcon.failures import ProgramMissing
-from study_app.devices.falcon.wire import BOOT_KEY
+from study_app.devices.falcon.wire.constants import BOOT_KEY
 
 _RESERVED_WORDS: Final = 8
 _HEADER_BYTES: Final = 2 * (1 + _RESERVED_WORDS + 2)

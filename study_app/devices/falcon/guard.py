@@ -18,8 +18,8 @@ from contextlib import suppress
 from types import TracebackType
 from typing import IO, Final, Self
 
-from study_app.devices.falcon.transport import Transport, open_transport
-from study_app.devices.falcon.wire import FLAG_HOMING, quiet_packet
+from study_app.devices.falcon.transport.transport import Transport, open_transport
+from study_app.devices.falcon.wire.constants import FLAG_HOMING, quiet_packet
 from study_app.errors import DeviceError
 from study_app.haptics.runtime.suspension import allow_suspension, refuse_suspension
 

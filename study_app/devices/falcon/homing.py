@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Final
 
-from study_app.devices.falcon.diagnosis import OPEN, Facts, sentence
+from study_app.devices.falcon.failure_modes import OPEN, Facts, sentence
 from study_app.devices.falcon.failures import FalconFailure
-from study_app.devices.falcon.replies import ALL_HOMED
+from study_app.devices.falcon.wire.replies import ALL_HOMED
 
 PATIENCE_S: Final = 120.0
 ADVICES: Final = 6  # so often, in that time, advice is given

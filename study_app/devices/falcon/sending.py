@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from typing import Any, Final
 
-from study_app.devices.falcon.kinematics import jacobian, motor_units, torques
+from study_app.devices.falcon.mechanics.kinematics import jacobian, motor_units, torques
 from study_app.haptics.kernels.compiled import kernel
 from study_app.haptics.kernels.passivity import SURE_MPS
 from study_app.haptics.kernels.vector import dot, square, square_distance

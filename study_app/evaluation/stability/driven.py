@@ -20,7 +20,7 @@ from typing import Any, Final
 import numpy as np
 
 from study_app.devices.falcon.emulated import EmulatedFalcon
-from study_app.devices.falcon.emulator.face import Emulator
+from study_app.devices.falcon.emulator.emulator import Emulator
 from study_app.devices.scripted import ScriptedDevice
 from study_app.evaluation.stability.bench import FORCE_LIMIT_N, lasts_s, new_bench
 from study_app.evaluation.stability.cases import GRIPS, LETS_GO, Case, scene_of

@@ -11,9 +11,9 @@ from PySide6.QtCore import QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QDialog, QFileDialog, QHBoxLayout, QProgressBar, QScrollArea, QVBoxLayout, QWidget
 
-from study_app.devices.falcon.diagnosis import Facts
-from study_app.devices.falcon.examination import Examination, Said
-from study_app.devices.falcon.findings import Report, findings_of, lines
+from study_app.devices.falcon.doctor.failure_report import Report, findings_of, lines
+from study_app.devices.falcon.doctor.worker import Examination, Said
+from study_app.devices.falcon.failure_modes import Facts
 from study_app.errors import StoreError
 from study_app.gui.cards import Card, Icon, Rule
 from study_app.gui.controls import ActionButton
@@ -30,7 +30,7 @@ SIZE = QSize(820, 700)
 
 
 class Examined(Protocol):
-    """What goes on elsewhere (see ``devices.falcon.examination.Examination``)."""
+    """What goes on elsewhere (see ``devices.falcon.doctor.worker.Examination``)."""
 
     def said(self) -> list[Said]: ...  # noqa: D102
     def close(self) -> None: ...  # noqa: D102

@@ -6,7 +6,7 @@ from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QColor, QGuiApplication, QPainter, QPaintEvent
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLineEdit, QVBoxLayout, QWidget
 
-from study_app.devices.falcon.findings import Finding, State
+from study_app.devices.falcon.doctor.failure_report import Finding, State
 from study_app.gui.cards import Chip, Tone
 from study_app.gui.controls import ActionButton
 from study_app.gui.labels import figures, label

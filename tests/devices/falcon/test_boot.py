@@ -7,7 +7,6 @@ if numba.config.DISABLE_JIT:
     pytest.skip("emulators are C functions", allow_module_level=True)
 
 from study_app.devices.falcon import boot as booting
-from study_app.devices.falcon import wire
 from study_app.devices.falcon.boot import (
     ATTEMPTS,
     PINGS,
@@ -18,10 +17,11 @@ from study_app.devices.falcon.boot import (
     measure_round_trip,
     set_event_character,
 )
-from study_app.devices.falcon.emulator.backend import EmulatedBackend
-from study_app.devices.falcon.emulator.face import ALL_HOMED, Emulator
+from study_app.devices.falcon.emulator.emulator import ALL_HOMED, Emulator
+from study_app.devices.falcon.emulator.usb_backend import EmulatedBackend
 from study_app.devices.falcon.failures import FalconLost, FalconNotFound, UsbFailure, usb_failure
-from study_app.devices.falcon.transport import PyUsbTransport
+from study_app.devices.falcon.transport.transport import PyUsbTransport
+from study_app.devices.falcon.wire import constants
 from study_app.errors import DeviceError
 from tests.devices.falcon.test_firmware import stream
 
@@ -38,7 +38,7 @@ class Wrong(PyUsbTransport):
         super().reopen()
 
     def control(self, request, value):
-        if request == wire.REQUEST_BAUD:
+        if request == constants.REQUEST_BAUD:
             value = dict(self.bauds).get(value, value)
         super().control(request, value)
 
@@ -85,9 +85,9 @@ def test_a_falcon_just_switched_on_is_loaded_and_answers(size):
 
 
 def test_a_chunk_of_whole_packets_is_no_special_case():
-    size = (wire.CHUNK * 10 - 22 - 6 - 2) // 2
+    size = (constants.CHUNK * 10 - 22 - 6 - 2) // 2
     data = stream(((0x3F8000, size),))
-    assert len(data) % wire.CHUNK == 0
+    assert len(data) % constants.CHUNK == 0
     emulator, transport = falcon()
     boot(transport, data)
     assert emulator.running
@@ -96,15 +96,19 @@ def test_a_chunk_of_whole_packets_is_no_special_case():
 def test_the_bridge_is_set_as_each_step_needs_it():
     emulator, transport = falcon()
     boot(transport, stream())
-    assert values(emulator, wire.REQUEST_BAUD) == [wire.BAUD_9600, wire.BAUD_142857, wire.BAUD_1500000]
-    assert values(emulator, wire.REQUEST_LATENCY) == [wire.LATENCY_BOOT_MS, wire.LATENCY_RUN_MS]
-    modem = [wire.RTS_LOW, wire.DTR_LOW, wire.DTR_HIGH, wire.DTR_LOW]
-    assert values(emulator, wire.REQUEST_MODEM) == modem
-    assert set(values(emulator, wire.REQUEST_LINE)) == {wire.LINE_8N1}
-    assert set(values(emulator, wire.REQUEST_FLOW)) == {0}
+    assert values(emulator, constants.REQUEST_BAUD) == [
+        constants.BAUD_9600,
+        constants.BAUD_142857,
+        constants.BAUD_1500000,
+    ]
+    assert values(emulator, constants.REQUEST_LATENCY) == [constants.LATENCY_BOOT_MS, constants.LATENCY_RUN_MS]
+    modem = [constants.RTS_LOW, constants.DTR_LOW, constants.DTR_HIGH, constants.DTR_LOW]
+    assert values(emulator, constants.REQUEST_MODEM) == modem
+    assert set(values(emulator, constants.REQUEST_LINE)) == {constants.LINE_8N1}
+    assert set(values(emulator, constants.REQUEST_FLOW)) == {0}
     order = [request for request, _ in itertools.groupby(request for request, _ in emulator.recorded)]
-    assert order[0] == wire.REQUEST_RESET  # what was in the bridge is forgotten first
-    assert wire.RESET_ALL not in values(emulator, wire.REQUEST_RESET)
+    assert order[0] == constants.REQUEST_RESET  # what was in the bridge is forgotten first
+    assert constants.RESET_ALL not in values(emulator, constants.REQUEST_RESET)
 
 
 def test_the_usual_size_takes_about_a_second_of_the_falcons_time():
@@ -121,7 +125,7 @@ def test_a_falcon_that_runs_is_left_as_it_is():
     configure(transport)
     assert is_running(transport)
     assert emulator.running
-    assert values(emulator, wire.REQUEST_MODEM) == []
+    assert values(emulator, constants.REQUEST_MODEM) == []
     assert emulator.highest_torque == 0
 
 
@@ -171,7 +175,7 @@ def test_what_is_still_in_the_bridge_does_no_harm():
     emulator, transport = falcon(running=True)
     configure(transport)
     for _ in range(5):
-        transport.write(wire.quiet_packet(), 0.1)
+        transport.write(constants.quiet_packet(), 0.1)
     transport.pause(0.01)  # five replies wait; then it is switched off and on
     emulator.power(False)
     emulator.power(True)
@@ -182,7 +186,7 @@ def test_what_is_still_in_the_bridge_does_no_harm():
 def test_replies_that_wait_do_not_make_a_dead_falcon_run():
     emulator, transport = falcon(running=True)
     configure(transport)
-    transport.write(wire.quiet_packet(), 0.1)
+    transport.write(constants.quiet_packet(), 0.1)
     transport.pause(0.01)
     emulator.power(False)
     configure(transport)
@@ -224,10 +228,10 @@ def test_more_pings_ignored_than_an_attempt_has_are_the_next_attempts():
 @pytest.mark.parametrize(
     ("taken", "given_", "step"),
     [
-        (wire.BAUD_9600, wire.BAUD_142857, "ping"),
-        (wire.BAUD_142857, wire.BAUD_9600, "autobaud"),
-        (wire.BAUD_142857, wire.BAUD_1500000, "autobaud"),
-        (wire.BAUD_1500000, wire.BAUD_142857, "start"),
+        (constants.BAUD_9600, constants.BAUD_142857, "ping"),
+        (constants.BAUD_142857, constants.BAUD_9600, "autobaud"),
+        (constants.BAUD_142857, constants.BAUD_1500000, "autobaud"),
+        (constants.BAUD_1500000, constants.BAUD_142857, "start"),
     ],
 )
 def test_a_wrong_speed_ends_the_step_that_it_is_of(taken, given_, step):
@@ -247,7 +251,7 @@ def test_a_wrong_echo_is_told_by_the_number_of_its_byte(at, monkeypatch):
 
     def write(self, chunk, timeout_s):
         nonlocal sent
-        if chunk in (wire.PING, wire.AUTOBAUD):
+        if chunk in (constants.PING, constants.AUTOBAUD):
             return before(self, chunk, timeout_s)
         if sent <= at < sent + len(chunk):  # all of the chunk up to the byte goes over, then its echo is spoilt
             spoilt = bytearray(chunk)
@@ -279,7 +283,7 @@ def test_an_echo_that_ends_is_told_by_the_byte_from_which_on_it_is_missing(monke
     before, chunks = PyUsbTransport.write, []
 
     def write(self, data, timeout_s):
-        if len(data) == wire.CHUNK:
+        if len(data) == constants.CHUNK:
             chunks.append(data)
         if len(chunks) == 3:
             emulator.power(False)
@@ -309,7 +313,7 @@ def test_what_is_no_firmware_is_not_sent():
 
 def test_a_bridge_that_takes_no_bytes_is_a_failed_attempt():
     _, transport = falcon()
-    transport.fails = usb_failure(wire.ERROR_TIMEOUT, "sending")
+    transport.fails = usb_failure(constants.ERROR_TIMEOUT, "sending")
     failure, _ = failing(transport, attempts=2)
     assert (failure.step, failure.reason) == ("ping", "the bridge does not take the bytes")
     configure(transport)
@@ -318,12 +322,12 @@ def test_a_bridge_that_takes_no_bytes_is_a_failed_attempt():
 
 def test_a_falcon_that_is_unplugged_is_not_waited_for():
     emulator, transport = falcon()
-    transport.fails = usb_failure(wire.ERROR_NO_DEVICE, "sending")
+    transport.fails = usb_failure(constants.ERROR_NO_DEVICE, "sending")
     with pytest.raises(FalconLost):
         boot(transport, stream())
     with pytest.raises(FalconLost):
         is_running(transport)
-    transport.fails = usb_failure(wire.ERROR_TIMEOUT, "sending")
+    transport.fails = usb_failure(constants.ERROR_TIMEOUT, "sending")
 
     def unplug(_line):
         emulator.faults.on("unplugged")
@@ -353,8 +357,8 @@ def test_the_event_character_and_the_timer_are_the_round_trip():
     assert 2 * 16 * 10 / 1.5e6 <= hastened_s < 0.5e-3
     assert 0.5e-3 < plain_s < 2.5e-3
     assert emulator.highest_torque == 0
-    expected = [wire.EVENT_ENABLED | wire.STOP, wire.STOP]
-    assert values(emulator, wire.REQUEST_EVENT_CHARACTER) == expected
+    expected = [constants.EVENT_ENABLED | constants.STOP, constants.STOP]
+    assert values(emulator, constants.REQUEST_EVENT_CHARACTER) == expected
 
 
 def test_a_few_lost_replies_do_not_move_the_median():

@@ -11,13 +11,13 @@ if numba.config.DISABLE_JIT:
 
 from study_app.devices.falcon import device as driver
 from study_app.devices.falcon.emulated import EmulatedFalcon
-from study_app.devices.falcon.emulator.face import Emulator
-from study_app.devices.falcon.wire import ENDPOINT_IN, ERROR_TIMEOUT
+from study_app.devices.falcon.emulator.emulator import Emulator
+from study_app.devices.falcon.wire.constants import ENDPOINT_IN, ERROR_TIMEOUT
 from study_app.errors import ServoFault
 from study_app.haptics.kernels.c_functions import READ_LOST
 from study_app.haptics.runtime import thread
 from study_app.haptics.runtime.servo import Servo
-from tests.devices.falcon.turns import BULK_CALL, torques_in
+from tests.devices.falcon.support.scripted_bridge import BULK_CALL, torques_in
 
 
 class HangingBridge:

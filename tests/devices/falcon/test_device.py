@@ -11,15 +11,17 @@ if numba.config.DISABLE_JIT:
     pytest.skip("devices are C functions", allow_module_level=True)
 
 from study_app.devices import open_device
-from study_app.devices.falcon import calibration, firmware, wire
 from study_app.devices.falcon import device as driver
-from study_app.devices.falcon.calibration import Calibration
+from study_app.devices.falcon import firmware
 from study_app.devices.falcon.emulated import EmulatedFalcon
-from study_app.devices.falcon.emulator.face import Emulator
+from study_app.devices.falcon.emulator.emulator import Emulator
 from study_app.devices.falcon.failures import FalconLost, UsbFailure
-from study_app.devices.falcon.geometry import GEOMETRIES, SAFE_BOX_M
 from study_app.devices.falcon.homing import PULL_OUT, READY, STROKES, NotHomed
-from study_app.devices.falcon.kinematics import REACHED, inverse, new_mechanism
+from study_app.devices.falcon.mechanics import calibration
+from study_app.devices.falcon.mechanics.calibration import Calibration
+from study_app.devices.falcon.mechanics.geometry import GEOMETRIES, SAFE_BOX_M
+from study_app.devices.falcon.mechanics.kinematics import REACHED, inverse, new_mechanism
+from study_app.devices.falcon.wire import constants
 from study_app.devices.scripted import STIFFNESS_NPM
 from study_app.errors import DeviceError
 from study_app.haptics.kernels.c_functions import READ_LOST, READ_NEW, READ_NOTHING_NEW
@@ -94,7 +96,7 @@ class TestOpening:
     def test_it_is_homed_by_a_hand_that_does_what_it_is_told(self, opened, told):
         assert told == [STROKES, PULL_OUT, READY]
         assert opened.hand.homed == 0b111
-        assert opened.hand.lights == wire.FLAG_GREEN
+        assert opened.hand.lights == constants.FLAG_GREEN
         assert opened.hand.highest_torque == 0
 
     def test_the_grip_is_back_in_the_middle(self, opened):

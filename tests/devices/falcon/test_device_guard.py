@@ -6,9 +6,9 @@ import pytest
 if numba.config.DISABLE_JIT:
     pytest.skip("devices are C functions", allow_module_level=True)
 
+from study_app.devices.falcon.doctor.weighing import Grip
 from study_app.devices.falcon.emulated import EmulatedFalcon
 from study_app.devices.falcon.homing import PULL_OUT
-from study_app.devices.falcon.weighing import Grip
 from study_app.errors import DeviceLost
 from study_app.haptics.kernels.c_functions import READ_LOST, READ_NEW
 from tests.devices.falcon.test_device import Turns, still

@@ -6,8 +6,7 @@ if numba.config.DISABLE_JIT:
     pytest.skip("the exchange is made of C functions", allow_module_level=True)
 
 from study_app.devices.falcon.exchange import RAMP_S
-from study_app.devices.falcon.packets import FLAGS_AT
-from study_app.devices.falcon.wire import (
+from study_app.devices.falcon.wire.constants import (
     ERROR_TIMEOUT,
     FLAG_BLUE,
     FLAG_GREEN,
@@ -17,8 +16,9 @@ from study_app.devices.falcon.wire import (
     ZERO,
     quiet_packet,
 )
+from study_app.devices.falcon.wire.packets import FLAGS_AT
 from study_app.haptics.kernels.c_functions import READ_NEW, READ_NOTHING_NEW
-from tests.devices.falcon.turns import (
+from tests.devices.falcon.support.scripted_bridge import (
     CENTRE_M,
     GROWTH_N,
     MODEM_STATUS,

@@ -12,12 +12,12 @@ if not hasattr(socket, "AF_UNIX"):
 
 from study_app.devices.falcon import guard as guarding
 from study_app.devices.falcon.failures import FalconNotFound
-from study_app.devices.falcon.framing import DESCRIPTOR
 from study_app.devices.falcon.guard import PACKETS, Guard, watch
-from study_app.devices.falcon.transport import open_transport
-from study_app.devices.falcon.wire import FLAG_HOMING, quiet_packet
+from study_app.devices.falcon.transport.socket_frames import DESCRIPTOR
+from study_app.devices.falcon.transport.transport import open_transport
+from study_app.devices.falcon.wire.constants import FLAG_HOMING, quiet_packet
 from study_app.errors import DeviceError
-from tests.devices.falcon.bridges import Server, compiled, warm
+from tests.devices.falcon.support.bridges import Server, compiled, warm
 
 QUIET = [quiet_packet(FLAG_HOMING)] * PACKETS
 PUSHING = b"<PPPAPPPAPPPABA>"  # 4095 on every motor, homing on
@@ -25,7 +25,7 @@ PUSHING = b"<PPPAPPPAPPPABA>"  # 4095 on every motor, homing on
 PROGRAM = """
 import os, signal, sys
 from study_app.devices.falcon.guard import Guard
-from study_app.devices.falcon.transport import open_transport
+from study_app.devices.falcon.transport.transport import open_transport
 transport = open_transport(sys.argv[1])
 guard = Guard(sys.argv[1])
 {guarded}
@@ -248,8 +248,8 @@ def test_a_guard_loads_nothing_from_the_folder_it_is_started_in(tmp_path, monkey
 @compiled
 def test_an_emulated_falcon_pushes_on_when_its_program_is_killed_and_not_when_it_was_guarded(tmp_path):
     from study_app.devices.falcon.boot import configure
-    from study_app.devices.falcon.emulator.face import Emulator
-    from study_app.devices.falcon.emulator.server import EmulatorServer
+    from study_app.devices.falcon.emulator.emulator import Emulator
+    from study_app.devices.falcon.emulator.socket_server import EmulatorServer
 
     emulator = warm(Emulator(tremor_m=0.0, running=True))
     with EmulatorServer(emulator, tmp_path / "falcon") as server:

@@ -8,7 +8,7 @@ if numba.config.DISABLE_JIT:
     pytest.skip("records as compiled code has them", allow_module_level=True)
 
 from study_app.devices.falcon.sending import _limit_growth
-from tests.devices.falcon.turns import Turns
+from tests.devices.falcon.support.scripted_bridge import Turns
 
 
 def test_limited_growth_never_makes_a_force_longer():

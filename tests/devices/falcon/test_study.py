@@ -14,7 +14,7 @@ if numba.config.DISABLE_JIT:
 
 from study_app.devices import scripted
 from study_app.devices.falcon.emulated import EmulatedFalcon
-from study_app.devices.falcon.emulator.face import Emulator
+from study_app.devices.falcon.emulator.emulator import Emulator
 from study_app.errors import SessionError
 from study_app.haptics.model.layout import STATUS_OK
 from study_app.haptics.model.limits import slew_limit_n

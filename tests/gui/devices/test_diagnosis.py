@@ -9,9 +9,9 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QFileDialog, QLabel
 
-from study_app.devices.falcon.diagnosis import MODES, OPEN, UDEV_RULE, Facts
-from study_app.devices.falcon.examination import Examination
-from study_app.devices.falcon.findings import Report, findings_of
+from study_app.devices.falcon.doctor.failure_report import Report, findings_of
+from study_app.devices.falcon.doctor.worker import Examination
+from study_app.devices.falcon.failure_modes import MODES, OPEN, UDEV_RULE, Facts
 from study_app.errors import StudyError
 from study_app.gui.devices.diagnosis import DiagnosisDialog
 from study_app.gui.devices.findings import Paste, capital

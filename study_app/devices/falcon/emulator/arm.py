@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from study_app.devices.falcon.geometry import Geometry
+from study_app.devices.falcon.mechanics.geometry import Geometry
 from study_app.haptics.kernels.compiled import kernel
 from study_app.haptics.kernels.vector import norm
 

@@ -1,0 +1,291 @@
+"""An emulated Falcon served in real time on a Unix socket, as ``framing`` says.
+
+So other programs, another driver or our own guard, can be put in front of it. Emulated time is the machine's. A
+transfer out is computed at once up to where it ends, and its answer is held back until that moment has come; a transfer
+in goes on from event to event of the bridge, so that it may be pending while others are carried out.
+"""
+
+from __future__ import annotations
+
+import math
+import select
+import socket
+import threading
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import TracebackType
+from typing import Final, Self
+
+import numpy as np
+
+from study_app.devices.falcon.emulator.emulator import Emulator
+from study_app.devices.falcon.transport.socket_frames import (
+    ANSWER,
+    BULK_IN,
+    BULK_OUT,
+    CONTROL,
+    DESCRIPTOR,
+    IDENTITY,
+    REQUEST,
+    TAGGED,
+)
+from study_app.devices.falcon.wire import constants
+from study_app.errors import DeviceError
+
+_IDLE_S: Final = 0.02  # how long nobody may ask before it is looked at anyway
+_MOST_BYTES: Final = 1 << 17
+_MOST_PENDING: Final = 16  # requests of a client; further ones stay in its socket
+_REFUSALS: Final = {
+    "unplugged": constants.ERROR_NO_DEVICE,
+    "access_denied": constants.ERROR_ACCESS,
+    "not_supported": constants.ERROR_NOT_SUPPORTED,
+    "busy": constants.ERROR_BUSY,
+    "kernel_driver": constants.ERROR_BUSY,
+}
+
+
+@dataclass(slots=True, eq=False)
+class _Request:
+    kind: int
+    at: int
+    value: int
+    length: int
+    timeout_ms: int
+    data: bytes  # to be transferred out, or transferred in so far
+    tagged: bool
+    ends_ns: float = 0.0  # when its time is out; 0: not begun
+    answer: bytes = b""
+    due_ns: int = 0  # when the answer may go
+
+
+@dataclass(slots=True, eq=False)
+class _Client:
+    connection: socket.socket
+    asked: bytearray = field(default_factory=bytearray)
+    pending: list[_Request] = field(default_factory=list)
+
+
+class EmulatorServer:
+    """Serves ``emulator`` at ``path`` while `serve` runs; as a context manager in a thread of its own.
+
+    Raises
+    ------
+    DeviceError
+        Something is at ``path`` already, it cannot be made there, or this system has no Unix sockets.
+    """
+
+    def __init__(self, emulator: Emulator, path: str | Path) -> None:
+        self.emulator = emulator
+        self.path = Path(path)
+        emulator.compile()  # a client may ask from now on, and its time-outs are milliseconds
+        self._clock = np.array([time.monotonic_ns()], np.int64)
+        emulator.follow_clock(int(self._clock.ctypes.data))
+        self._clients: dict[socket.socket, _Client] = {}
+        self._owner: _Client | None = None
+        self._changed = threading.Condition()
+        self._thread: threading.Thread | None = None
+        self._door = _listen(self.path)
+        self._bell, self._heard = socket.socketpair()
+
+    @property
+    def clients(self) -> int:
+        """How many programs are connected."""
+        return len(self._clients)
+
+    def serve(self, tell: Callable[[], None] | None = None, every_s: float = 1.0) -> None:
+        """Answer until `stop`; call ``tell`` now and then. Leaves nothing at the path, however it ends."""
+        told_s = time.monotonic()
+        try:
+            while True:
+                ready = self._wait()
+                if self._heard in ready:
+                    return
+                self._clock[0] = time.monotonic_ns()
+                if not ready:
+                    self.emulator.look()
+                if self._door in ready:
+                    self._welcome()
+                for connection in ready:
+                    if connection in self._clients:
+                        self._hear(self._clients[connection])
+                for client in list(self._clients.values()):
+                    self._serve(client)
+                with self._changed:
+                    self._changed.notify_all()
+                if tell is not None and time.monotonic() - told_s >= every_s:
+                    told_s = time.monotonic()
+                    tell()
+        finally:
+            self._close()
+
+    def stop(self) -> None:
+        """Let `serve` end; from any thread or a signal's handler."""
+        with suppress(OSError):  # it has ended already
+            self._bell.send(b".")
+
+    def until(self, condition: Callable[[], bool], timeout_s: float) -> bool:
+        """Wait in another thread until something was served after which ``condition`` holds; whether it did."""
+        with self._changed:
+            return self._changed.wait_for(condition, timeout_s)
+
+    def __enter__(self) -> Self:
+        self._thread = threading.Thread(target=self.serve, name="emulated Falcon", daemon=True)
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._thread is not None and self._thread.is_alive():
+            self.stop()
+            self._thread.join()
+
+    def _wait(self) -> set[socket.socket]:
+        """Return who has something to say, at the latest when a pending request may go on."""
+        listening = [client.connection for client in self._clients.values() if len(client.pending) < _MOST_PENDING]
+        due_ns = min(
+            (self._due_ns(request) for client in self._clients.values() for request in client.pending), default=math.inf
+        )
+        seconds = min(max(due_ns - time.monotonic_ns(), 0) * 1e-9, _IDLE_S)
+        ready, _, _ = select.select([self._door, self._heard, *listening], [], [], seconds)
+        return set(ready)
+
+    def _due_ns(self, request: _Request) -> float:
+        return request.due_ns if request.answer else min(request.ends_ns, self.emulator.next_event_ns)
+
+    def _welcome(self) -> None:
+        connection, _ = self._door.accept()
+        connection.setblocking(False)
+        self._clients[connection] = _Client(connection)
+
+    def _hear(self, client: _Client) -> None:
+        try:
+            more = client.connection.recv(_MOST_BYTES)
+        except BlockingIOError:
+            return
+        except OSError:
+            more = b""
+        if not more:
+            self._dismiss(client)
+        client.asked += more
+
+    def _dismiss(self, client: _Client) -> None:
+        """Let a client go; whatever it told the motors last stays."""
+        self._clients.pop(client.connection, None)
+        client.connection.close()
+        if self._owner is client:
+            self._owner = None
+
+    def _serve(self, client: _Client) -> None:
+        """Go on with all pending requests, at each endpoint in their order; send the answers that are due."""
+        while len(client.pending) < _MOST_PENDING and (request := _take_request(client.asked)) is not None:
+            client.pending.append(request)
+        busy: set[int] = set()
+        for request in client.pending:
+            if not request.answer and request.kind not in busy:
+                self._go_on(client, request)
+            if not request.answer:
+                busy.add(request.kind)
+        in_order = True
+        for request in list(client.pending):
+            if request.answer and request.due_ns <= time.monotonic_ns() and (request.tagged or in_order):
+                client.pending.remove(request)
+                try:
+                    client.connection.sendall(request.answer)
+                except OSError:  # gone, or it does not read its answers
+                    self._dismiss(client)
+                    return
+            elif not request.tagged:
+                in_order = False
+
+    def _go_on(self, client: _Client, request: _Request) -> None:
+        """Carry out a request as far as it goes by now; once it is over, give it its answer."""
+        code, data = self._carry_out(client, request)
+        if request.kind == BULK_IN:
+            request.data += data
+            now_ns = int(self._clock[0])
+            if request.ends_ns == 0.0:
+                request.ends_ns = now_ns + 1e6 * request.timeout_ms if request.timeout_ms else math.inf
+            if code == constants.ERROR_TIMEOUT and now_ns < request.ends_ns:
+                return
+            data = request.data
+        tag = bytes([request.kind | TAGGED]) if request.tagged else b""
+        request.answer = tag + ANSWER.pack(code, len(data)) + data
+        request.due_ns = self.emulator.now_ns if self._owner is client else 0
+
+    def _carry_out(self, client: _Client, request: _Request) -> tuple[int, bytes]:
+        """Return the code and the bytes of the answer."""
+        emulator, kind, at = self.emulator, request.kind, request.at
+        refused = self._claim(client)
+        if refused != constants.SUCCESS:
+            return refused, b""
+        if kind == CONTROL:
+            return emulator.control(at, request.value), b""
+        if kind == BULK_OUT and at == constants.ENDPOINT_OUT:
+            return emulator.write(request.data, request.timeout_ms)[0], b""
+        if kind == BULK_IN and at == constants.ENDPOINT_IN:
+            return emulator.poll(request.length - len(request.data))
+        if kind == DESCRIPTOR:
+            return constants.SUCCESS, IDENTITY.pack(
+                constants.VENDOR_ID, constants.PRODUCT_ID
+            ) + emulator.serial.encode()
+        return (constants.ERROR_NOT_FOUND if kind in {BULK_OUT, BULK_IN} else constants.ERROR_NOT_SUPPORTED), b""
+
+    def _claim(self, client: _Client) -> int:
+        """Give the one interface to who asks first; return 0 or why a client cannot have it."""
+        if self._owner is client:
+            return constants.ERROR_NO_DEVICE if self.emulator.faults.is_on("unplugged") else constants.SUCCESS
+        for fault, code in _REFUSALS.items():
+            if self.emulator.faults.is_on(fault):
+                return code
+        if self._owner is not None:
+            return constants.ERROR_BUSY
+        self._owner = client
+        self.emulator.claimed()
+        return constants.SUCCESS
+
+    def _close(self) -> None:
+        for client in list(self._clients.values()):
+            self._dismiss(client)
+        self._door.close()
+        self._bell.close()
+        self._heard.close()
+        self.path.unlink(missing_ok=True)
+        self.emulator.follow_clock(0)
+        with self._changed:
+            self._changed.notify_all()
+
+
+def _take_request(asked: bytearray) -> _Request | None:
+    """Take the next request out of what a client has sent; None where it is not whole yet."""
+    if len(asked) < REQUEST.size:
+        return None
+    kind, at, value, length, timeout_ms = REQUEST.unpack_from(asked)
+    whole = REQUEST.size + (length if kind & ~TAGGED == BULK_OUT else 0)
+    if len(asked) < whole:
+        return None
+    data = bytes(asked[REQUEST.size : whole])
+    del asked[:whole]
+    return _Request(kind & ~TAGGED, at, value, length, timeout_ms, data, bool(kind & TAGGED))
+
+
+def _listen(path: Path) -> socket.socket:
+    """Return a socket that listens at ``path``, where nothing is yet."""
+    family = getattr(socket, "AF_UNIX", None)
+    if family is None:
+        raise DeviceError("a Falcon cannot be served here: this system's Python has no Unix sockets")
+    if path.exists() or path.is_symlink():
+        raise DeviceError(f"{path} exists already: name another socket, or remove it if nobody serves there")
+    door = socket.socket(family, socket.SOCK_STREAM)
+    try:
+        door.bind(str(path))
+        door.listen()
+    except OSError as error:
+        door.close()
+        raise DeviceError(
+            f"{path}: no socket can be made there ({error}); name a short path in a folder of yours"
+        ) from None
+    return door

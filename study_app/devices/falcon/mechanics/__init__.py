@@ -1,0 +1,1 @@
+"""Geometry, kinematics and calibration of a Falcon."""

@@ -1,0 +1,1 @@
+"""Connections to a Falcon: libusb, FTDI, socket."""

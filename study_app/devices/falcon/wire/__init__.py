@@ -1,0 +1,1 @@
+"""Constants, packets and replies of the Falcon's protocol."""

@@ -1,0 +1,144 @@
+"""A device made of ``haptics.kernels.plant`` and a hand: all that the mouse and the scripted device share.
+
+Its read steps hand and handle to the time given, inside the servo's loop; its write holds the force for the next step.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+
+from study_app.devices.base import Device
+from study_app.devices.simulated.hand import HAND, move_hand
+from study_app.devices.simulated.hand_commands import HandOrders
+from study_app.haptics.kernels.c_functions import (
+    READ,
+    READ_LOST,
+    READ_NEW,
+    READ_NOTHING_NEW,
+    WRITE,
+    c_function,
+    record_at,
+)
+from study_app.haptics.kernels.plant import HANDLE, let_go, measure, move, push
+from study_app.haptics.model.device_dynamics import Dynamics
+from study_app.haptics.model.layout import COMMAND, READING, records
+
+SIMULATED = np.dtype(
+    [
+        ("handle", HANDLE),
+        ("hand", HAND),
+        ("last_ns", np.int64),  # time of the last read
+        ("started", np.int64),  # 1 after the first read
+        ("buttons", np.int64),
+        ("unplugged", np.int64),  # 1: answers no more
+    ],
+    align=True,
+)
+
+_simulated_at = record_at(SIMULATED)
+_reading_at = record_at(READING)
+_command_at = record_at(COMMAND)
+
+_LONGEST_STEP_S = 0.05  # a loop that stood still for longer must not spend longer still on catching up
+
+
+class SimulatedDevice(HandOrders, Device):
+    """A handle that somebody moves; ``name``, hand and numbers come from the subclass.
+
+    Parameters
+    ----------
+    handle : record of ``plant.HANDLE``
+    workspace_m : half extents of the end stops [m]
+    force_limit_n : the greatest force it may be asked for [N]
+    """
+
+    name = ""
+
+    def __init__(self, handle: Any, workspace_m: tuple[float, float, float], force_limit_n: float) -> None:
+        self._memory = records(SIMULATED, 1)
+        super().__init__(self._memory[0], workspace_m)
+        self.force_limit_n = force_limit_n
+        self._state.handle = handle
+        self._state.handle.stop_m = workspace_m
+        self.context = int(self._memory.ctypes.data)
+        self.read, self.write = _functions()
+        self.hold(0.0, 0.0, 0.0)
+
+    @property
+    def dynamics(self) -> Dynamics:
+        """The handle's own numbers; its delay as it is at 1 kHz."""
+        handle = self._state.handle
+        return Dynamics(1e-3 * float(handle.delay), float(handle.quantum_m), float(handle.mass_kg))
+
+    def unplug(self) -> None:
+        """Answer no more, as a device whose cable was pulled."""
+        self._state.unplugged = 1
+
+    def open(self) -> None:
+        """Plug it in."""
+        self._state.unplugged = 0
+
+    def close(self) -> None:
+        """Take the force off the handle."""
+        let_go(self._state.handle)
+
+    def describe(self) -> dict[str, Any]:
+        """Return name and numbers for the receipt."""
+        handle = self._state.handle
+        return {
+            "name": self.name,
+            "workspace_m": list(self.workspace_m),
+            "force_limit_n": self.force_limit_n,
+            "mass_kg": float(handle.mass_kg),
+            "viscous_nspm": float(handle.viscous_nspm),
+            "coulomb_n": float(handle.coulomb_n),
+            "stiffness_npm": float(handle.stiffness_npm),
+            "damping_nspm": float(handle.damping_nspm),
+            "quantum_m": float(handle.quantum_m),
+            "dynamics": self.dynamics.describe(),
+        }
+
+    def __enter__(self) -> Self:
+        self.open()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+@cache
+def _functions() -> tuple[Any, Any]:
+    """Compile read and write, once for all simulated devices."""
+    return c_function(READ, _read), c_function(WRITE, _write)
+
+
+def _read(context: int, now_ns: int, reading: int) -> int:
+    device = _simulated_at(context)
+    if device.unplugged != 0:
+        return READ_LOST
+    elapsed_s = 0.0
+    if device.started != 0:
+        if now_ns <= device.last_ns:
+            return READ_NOTHING_NEW
+        elapsed_s = min((now_ns - device.last_ns) * 1e-9, _LONGEST_STEP_S)
+    device.started = 1
+    device.last_ns = now_ns
+    move_hand(device.hand, now_ns, elapsed_s)
+    move(device.handle, device.hand.was_m, device.hand.place_m, elapsed_s)
+    out = _reading_at(reading)
+    measure(device.handle, out.position_m)
+    out.buttons = device.buttons
+    out.delay_ticks = device.handle.delay
+    return READ_NEW
+
+
+def _write(context: int, command: int) -> int:
+    device, force_n = _simulated_at(context), _command_at(command).force_n
+    push(device.handle, force_n[0], force_n[1], force_n[2])
+    return READ_LOST if device.unplugged != 0 else 0

@@ -1,0 +1,140 @@
+"""A 3Dconnexion SpaceMouse: how far its cap is pushed is how fast the pointer of a simulated handle goes.
+
+Felt is nothing; seen is what the mouse shows: the handle hangs on its pointer by a spring, and the liquid's force acts
+on the handle. A thread of its own reads the device and says where the pointer is, as a window does for the mouse.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Any
+
+from study_app.devices.mouse import PointedDevice
+from study_app.devices.spacemouse.hid import choose, find_space_mice, load_hid, opened
+from study_app.devices.spacemouse.reports import (
+    DEAD_DEFLECTION,
+    FULL_DEFLECTION,
+    FULL_SPEED_MPS,
+    LED,
+    Buttons,
+    Displacement,
+    Model,
+    parse,
+    program_buttons,
+    velocity_mps,
+)
+
+_REPORT_BYTES = 64
+_WAIT_MS = 10
+_SILENT_S = 0.5  # it repeats a held displacement every 8 or 16 ms: silent for longer, it is not held
+_LONGEST_STEP_S = 0.05
+
+
+class SpaceMouseDevice(PointedDevice):
+    """The SpaceMouse that is connected; it can be pulled out and opened again.
+
+    Parameters
+    ----------
+    workspace_m : half extents of where the handle reaches [m]
+    force_limit_n : the greatest force it may be asked for [N]
+    hid : the module to talk through; None: hidapi's, loaded when it is opened
+    now_s : a clock [s]
+    """
+
+    name = "spacemouse"
+
+    def __init__(
+        self,
+        workspace_m: tuple[float, float, float] = (0.05, 0.05, 0.05),
+        force_limit_n: float = 8.0,
+        *,
+        hid: Any = None,
+        now_s: Callable[[], float] = time.monotonic,
+    ) -> None:
+        super().__init__(workspace_m, force_limit_n)
+        self._hid = hid
+        self._now_s = now_s
+        self._model: Model | None = None
+        self._open_hid: Any = None
+        self._thread: threading.Thread | None = None
+        self._ending = threading.Event()
+
+    def open(self) -> None:
+        """Find it, open it, and read it from now on.
+
+        Raises
+        ------
+        DeviceNotFound
+            None is connected.
+        DeviceError
+            There is one, and it cannot be opened or reports no motion.
+        """
+        if self._thread is not None and self._thread.is_alive():
+            return
+        self.close()
+        hid = self._hid if self._hid is not None else load_hid()
+        self._model, path = choose(find_space_mice(hid))
+        self._open_hid = opened(hid, self._model, path)
+        self._light(on=True)
+        self.point_to(*self.aim_m)
+        self.release()
+        super().open()
+        self._ending.clear()
+        self._thread = threading.Thread(target=self._read_on, name="SpaceMouse", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Take the force off the handle and let go of the device; a second call does nothing."""
+        super().close()
+        thread, self._thread = self._thread, None
+        if thread is not None:
+            self._ending.set()
+            thread.join()
+        if self._open_hid is not None:
+            self._light(on=False)
+            self._open_hid.close()
+            self._open_hid = None
+
+    def describe(self) -> dict[str, Any]:
+        """Return name and numbers for the receipt."""
+        own = {
+            "model": None if self._model is None else self._model.name,
+            "full_speed_mps": FULL_SPEED_MPS,
+            "dead_share": DEAD_DEFLECTION / FULL_DEFLECTION,
+        }
+        return super().describe() | own
+
+    def _read_on(self) -> None:
+        """Read until it is closed, or gone: then the servo hears of it at its next turn."""
+        assert self._model is not None  # noqa: S101 - it is open
+        moving = Displacement(0, 0, 0)
+        place_m = self.aim_m
+        now_s = heard_s = self._now_s()
+        while not self._ending.is_set():
+            try:
+                said = parse(bytes(self._open_hid.read(_REPORT_BYTES, _WAIT_MS)))
+            except (OSError, ValueError):
+                self.unplug()
+                return
+            before_s, now_s = now_s, self._now_s()
+            if said is not None:
+                heard_s = now_s
+            elif now_s - heard_s > _SILENT_S:
+                moving = Displacement(0, 0, 0)
+            step_s = min(now_s - before_s, _LONGEST_STEP_S)
+            goes = velocity_mps(moving)
+            if any(goes):
+                place_m = self._inside(*(at + step_s * speed for at, speed in zip(place_m, goes, strict=True)))
+                self.point_to(*place_m)
+            if isinstance(said, Displacement):
+                moving = said
+            elif isinstance(said, Buttons):
+                self.press(program_buttons(said.held, self._model))
+
+    def _light(self, *, on: bool) -> None:
+        if self._model is not None and self._model.light:
+            with suppress(OSError, ValueError):  # one without a light, or gone
+                self._open_hid.write(bytes([LED, int(on)]))

@@ -1,0 +1,147 @@
+import math
+from itertools import chain, repeat
+
+import numba
+import numpy as np
+import pytest
+
+if numba.config.DISABLE_JIT:
+    pytest.skip("devices are C functions", allow_module_level=True)
+
+from study_app.devices.falcon.doctor.weighing import GRAVITY_MPS2, PLACES_M, Grip, hang, pull
+from study_app.devices.falcon.emulated import EmulatedFalcon
+from study_app.devices.falcon.emulator.emulator import Emulator
+from study_app.devices.falcon.mechanics.calibration import fit, left_over
+from study_app.devices.falcon.mechanics.geometry import GEOMETRIES
+from study_app.errors import DeviceError, DeviceLost
+
+WEIGHT_N = 0.4 * GRAVITY_MPS2
+
+
+def emulated(**options):
+    return Emulator(**{"tremor_m": 0.0, "running": True, **options})
+
+
+def helper(emulator, weight_n=WEIGHT_N, *, readings=None, lags=0):
+    """Return what does as it is asked, some turns later, and the list of what that was."""
+    asked = []
+
+    def ask(kind, _words):
+        asked.append(kind)
+        waits = iter([None] * lags)
+        if kind in {"hang", "pull"}:
+            emulator.weight_n = weight_n
+        elif kind in {"let-go", "take-off"}:
+            emulator.weight_n = 0.0
+        emulator.held = kind == "take-off"
+        answer = next(readings) if kind == "reading" else ""
+        return lambda: next(waits, answer)
+
+    return ask, asked
+
+
+def weighed(emulator, weight_n=WEIGHT_N):
+    ask, asked = helper(emulator, weight_n)
+    with EmulatedFalcon(emulator=emulator) as device:
+        notes = hang(Grip(device, virtual=True), weight_n, ask)
+    return notes, asked
+
+
+class TestAWeight:
+    @pytest.mark.parametrize(
+        ("gain", "offset_deg", "geometry"),
+        [(6616.0, 0.0, "libnifalcon"), (10_000.0, 0.0, "zm-redux"), (8000.0, 4.0, "libnifalcon")],
+    )
+    def test_tells_gain_and_offset_of_the_emulated_arms(self, gain, offset_deg, geometry):
+        emulator = emulated(units_per_nm=gain, arm_offset_rad=(math.radians(offset_deg),) * 3, geometry=geometry)
+        notes, asked = weighed(emulator)
+        assert asked == ["let-go", "hang", "take-off"]
+        found = fit(GEOMETRIES[geometry], notes.counts, notes.forces_n, notes.units)
+        assert found.units_per_nm == pytest.approx(gain, rel=0.01)
+        assert math.degrees(found.arm_offset_rad) == pytest.approx(offset_deg, abs=0.3)
+        assert found.own_weight_n == pytest.approx(0.0, abs=0.03)
+        assert found.poses == 4 * len(PLACES_M)
+        left = left_over(found, notes.counts, notes.forces_n, notes.units)
+        assert math.sqrt((left**2).sum() / len(left)) == pytest.approx(found.residual_n)
+        assert np.abs(left).max() < 0.12  # 0.1 N of it is the friction of the emulated arms
+
+    def test_one_that_is_not_what_was_said_is_taken_for_another_gain(self):
+        emulator = emulated()
+        ask, _ = helper(emulator, WEIGHT_N / 2)
+        with EmulatedFalcon(emulator=emulator) as device:
+            notes = hang(Grip(device, virtual=True), WEIGHT_N, ask)
+        found = fit(GEOMETRIES["libnifalcon"], notes.counts, notes.forces_n, notes.units)
+        assert found.units_per_nm == pytest.approx(6616 / 2, rel=0.02)
+
+    @pytest.mark.parametrize("weight_n", [0.5, 6.5, -1.0, math.nan])
+    def test_one_that_tells_nothing_or_is_too_heavy_is_refused(self, weight_n):
+        emulator = emulated()
+        with EmulatedFalcon(emulator=emulator) as device, pytest.raises(DeviceError, match="110 to 600 g"):
+            hang(Grip(device, virtual=True), weight_n, helper(emulator)[0])
+
+
+class TestAScale:
+    def test_tells_the_gain_as_a_weight_does(self):
+        emulator = emulated(units_per_nm=9000.0)
+        ask, asked = helper(emulator, readings=repeat("400"), lags=5)
+        with EmulatedFalcon(emulator=emulator) as device:
+            notes = pull(Grip(device, virtual=True), ask)
+        assert asked == ["let-go", *["pull", "reading", "let-go"] * len(PLACES_M), "take-off"]
+        found = fit(GEOMETRIES["libnifalcon"], notes.counts, notes.forces_n, notes.units)
+        assert found.units_per_nm == pytest.approx(9000, rel=0.04)
+
+    def test_a_reading_that_is_none_is_asked_for_again(self):
+        emulator = emulated()
+        wrong = ["", "four", "-3", "0", "900", "nan"]
+        ask, asked = helper(emulator, readings=chain(wrong, repeat("400")))
+        words = []
+        with EmulatedFalcon(emulator=emulator) as device:
+            notes = pull(Grip(device, virtual=True), lambda kind, said: words.append(said) or ask(kind, said))
+        assert asked.count("reading") == len(wrong) + len(PLACES_M)
+        assert [said for said in words if "no reading of the scale" in said][1].startswith("'four' is")
+        found = fit(GEOMETRIES["libnifalcon"], notes.counts, notes.forces_n, notes.units)
+        assert found.units_per_nm == pytest.approx(6616, rel=0.04)
+
+
+class TestTheGrip:
+    def test_is_moved_slowly_and_with_no_more_force_than_the_limit(self):
+        emulator = emulated()
+        with EmulatedFalcon(emulator=emulator, force_limit_n=2.0) as device:
+            grip = Grip(device, virtual=True)
+            emulator.held = False
+            grip.come((0.02, 0.01, 0.01))
+            assert grip.place_m == pytest.approx((0.02, 0.01, 0.01), abs=5e-4)
+            emulator.held = True
+            emulator.reach_to(-0.04, 0.0, 0.0)
+            pushes = []
+            for _ in range(1500):
+                grip.turn()
+                pushes.append(np.linalg.norm(emulator.force_n))
+            assert max(pushes) == pytest.approx(2.0, rel=0.01)
+
+    def test_one_that_somebody_shakes_does_not_come_to_rest(self):
+        emulator = emulated(tremor_m=2e-3)
+        with EmulatedFalcon(emulator=emulator) as device, pytest.raises(DeviceError, match="does not come to rest"):
+            Grip(device, virtual=True).come((0.01, 0.0, 0.0))
+        assert emulator.torques == (0, 0, 0)
+
+    def test_a_cable_that_is_pulled_ends_it(self):
+        emulator = emulated()
+        with EmulatedFalcon(emulator=emulator) as device:
+            grip = Grip(device, virtual=True)
+            emulator.faults.on("unplugged")
+            with pytest.raises(DeviceLost, match="no longer there"):
+                grip.come((0.01, 0.0, 0.0))
+
+    def test_without_news_of_its_place_it_is_let_go(self):
+        emulator = emulated()
+        with EmulatedFalcon(emulator=emulator) as device:
+            grip = Grip(device, virtual=True)
+            emulator.reach_to(0.03, 0.0, 0.0)
+            for _ in range(1500):
+                grip.turn()
+            assert emulator.torques != (0, 0, 0)
+            emulator.faults.chance("drop", 1.0)
+            for _ in range(40):
+                grip.turn()
+            assert emulator.torques == (0, 0, 0)

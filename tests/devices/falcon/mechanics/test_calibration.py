@@ -1,0 +1,139 @@
+import dataclasses
+import json
+import math
+from datetime import date
+
+import numpy as np
+import pytest
+
+from study_app.devices.falcon.mechanics.calibration import Calibration, calibration_file, fit, load, save
+from study_app.devices.falcon.mechanics.geometry import GEOMETRIES
+from study_app.devices.falcon.mechanics.kinematics import REACHED, inverse, new_mechanism
+from study_app.errors import DeviceError
+
+GEOMETRY = GEOMETRIES["libnifalcon"]
+PLACES = ((0, 0, 0.127), (0.03, 0.02, 0.11), (-0.03, 0.02, 0.14), (0.02, -0.02, 0.15), (-0.02, -0.03, 0.10))
+WEIGHTS_N = (0.0, 4.9, 0.0, 4.9, 2.45)
+
+
+def weighed(gain, offset_rad, own_n, *, places=PLACES, weights_n=WEIGHTS_N):
+    """Return counts, forces and units of a Falcon that holds weights: by virtual work, slopes taken by differences."""
+    mechanism = new_mechanism(GEOMETRY, gain, offset_rad)
+
+    def theta_at(place):
+        theta = np.zeros(3)
+        assert inverse(mechanism, np.array(place, float), theta) == REACHED
+        return theta
+
+    counts, units = [], []
+    for place, weight_n in zip(places, weights_n, strict=True):
+        slopes = np.zeros((3, 3))
+        for axis, step in enumerate(np.eye(3) * 1e-6):
+            slopes[:, axis] = (theta_at(np.add(place, step)) - theta_at(np.subtract(place, step))) / 2e-6
+        torque_nm = np.linalg.solve(slopes.T, [0.0, weight_n + own_n, 0.0])
+        counts.append((theta_at(place) - mechanism.zero_rad) / mechanism.rad_per_count)
+        units.append(-gain * torque_nm)
+    forces_n = np.column_stack([np.zeros(len(places)), -np.array(weights_n), np.zeros(len(places))])
+    return np.array(counts), forces_n, np.array(units)
+
+
+class TestFit:
+    @pytest.mark.parametrize("gain", [6616.0, 10_000.0, 8000.0])
+    @pytest.mark.parametrize("offset_deg", [0.0, 5.0, -3.0])
+    def test_finds_gain_offset_and_weight_of_the_grip(self, gain, offset_deg):
+        found = fit(GEOMETRY, *weighed(gain, math.radians(offset_deg), 1.2), measured=date(2026, 11, 20))
+        assert found.units_per_nm == pytest.approx(gain, rel=1e-4)
+        assert math.degrees(found.arm_offset_rad) == pytest.approx(offset_deg, abs=0.01)
+        assert found.own_weight_n == pytest.approx(1.2, abs=1e-3)
+        assert found.residual_n < 1e-3
+        assert (found.geometry, found.poses, found.measured) == ("libnifalcon", 5, "2026-11-20")
+
+    def test_whole_counts_and_friction_spoil_little(self):
+        counts, forces_n, units = weighed(6616.0, math.radians(2), 1.0, places=PLACES * 4, weights_n=WEIGHTS_N * 4)
+        random = np.random.Generator(np.random.PCG64(7))
+        noisy = units * (1 + 0.02 * random.standard_normal(units.shape))
+        found = fit(GEOMETRY, np.round(counts), forces_n, noisy)
+        assert found.units_per_nm == pytest.approx(6616, rel=0.03)
+        assert 0.0 < found.residual_n < 0.3
+
+    def test_a_few_poses_are_not_enough(self):
+        with pytest.raises(DeviceError, match="5 poses or more, not 4"):
+            fit(GEOMETRY, *(each[:4] for each in weighed(6616.0, 0.0, 1.0)))
+
+    def test_one_weight_cannot_be_told_from_the_grips_own(self):
+        with pytest.raises(DeviceError, match="two weights"):
+            fit(GEOMETRY, *weighed(6616.0, 0.0, 1.0, weights_n=(4.9,) * 5))
+
+    def test_a_weight_ten_times_too_heavy_is_found_out(self):
+        counts, forces_n, units = weighed(6616.0, 0.0, 1.0)
+        with pytest.raises(DeviceError, match="check the weights"):
+            fit(GEOMETRY, counts, forces_n * 10, units)
+
+    def test_encoders_that_are_no_pose_are_named(self):
+        counts, forces_n, units = weighed(6616.0, 0.0, 1.0)
+        counts[2] = 9000
+        with pytest.raises(DeviceError, match="pose 3"):
+            fit(GEOMETRY, counts, forces_n, units)
+
+    def test_numbers_that_do_not_belong_together_are_refused(self):
+        counts, forces_n, units = weighed(6616.0, 0.0, 1.0)
+        with pytest.raises(DeviceError, match="three numbers a pose"):
+            fit(GEOMETRY, counts, forces_n[:, :2], units)
+
+
+class TestKeeping:
+    CALIBRATION = Calibration("zm-redux", 7000.0, 0.03, 1.1, 0.05, 6, "2026-11-20")
+
+    @pytest.fixture(autouse=True)
+    def folder(self, tmp_path, monkeypatch):
+        monkeypatch.setenv("LIQUID_STUDY_CONFIG", str(tmp_path / "settings"))
+        return tmp_path / "settings"
+
+    def test_is_found_again_by_serial_number(self):
+        save("FTABC123", self.CALIBRATION)
+        assert load("FTABC123") == self.CALIBRATION
+        assert load("FTABC124") is None
+
+    def test_a_newer_one_takes_its_place(self):
+        save("A", self.CALIBRATION)
+        newer = dataclasses.replace(self.CALIBRATION, units_per_nm=9000.0)
+        assert load("A") != newer
+        save("A", newer)
+        assert load("A") == newer
+
+    def test_no_serial_number_leaves_the_folder(self, folder):
+        assert calibration_file("../../x").parent == folder
+        assert save("", self.CALIBRATION).parent == folder
+
+    @pytest.mark.parametrize(
+        "text",
+        [
+            "",
+            "[]",
+            '{"geometry": "libnifalcon"}',
+            '{"geometry": "libnifalcon", "units_per_nm": 0}',
+            '{"geometry": "libnifalcon", "units_per_nm": NaN}',
+            '{"geometry": "libnifalcon", "units_per_nm": "7000"}',
+            '{"geometry": "libnifalcon", "units_per_nm": 7000, "arm_offset_rad": 2}',
+        ],
+    )
+    def test_a_file_that_makes_no_sense_is_told_with_its_place(self, text):
+        file = save("A", self.CALIBRATION)
+        file.write_text(text)
+        with pytest.raises(DeviceError, match=r"falcon-A\.json.*calibrate again"):
+            load("A")
+
+    def test_a_geometry_that_is_not_known_is_told(self):
+        save("A", dataclasses.replace(self.CALIBRATION, geometry="other"))
+        with pytest.raises(DeviceError, match="'other'"):
+            load("A")
+
+    def test_a_folder_that_is_a_file_is_told(self, folder):
+        folder.write_text("")
+        with pytest.raises(DeviceError, match="LIQUID_STUDY_CONFIG"):
+            save("A", self.CALIBRATION)
+
+    def test_the_receipt_says_what_was_used(self):
+        described = self.CALIBRATION.describe()
+        assert json.loads(json.dumps(described)) == described
+        assert described["units_per_nm"] == 7000.0

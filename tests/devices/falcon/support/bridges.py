@@ -1,0 +1,319 @@
+"""Bridges made up for tests: a pyusb backend, a server of the socket's framing, and FTDI's library, each scripted."""
+
+import ctypes
+import socket
+import threading
+from contextlib import suppress
+from types import SimpleNamespace
+
+import numba
+import numpy as np
+import pytest
+import usb.core
+from usb.backend import IBackend
+
+from study_app.devices.falcon.failures import usb_failure
+from study_app.devices.falcon.transport.socket_frames import (
+    ANSWER,
+    BULK_IN,
+    BULK_OUT,
+    CONTROL,
+    DESCRIPTOR,
+    IDENTITY,
+    REQUEST,
+)
+from study_app.devices.falcon.wire import constants
+
+
+class Backend(IBackend):
+    """A bus with Falcons on it: ``serials`` names them; ``fails`` maps a method's name to the error it raises."""
+
+    def __init__(self, *serials, fails=None, configured=True, kernel_driver=None):
+        super().__init__()
+        self.serials = list(serials)
+        self.fails = dict(fails or {})
+        self.configured = configured
+        self.kernel_driver = kernel_driver
+        self.calls = []
+        self.incoming = []  # what the next reads give; nothing left: a time-out
+        self.most_written = 1 << 20
+
+    def _called(self, name, *arguments):
+        self.calls.append((name, *arguments))
+        error = self.fails.get(name)
+        if error is not None:
+            raise error
+
+    def enumerate_devices(self):
+        self._called("enumerate_devices")
+        return range(len(self.serials))
+
+    def get_device_descriptor(self, device):
+        fields = {"bLength": 18, "bDescriptorType": 1, "bcdUSB": 0x0200, "bDeviceClass": 0, "bDeviceSubClass": 0}
+        fields |= {"bDeviceProtocol": 0, "bMaxPacketSize0": 8, "idVendor": constants.VENDOR_ID, "bcdDevice": 0x0600}
+        fields |= {"idProduct": constants.PRODUCT_ID, "iManufacturer": 0, "iProduct": 0, "bNumConfigurations": 1}
+        fields |= {"iSerialNumber": 3 if self.serials[device] else 0, "address": device + 1, "bus": 1}
+        return SimpleNamespace(**fields, port_number=1, port_numbers=(1,), speed=2)
+
+    def get_configuration_descriptor(self, device, config):
+        if config > 0:
+            raise IndexError(config)
+        fields = {"bLength": 9, "bDescriptorType": 2, "wTotalLength": 32, "bNumInterfaces": 1, "bmAttributes": 0x80}
+        fields |= {"bConfigurationValue": 1, "iConfiguration": 0, "bMaxPower": 45, "extra_descriptors": []}
+        return SimpleNamespace(**fields)
+
+    def get_interface_descriptor(self, device, interface, alternate, config):
+        if interface > 0 or alternate > 0:
+            raise IndexError(interface)
+        fields = {"bLength": 9, "bDescriptorType": 4, "bInterfaceNumber": 0, "bAlternateSetting": 0, "iInterface": 0}
+        fields |= {"bNumEndpoints": 2, "bInterfaceClass": 0xFF, "bInterfaceSubClass": 0xFF, "bInterfaceProtocol": 0xFF}
+        return SimpleNamespace(**fields, extra_descriptors=[])
+
+    def get_endpoint_descriptor(self, device, endpoint, interface, alternate, config):
+        address = (constants.ENDPOINT_IN, constants.ENDPOINT_OUT)[endpoint]
+        fields = {"bLength": 7, "bDescriptorType": 5, "bEndpointAddress": address, "bmAttributes": 2, "bInterval": 0}
+        fields |= {"wMaxPacketSize": constants.USB_PACKET, "bRefresh": 0, "bSynchAddress": 0, "extra_descriptors": []}
+        return SimpleNamespace(**fields)
+
+    def open_device(self, device):
+        self._called("open_device", device)
+        return SimpleNamespace(device=device)
+
+    def close_device(self, handle):
+        self._called("close_device", handle.device)
+
+    def get_configuration(self, handle):
+        self._called("get_configuration")
+        return 1 if self.configured else 0
+
+    def set_configuration(self, handle, value):
+        self._called("set_configuration", value)
+        self.configured = True
+
+    def claim_interface(self, handle, interface):
+        self._called("claim_interface", handle.device)
+
+    def release_interface(self, handle, interface):
+        self._called("release_interface", handle.device)
+
+    def is_kernel_driver_active(self, handle, interface):
+        if self.kernel_driver is None:
+            raise NotImplementedError
+        return self.kernel_driver
+
+    def detach_kernel_driver(self, handle, interface):
+        self._called("detach_kernel_driver")
+        self.kernel_driver = False
+
+    def ctrl_transfer(self, handle, kind, request, value, index, data, timeout):
+        if kind == 0x80:  # a string: languages first
+            text = b"\x09\x04" if value & 0xFF == 0 else self.serials[handle.device].encode("utf-16-le")
+            answer = bytes([len(text) + 2, 3]) + text
+            data[: len(answer)] = type(data)("B", answer)
+            return len(answer)
+        self._called("ctrl_transfer", kind, request, value, index)
+        return 0
+
+    def bulk_write(self, handle, endpoint, interface, data, timeout):
+        self._called("bulk_write", endpoint, bytes(data), timeout)
+        return min(len(data), self.most_written)
+
+    def bulk_read(self, handle, endpoint, interface, buffer, timeout):
+        self._called("bulk_read", endpoint, len(buffer), timeout)
+        if not self.incoming:
+            raise usb.core.USBTimeoutError("timed out", constants.ERROR_TIMEOUT, 110)
+        data = self.incoming.pop(0)[: len(buffer)]
+        buffer[: len(data)] = type(buffer)("B", data)
+        return len(data)
+
+
+class Server(threading.Thread):
+    """A server of the socket's framing, for one client after another.
+
+    ``answers`` maps a kind of request to its answer, (code, bytes); bulk in takes from ``incoming``. Every request is
+    kept in ``requests`` as (kind, at, value, length, timeout_ms, data).
+    """
+
+    def __init__(self, path, *, serial="FALC0001", product=constants.PRODUCT_ID):
+        super().__init__(daemon=True)
+        self.requests = []
+        self.news = threading.Condition()
+        self.answers = {DESCRIPTOR: (0, IDENTITY.pack(constants.VENDOR_ID, product) + serial.encode())}
+        self.incoming = []
+        self.hang_up_at = None  # a kind of request upon which the server goes, in the middle of its answer
+        self._listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        self._listener.bind(str(path))
+        self._listener.listen()
+
+    def __enter__(self):
+        self.start()
+        return self
+
+    def __exit__(self, *_):
+        self._listener.shutdown(socket.SHUT_RDWR)
+        self._listener.close()
+        self.join()
+
+    def run(self):
+        while True:
+            try:
+                client, _ = self._listener.accept()
+            except OSError:
+                return
+            with client, client.makefile("rb") as stream, suppress(BrokenPipeError):
+                self._serve(client, stream)
+
+    def _serve(self, client, stream):
+        while head := stream.read(REQUEST.size):
+            kind, at, value, length, timeout_ms = REQUEST.unpack(head)
+            data = stream.read(length) if kind == BULK_OUT else b""
+            with self.news:
+                self.requests.append((kind, at, value, length, timeout_ms, data))
+                self.news.notify_all()
+            answer = self._answer(kind)
+            if kind == self.hang_up_at:
+                client.sendall(answer[:5])
+                return
+            client.sendall(answer)
+
+    def _answer(self, kind):
+        code, data = self.answers.get(kind, (0, b""))
+        if kind == BULK_IN and kind not in self.answers:
+            code, data = (0, self.incoming.pop(0)) if self.incoming else (constants.ERROR_TIMEOUT, b"")
+        return ANSWER.pack(code, len(data)) + data
+
+    def sent(self):
+        """Return the data of every bulk out."""
+        return [request[5] for request in self.requests if request[0] == BULK_OUT]
+
+    def controls(self):
+        """Return (request, value) of every control request."""
+        return [request[1:3] for request in self.requests if request[0] == CONTROL]
+
+    def wait_for(self, count, timeout_s=30.0):
+        """Wait until ``count`` packets were sent."""
+        with self.news:
+            assert self.news.wait_for(lambda: len(self.sent()) >= count, timeout_s), self.sent()
+
+
+DWORD, POINTER = ctypes.c_uint32, ctypes.c_void_p
+
+
+class D2xx:
+    """FTDI's library with ``devices``, each (serial, description): C functions around a queue of bytes."""
+
+    def __init__(self, *devices):
+        self.devices = devices
+        self.calls = []
+        self.waiting = bytearray()  # has come already
+        self.coming = bytearray()  # comes when one waits
+        self.written = bytearray()
+        self.most_written = 1 << 20
+        self.status = 0
+        move = ctypes.CFUNCTYPE(DWORD, POINTER, POINTER, DWORD, ctypes.POINTER(DWORD))
+        self.FT_Read, self.FT_Write = move(self._read), move(self._write)
+        self.FT_GetQueueStatus = ctypes.CFUNCTYPE(DWORD, POINTER, ctypes.POINTER(DWORD))(self._queue)
+        self.FT_SetTimeouts = ctypes.CFUNCTYPE(DWORD, POINTER, DWORD, DWORD)(self._set_timeouts)
+
+    def __getattr__(self, name):
+        if not name.startswith("FT_"):
+            raise AttributeError(name)
+
+        def function(handle, *arguments):
+            self.calls.append((name, *arguments))
+            return self.status
+
+        return function
+
+    def FT_CreateDeviceInfoList(self, count):  # noqa: N802 - the library's names
+        count._obj.value = len(self.devices)
+        return self.status
+
+    def FT_GetDeviceInfoDetail(self, index, flags, kind, ids, place, serial, description, handle):  # noqa: N802
+        serial.value, description.value = (text.encode() for text in self.devices[index])
+        return self.status
+
+    def FT_Open(self, index, handle):  # noqa: N802
+        self.calls.append(("FT_Open", index))
+        handle._obj.value = 0x1234
+        return self.status
+
+    def _read(self, handle, data, length, count):
+        assert handle == 0x1234
+        if not self.waiting:
+            self.waiting, self.coming = self.coming, bytearray()
+        given = bytes(self.waiting[:length])
+        del self.waiting[:length]
+        ctypes.memmove(data, given, len(given))
+        count[0] = len(given)
+        return self.status
+
+    def _write(self, handle, data, length, count):
+        length = min(length, self.most_written)
+        self.written += ctypes.string_at(data, length)
+        count[0] = length
+        return self.status
+
+    def _queue(self, handle, count):
+        count[0] = len(self.waiting)
+        return self.status
+
+    def _set_timeouts(self, handle, read_ms, write_ms):
+        self.calls.append(("FT_SetTimeouts", read_ms, write_ms))
+        return self.status
+
+
+compiled = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="a C function is compiled")
+
+
+class Python:
+    """The transport's own transfers."""
+
+    def __init__(self, transport):
+        self._transport = transport
+
+    def write(self, data, timeout_s=0.01):
+        self._transport.write(data, timeout_s)
+
+    def read(self, timeout_s=0.01):
+        return self._transport.read(64, timeout_s)
+
+
+class Compiled:
+    """The transfers that compiled code makes, made to fail as the transport's own do."""
+
+    def __init__(self, transport):
+        self.calls = transport.calls()
+        self._count = np.zeros(1, np.int32)
+        kinds = (ctypes.c_ssize_t, ctypes.c_uint8, ctypes.c_ssize_t, ctypes.c_int32, ctypes.c_ssize_t, ctypes.c_uint32)
+        self._transfer = ctypes.CFUNCTYPE(ctypes.c_int32, *kinds)(self.calls.transfer)
+
+    def transfer(self, endpoint, data, timeout_s):
+        address, count = data.ctypes.data, self._count.ctypes.data
+        return self._transfer(self.calls.handle, endpoint, address, data.size, count, round(timeout_s * 1000))
+
+    def write(self, data, timeout_s=0.01):
+        code = self.transfer(constants.ENDPOINT_OUT, np.frombuffer(bytearray(data), np.uint8), timeout_s)
+        if code != 0:
+            raise usb_failure(code, "sending")
+        assert self._count[0] == len(data)
+
+    def read(self, timeout_s=0.01, size=64):
+        buffer = np.full(size + 8, 0xEE, np.uint8)
+        code = self.transfer(constants.ENDPOINT_IN, buffer[:size], timeout_s)
+        assert (buffer[size:] == 0xEE).all()
+        if code not in {constants.SUCCESS, constants.ERROR_TIMEOUT}:
+            raise usb_failure(code, "receiving")
+        return bytes(buffer[: self._count[0]])
+
+
+both = pytest.mark.parametrize("kind", [Python, pytest.param(Compiled, marks=compiled)])
+
+
+def warm(emulator):
+    """Return ``emulator`` with all compiled that a server of it calls, so that nobody waits for that."""
+    emulator.control(constants.REQUEST_LATENCY, constants.LATENCY_RUN_MS)
+    emulator.write(b"\0", 1)
+    emulator.read(constants.USB_PACKET, 1)
+    emulator.pause(1e-3)
+    return emulator

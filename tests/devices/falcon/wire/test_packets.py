@@ -1,0 +1,213 @@
+import re
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from study_app.devices.falcon.wire.constants import FLAG_BLUE, FLAG_HOMING, MOST_TORQUE, PACKET, quiet_packet
+from study_app.devices.falcon.wire.packets import PARSER, STATUS, feed, number, pack, put_number, strip
+from study_app.haptics.model.layout import records
+
+# What a packet is, said once more and otherwise: the parser must find what this finds.
+VALID = re.compile(rb"<[\x41-\x50]{12}[\x41-\xc0][\x00-\xff]>", re.DOTALL)
+
+
+def packed(*torques, flags=0):
+    out = np.zeros(PACKET, np.uint8)
+    pack(np.array(torques, np.int64), flags, out)
+    return bytes(out)
+
+
+def reply(encoders=(0, 0, 0), buttons=0, homed=0, unknown=0x41):
+    """Return what a Falcon answers, spelt out."""
+    numbers = b"".join(bytes(0x41 + int(digit, 16) for digit in f"{n & 0xFFFF:04x}"[::-1]) for n in encoders)
+    return b"<" + numbers + bytes([0x41 + buttons + (homed << 4), unknown]) + b">"
+
+
+class Stream:
+    """A parser and what it said last."""
+
+    def __init__(self):
+        self._parser, self._status = records(PARSER, 1), records(STATUS, 1)
+        self.parser, self.status = self._parser[0], self._status[0]
+
+    def feed(self, data):
+        return feed(self.parser, np.frombuffer(bytearray(data), np.uint8), len(data), self.status)
+
+    @property
+    def encoders(self):
+        return [int(n) for n in self.status.encoders]
+
+
+# numbers
+
+
+def test_every_number_of_16_bits_comes_back():
+    out = np.zeros(6, np.uint8)
+    for value in range(-(1 << 15), 1 << 15):
+        put_number(out, 1, value)
+        assert number(out, 1) == value
+    assert out[0] == out[5] == 0
+
+
+def test_numbers_are_nibbles_from_a_on_the_least_significant_first():
+    out = np.zeros(4, np.uint8)
+    put_number(out, 0, 0x1234)
+    assert bytes(out) == b"EDCB"
+    put_number(out, 0, -1447)  # 0xFA59
+    assert bytes(out) == b"JFKP"
+
+
+# to the device
+
+
+def test_a_packet_of_no_torque_is_the_quiet_packet():
+    assert packed(0, 0, 0) == b"<AAAAAAAAAAAAAA>" == quiet_packet()
+    flags = FLAG_HOMING | FLAG_BLUE
+    assert packed(0, 0, 0, flags=flags) == b"<AAAAAAAAAAAAFA>" == quiet_packet(flags)
+
+
+def test_torques_stand_in_the_order_of_the_arms():
+    assert packed(1, -1, 0x321) == b"<BAAAPPPPBCDAAA>"
+
+
+@given(st.lists(st.integers(-(10**12), 10**12), min_size=3, max_size=3))
+def test_no_torque_beyond_the_most_is_ever_packed_nor_one_of_the_other_sign(torques):
+    packet = np.frombuffer(packed(*torques), np.uint8)
+    for arm, torque in enumerate(torques):
+        assert number(packet, 1 + 4 * arm) == max(-MOST_TORQUE, min(MOST_TORQUE, torque))
+
+
+# the bridge's status bytes
+
+
+@pytest.mark.parametrize("length", [0, 1, 2, 3, 18, 63, 64, 65, 66, 67, 128, 150, 512])
+def test_two_status_bytes_go_at_the_begin_of_every_64(length):
+    data = np.arange(length, dtype=np.int64).astype(np.uint8)
+    expected = b"".join(bytes(data[k + 2 : k + 64]) for k in range(0, length, 64))
+    out = np.zeros(length, np.uint8)
+    kept = strip(data, length, out)
+    assert bytes(out[:kept]) == expected
+    kept = strip(data, length, data)
+    assert bytes(data[:kept]) == expected
+
+
+# from the device
+
+
+def test_a_reply_is_read():
+    stream = Stream()
+    assert stream.feed(reply((1600, -1600, -1), buttons=0b1010, homed=0b101)) == 1
+    assert stream.encoders == [1600, -1600, -1]
+    assert (stream.status.buttons, stream.status.homed, stream.status.count) == (0b1010, 0b101, 1)
+    assert (stream.parser.packets, stream.parser.skipped, stream.parser.held) == (1, 0, 0)
+
+
+@given(
+    st.tuples(*[st.integers(-(1 << 15), (1 << 15) - 1)] * 3),
+    st.integers(0, 15),
+    st.integers(0, 7),
+    st.integers(0, 255),
+)
+def test_whatever_a_reply_says_is_read(encoders, buttons, homed, unknown):
+    stream = Stream()
+    assert stream.feed(reply(encoders, buttons, homed, unknown)) == 1
+    assert (stream.encoders, stream.status.buttons, stream.status.homed) == ([*encoders], buttons, homed)
+
+
+def test_the_newest_of_several_replies_is_kept_and_all_are_counted():
+    stream = Stream()
+    assert stream.feed(reply((1, 2, 3)) + reply((4, 5, 6)) + reply((7, 8, 9))[:9]) == 2
+    assert stream.encoders == [4, 5, 6]
+    assert stream.status.count == stream.parser.packets == 2
+
+
+@pytest.mark.parametrize("cut", range(1, PACKET))
+def test_a_reply_in_two_pieces_is_one_reply(cut):
+    stream = Stream()
+    whole = reply((100, -200, 300), homed=7)
+    assert stream.feed(whole[:cut]) == 0
+    assert stream.parser.held == cut
+    assert stream.feed(whole[cut:]) == 1
+    assert stream.encoders == [100, -200, 300]
+    assert stream.parser.skipped == 0
+
+
+def test_nothing_new_leaves_the_status_alone():
+    stream = Stream()
+    stream.feed(reply((1, 2, 3), buttons=1))
+    assert stream.feed(b"") == 0
+    assert stream.feed(reply((7, 7, 7))[:15]) == 0
+    assert stream.encoders == [1, 2, 3]
+    assert stream.status.count == 1
+
+
+@pytest.mark.parametrize("kept", range(PACKET))
+def test_a_reply_cut_short_is_never_completed_by_the_next(kept):
+    stream = Stream()
+    # status 13, unknown '<': what a parser without checks took for buttons and homed
+    assert stream.feed(reply((5, 5, 5), buttons=13, homed=7, unknown=0x3C)[:kept] + reply((1, 2, 3))) == 1
+    assert stream.encoders == [1, 2, 3]
+    assert (stream.status.buttons, stream.status.homed) == (0, 0)
+    assert stream.parser.skipped == kept
+
+
+@pytest.mark.parametrize("at", range(PACKET))
+def test_a_reply_that_lost_a_byte_within_is_no_reply(at):
+    stream = Stream()
+    broken = reply((5, 6, 7), homed=7)
+    assert stream.feed(broken[:at] + broken[at + 1 :] + reply((1, 2, 3))) == 1
+    assert stream.encoders == [1, 2, 3]
+    assert stream.parser.skipped == PACKET - 1
+
+
+@pytest.mark.parametrize(("at", "byte"), [(0, 0x3D), (1, 0x40), (12, 0x51), (13, 0x40), (13, 0xC1), (15, 0x3D)])
+def test_a_byte_that_may_not_stand_there_spoils_its_packet_alone(at, byte):
+    stream = Stream()
+    spoilt = bytearray(reply())
+    spoilt[at] = byte
+    assert stream.feed(reply((1, 1, 1)) + bytes(spoilt) + reply((2, 2, 2))) == 2
+    assert stream.encoders == [2, 2, 2]
+    assert stream.parser.skipped == PACKET
+
+
+def test_a_start_in_the_place_of_the_unknown_byte_may_be_a_start():
+    stream = Stream()
+    assert stream.feed(reply(unknown=0x3C)[:15] + reply((3, 4, 5))[1:]) == 1
+    assert stream.encoders == [3, 4, 5]
+    assert stream.parser.skipped == 14
+
+
+def test_a_million_random_bytes_make_no_packet():
+    stream = Stream()
+    noise = np.random.default_rng(1).integers(0, 256, 10**6, np.uint8)  # by chance: 10^6 · 2^-65 packets
+    assert stream.feed(noise) == 0
+    assert stream.parser.skipped + stream.parser.held == 10**6
+    assert stream.status.count == 0
+    stream.feed(b"\x00" * PACKET)
+    assert stream.feed(reply((9, 8, 7))) == 1
+    assert stream.encoders == [9, 8, 7]
+
+
+@given(
+    st.lists(
+        st.sampled_from([b"<", b">", b"A", b"P", b"Q", b"\xc0", b"\x00", reply((1, 2, 3)), reply(unknown=0x3C)])
+        | st.builds(lambda at: reply(homed=7)[:at], st.integers(0, 15))
+        | st.builds(lambda at: reply(homed=7)[at:], st.integers(0, 15)),
+        max_size=40,
+    ),
+    st.lists(st.integers(0, 40), max_size=40),
+)
+def test_packets_are_those_that_a_search_from_left_to_right_finds_however_the_stream_is_cut(parts, cuts):
+    data = b"".join(parts)
+    stream = Stream()
+    found, at = 0, 0
+    for cut in [*cuts, len(data)]:
+        found += stream.feed(data[at : at + cut])
+        at = min(at + cut, len(data))
+    matches = VALID.findall(data)
+    assert found == stream.parser.packets == stream.status.count == len(matches)
+    if matches:
+        assert stream.encoders == [number(np.frombuffer(matches[-1], np.uint8), at) for at in (1, 5, 9)]
+    assert stream.parser.skipped + stream.parser.held + PACKET * found == len(data)

@@ -1,0 +1,276 @@
+import threading
+
+import numba
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+if numba.config.DISABLE_JIT:
+    pytest.skip("devices are C functions", allow_module_level=True)
+
+from study_app.devices import is_simulated, list_devices, moves_by_itself
+from study_app.devices.spacemouse import hid as spacemouse_hid
+from study_app.devices.spacemouse.device import SpaceMouseDevice
+from study_app.devices.spacemouse.hid import find_space_mice
+from study_app.devices.spacemouse.reports import (
+    FULL_SPEED_MPS,
+    MODELS,
+    Buttons,
+    Displacement,
+    parse,
+    program_buttons,
+    velocity_mps,
+)
+from study_app.errors import DeviceError, DeviceLost, DeviceNotFound
+from study_app.haptics.model.layout import BUTTON_STOP
+from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.servo import Servo
+
+MODEL = {model.name: model for model in MODELS}
+RIGHT = bytes([1, 0x5E, 0x01, 0, 0, 0, 0])  # 350 to the right
+REST = bytes([1, 0, 0, 0, 0, 0, 0])
+HELD_S = 0.008
+
+
+class FakeHid:
+    """hidapi with these devices connected; one that is opened reports what it is given, 8 ms apart."""
+
+    def __init__(self, *reports, listed=None, opens=True):
+        self.reports = list(reports)
+        self.listed = [interface()] if listed is None else listed
+        self.opens = opens
+        self.now = 0.0
+        self.written = []
+        self.path = None
+        self.open_count = 0
+        self.idle = threading.Event()
+        self.gone = threading.Event()
+
+    def now_s(self):
+        return self.now
+
+    def enumerate(self):
+        return self.listed
+
+    def device(self):
+        return self
+
+    def open_path(self, path):
+        if not self.opens:
+            raise OSError("open failed")
+        self.path = path
+        self.open_count += 1
+
+    def read(self, size, timeout_ms):
+        assert size >= 13
+        if self.gone.is_set():
+            raise OSError("read error")
+        if not self.reports:
+            self.idle.set()
+            self.gone.wait(timeout_ms / 1000)
+            return []
+        report = self.reports.pop(0)
+        self.now += HELD_S
+        if isinstance(report, Exception):
+            raise report
+        return list(report)
+
+    def write(self, data):
+        self.written.append(bytes(data))
+        return len(data)
+
+    def close(self):
+        self.open_count -= 1
+
+
+def interface(model="SpaceNavigator", path=b"first", usage=(1, 8)):
+    known = MODEL[model]
+    told = {} if usage is None else {"usage_page": usage[0], "usage": usage[1]}
+    return {"vendor_id": known.vendor, "product_id": known.product, "path": path, **told}
+
+
+def opened(*reports, **options):
+    hid = FakeHid(*reports, **options)
+    device = SpaceMouseDevice(hid=hid, now_s=hid.now_s)
+    device.open()
+    assert hid.idle.wait(10) or hid.gone.is_set()
+    return device, hid
+
+
+class TestReports:
+    def test_the_displacement_is_read_byte_by_byte(self):
+        assert parse(bytes([1, 0x5E, 0x01, 0xA2, 0xFE, 0x07, 0x00])) == Displacement(right=350, toward=-350, down=7)
+        assert parse(bytes([1, 0xFF, 0xFF, 0x00, 0x01, 0x00, 0x80])) == Displacement(right=-1, toward=256, down=-32768)
+
+    def test_newer_ones_say_the_rotation_in_the_same_report(self):
+        assert parse(bytes([1, 1, 0, 2, 0, 3, 0, 9, 9, 9, 9, 9, 9])) == Displacement(1, 2, 3)
+
+    def test_buttons_are_bits_over_as_many_bytes_as_there_are(self):
+        assert parse(bytes([3, 0x02, 0x00])) == Buttons(0b10)
+        assert parse(bytes([3, 0, 0, 0x40, 0])) == Buttons(1 << 22)
+
+    @pytest.mark.parametrize(
+        "report", [b"", b"\x01", b"\x01\x00\x00\x00\x00\x00", b"\x03", b"\x02" + bytes(6), b"\x17abc"]
+    )
+    def test_rotation_half_reports_and_others_say_nothing(self, report):
+        assert parse(report) is None
+
+    @given(st.binary(max_size=64))
+    def test_no_bytes_upset_it(self, report):
+        said = parse(report)
+        if isinstance(said, Displacement):
+            assert all(abs(speed) <= FULL_SPEED_MPS for speed in velocity_mps(said))
+
+    def test_push_right_is_x_lift_is_y_and_pull_is_z(self):
+        assert velocity_mps(Displacement(350, 0, 0)) == (FULL_SPEED_MPS, 0, 0)
+        assert velocity_mps(Displacement(0, 0, -350)) == (0, FULL_SPEED_MPS, 0)
+        assert velocity_mps(Displacement(0, 350, 0)) == (0, 0, FULL_SPEED_MPS)
+
+    def test_a_cap_at_rest_is_at_rest_and_speed_grows_without_a_step(self):
+        speeds = np.array([velocity_mps(Displacement(v, 0, 0))[0] for v in range(-500, 501)])
+        assert (speeds[480:521] == 0).all()
+        assert np.diff(speeds).max() < FULL_SPEED_MPS / 300
+        assert (np.diff(speeds) >= 0).all()
+        assert speeds == pytest.approx(-speeds[::-1])
+
+    @pytest.mark.parametrize(
+        ("model", "held", "buttons"),
+        [
+            ("SpaceNavigator", 0b01, 0b01),
+            ("SpaceNavigator", 0b10, 0b10),
+            ("SpaceNavigator", 0b11, BUTTON_STOP | 0b11),
+            ("SpaceNavigator", 1 << 3, 0),
+            ("SpaceMouse Pro", 1 << 22, BUTTON_STOP),
+            ("SpaceMouse Pro", 1 << 3, 0),
+            ("SpaceExplorer", 1 << 6, BUTTON_STOP),
+            ("SpacePilot", 1 << 10, BUTTON_STOP),
+        ],
+    )
+    def test_every_model_can_stop_the_force_and_no_other_button_does(self, model, held, buttons):
+        assert program_buttons(held, MODEL[model]) == buttons
+
+
+class TestMoving:
+    def test_how_far_it_is_pushed_is_how_fast_it_goes(self):
+        device, _ = opened(RIGHT, *[RIGHT] * 12, REST, REST, REST)
+        with device, Servo(device, clock=VirtualClock()) as servo:
+            servo.advance(500)
+            expected = 13 * HELD_S * FULL_SPEED_MPS
+            assert servo.telemetry.latest().position_m == pytest.approx([expected, 0, 0], abs=2e-4)
+
+    def test_it_does_not_leave_the_workspace_nor_remember_how_far_it_was_pushed_beyond(self):
+        device, hid = opened(*[RIGHT] * 100, bytes([1, 0xA2, 0xFE, 0, 0, 0, 0]), *[REST] * 2)
+        with device, Servo(device, clock=VirtualClock()) as servo:
+            servo.advance(500)
+            assert servo.telemetry.latest().position_m[0] == pytest.approx(0.05 - HELD_S * FULL_SPEED_MPS, abs=2e-4)
+            assert hid.now > 0.8
+
+    def test_one_that_falls_silent_is_not_followed_for_ever(self):
+        slow = bytes([1, 41, 0, 0, 0, 0, 0])
+        device, hid = opened(slow, *[b""] * 200, REST)
+        with device, Servo(device, clock=VirtualClock()) as servo:
+            servo.advance(500)
+            went_m = 0.5 * velocity_mps(Displacement(41, 0, 0))[0]
+            assert hid.now > 1.5
+            assert servo.telemetry.latest().position_m[0] == pytest.approx(went_m, rel=0.05)
+
+    def test_buttons_are_passed_on(self):
+        device, _ = opened(bytes([3, 1, 0]))
+        with device, Servo(device, clock=VirtualClock()) as servo:
+            servo.advance(5)
+            assert servo.telemetry.latest().buttons == 1
+        device, _ = opened(bytes([3, 3, 0]), bytes([3, 0, 0]))
+        with device, Servo(device, clock=VirtualClock()) as servo:
+            servo.advance(5)
+            assert servo.telemetry.latest().buttons == 0
+
+    def test_its_light_is_on_while_it_is_used(self):
+        device, hid = opened()
+        assert hid.written == [b"\x04\x01"]
+        device.close()
+        assert hid.written[-1] == b"\x04\x00"
+        assert hid.open_count == 0
+        device.close()
+
+
+class TestComingAndGoing:
+    def test_one_that_is_pulled_out_is_lost_and_can_be_opened_again(self):
+        device, hid = opened(RIGHT)
+        with Servo(device, clock=VirtualClock()) as servo:
+            servo.advance(10)
+            hid.gone.set()
+            device._thread.join(10)
+            servo.advance(10)
+            with pytest.raises(DeviceLost, match="spacemouse"):
+                servo.check()
+        device.close()
+        hid.gone.clear()
+        device.open()
+        with Servo(device, clock=VirtualClock()) as servo:
+            servo.advance(10)
+            servo.check()
+        device.close()
+        assert hid.open_count == 0
+
+    def test_none_connected_is_told_with_those_there_are(self):
+        other = {"vendor_id": 0x046D, "product_id": 0xC52B, "path": b"a mouse", "usage_page": 1, "usage": 2}
+        hid = FakeHid(listed=[other])
+        assert find_space_mice(hid) == []
+        with pytest.raises(DeviceNotFound, match=r"no SpaceMouse is connected.*SpaceNavigator"):
+            SpaceMouseDevice(hid=hid).open()
+
+    def test_of_a_receivers_interfaces_the_one_that_reports_motion_is_taken(self):
+        listed = [
+            interface("Universal Receiver", b"keys", (1, 6)),
+            interface("Universal Receiver", b"vendor", (0xFF00, 1)),
+            interface("Universal Receiver", b"motion", (1, 8)),
+        ]
+        device, hid = opened(listed=listed)
+        device.close()
+        assert hid.path == b"motion"
+        with pytest.raises(DeviceError, match=r"usage page 1, usage 8.*pair it"):
+            SpaceMouseDevice(hid=FakeHid(listed=listed[:2])).open()
+
+    def test_one_that_does_not_tell_its_usage_is_tried(self):
+        device, hid = opened(listed=[interface(path=b"silent", usage=None)])
+        device.close()
+        assert hid.path == b"silent"
+
+    @pytest.mark.parametrize(
+        ("platform", "words"),
+        [
+            ("linux", r"KERNELS==.*uaccess.*udevadm control --reload"),
+            ("darwin", "quit 3DconnexionHelper"),
+            ("win32", "close it, and 3DxWare"),
+        ],
+    )
+    def test_one_that_cannot_be_opened_says_what_to_do_on_this_system(self, platform, words, monkeypatch):
+        monkeypatch.setattr("sys.platform", platform)
+        with pytest.raises(DeviceError, match=words):
+            SpaceMouseDevice(hid=FakeHid(opens=False)).open()
+
+    def test_without_hidapi_it_says_what_to_install(self, monkeypatch):
+        def missing(name):
+            raise ImportError(f"no {name} here")
+
+        monkeypatch.setattr(spacemouse_hid, "import_module", missing)
+        with pytest.raises(DeviceError, match=r"no hid.* here.*pip install hidapi"):
+            SpaceMouseDevice().open()
+
+    def test_hidapi_itself_can_be_asked(self):
+        assert isinstance(find_space_mice(spacemouse_hid.load_hid()), list)
+
+
+def test_a_participant_holds_it():
+    assert "spacemouse" in list_devices()
+    assert not is_simulated("spacemouse")
+    assert not moves_by_itself("spacemouse")
+
+
+def test_the_receipt_says_which_it_was():
+    device, _ = opened(listed=[interface("SpaceMouse Pro")])
+    described = device.describe()
+    device.close()
+    assert described["name"] == "spacemouse"
+    assert described["model"] == "SpaceMouse Pro"
