@@ -63,7 +63,7 @@ def offered_workspace() -> Workspace:
 
 
 def _setting() -> str | None:
-    """Return what the settings file says; a file that cannot be used says nothing (`store.machine` reports it)."""
+    """Return what the settings file says; a file that cannot be used says nothing (`store.workstation` reports it)."""
     try:
         document = json.loads(settings_file().read_bytes())
     except (OSError, ValueError):

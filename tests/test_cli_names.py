@@ -10,8 +10,8 @@ from study_app.cli import commands
 from study_app.cli.words import GROUPS
 from study_app.protocol.load import load, source_bytes
 from study_app.store.exclusions import exclusions
-from study_app.store.machine import load as load_settings
-from study_app.store.session import begin
+from study_app.store.sessions.begin import begin
+from study_app.store.workstation import load as load_settings
 
 IN_GROUPS = [name for names in GROUPS.values() for name in names.split()]
 TAKE_A_STUDY = ("export", "plot", "report", "unblind", "exclude", "include", "verify")

@@ -8,13 +8,13 @@ from pathlib import Path
 import pytest
 
 from study_app.session.rehearsal import rehearse
-from study_app.store.blinding import reveal
-from study_app.store.dictionary import dictionary_markdown
+from study_app.store.blinded.blinding import reveal
 from study_app.store.exclusions import exclude
+from study_app.store.tables.column_dictionary import dictionary_markdown
 from tests.compiled import needs_servo
 
 ROOT = Path(__file__).resolve().parent.parent
-BEGIN = "<!-- dictionary: printed by python -m study_app.store.dictionary -->\n\n"
+BEGIN = "<!-- dictionary: printed by python -m study_app.store.tables.column_dictionary -->\n\n"
 END = "\n<!-- end of dictionary -->\n"
 
 
@@ -27,7 +27,9 @@ def section() -> str:
 def test_the_dictionary_stands_there_as_it_is_printed(section: str) -> None:
     assert section.count(BEGIN) == section.count(END) == 1
     held = section.split(BEGIN)[1].split(END, maxsplit=1)[0]
-    assert held == dictionary_markdown(), "put what `python -m study_app.store.dictionary` prints between the comments"
+    assert held == dictionary_markdown(), (
+        "put what `python -m study_app.store.tables.column_dictionary` prints between the comments"
+    )
 
 
 def named_files(section: str) -> set[str]:

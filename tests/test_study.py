@@ -22,11 +22,11 @@ from study_app.evaluation.replay import replay
 from study_app.protocol.load import load, shipped
 from study_app.protocol.orders.schedule import build_schedule, stream
 from study_app.session.rehearsal import rehearse
-from study_app.store import journal
-from study_app.store.blinding import open_or_draw_key, read_key
-from study_app.store.layout import SessionFolder, StudyFolder
-from study_app.store.sealing import opened
-from study_app.store.verify import verify
+from study_app.store.blinded.blinding import open_or_draw_key, read_key
+from study_app.store.blinded.sealing import opened
+from study_app.store.folders import SessionFolder, StudyFolder
+from study_app.store.journals import journal
+from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
 
 pytestmark = needs_servo
@@ -229,7 +229,7 @@ def test_a_finished_folder_names_no_condition_liquid_parameter_or_delay(tmp_path
 KILLED = """
 import sys
 from study_app.session.rehearsal import rehearse
-from study_app.store.session import SessionStore
+from study_app.store.sessions.begin import SessionStore
 
 kept = SessionStore.append
 

@@ -13,8 +13,8 @@ from study_app.errors import StoreError
 from study_app.gui.home.facts import sources, study_facts
 from study_app.protocol.load import load as load_protocol
 from study_app.protocol.load import source_bytes
-from study_app.store.machine import keep_workspace, load, recent_protocols, remember_protocol
-from study_app.store.session import begin
+from study_app.store.sessions.begin import begin
+from study_app.store.workstation import keep_workspace, load, recent_protocols, remember_protocol
 from study_app.user_folder import settings_file
 from study_app.workspace import Workspace, chosen_workspace, offered_workspace, workspace
 

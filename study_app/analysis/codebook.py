@@ -11,9 +11,9 @@ from study_app import __version__
 from study_app.analysis.measures import AGREEMENT, LEVELS, QUARTILES
 from study_app.analysis.questions import Block
 from study_app.analysis.tables import Study
-from study_app.store import blinding
-from study_app.store.columns import MISSING, SEALED, Column
-from study_app.store.formulas import COMPUTED
+from study_app.store.blinded import blinding
+from study_app.store.tables.columns import MISSING, SEALED, Column
+from study_app.store.tables.formulas import COMPUTED
 
 
 def codebook_bytes(study: Study, files: Mapping[str, Iterable[Column]]) -> bytes:

@@ -10,7 +10,7 @@ from study_app import __version__
 from study_app.analysis.codebook import codebook_bytes
 from study_app.analysis.questions import spoken, text_in
 from study_app.analysis.tables import Study
-from study_app.store.columns import Column, variable
+from study_app.store.tables.columns import Column, variable
 
 FOLDER: Final = "psych-ds"
 KEYWORDS: Final = ("haptics", "psychophysics", "liquids", "Likert scale")

@@ -15,7 +15,7 @@ import pandas as pd
 from study_app.analysis.measures import AGREEMENT, LEVELS, QUARTILES
 from study_app.analysis.questions import Setting
 from study_app.analysis.tables import Study
-from study_app.store.columns import PARTICIPANTS, RESPONSES, TRIALS, Column, header, unsealed
+from study_app.store.tables.columns import PARTICIPANTS, RESPONSES, TRIALS, Column, header, unsealed
 
 _STATUS: Final = next(column for column in PARTICIPANTS if column.name == "status")
 _BY_NAME: Final = {column.name: column for column in (*TRIALS, *RESPONSES)}

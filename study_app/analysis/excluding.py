@@ -8,7 +8,7 @@ import pandas as pd
 
 from study_app.errors import AnalysisError
 from study_app.store.exclusions import Exclusion, named
-from study_app.store.layout import StudyFolder
+from study_app.store.folders import StudyFolder
 
 
 def with_excluded(table: pd.DataFrame, listed: Sequence[Exclusion]) -> pd.DataFrame:

@@ -51,7 +51,7 @@ class TakeBack:
 
 @dataclass(frozen=True, slots=True)
 class OpenKey:
-    """Open the sealed key (see ``store.blinding.reveal``)."""
+    """Open the sealed key (see ``store.blinded.blinding.reveal``)."""
 
     folder: Path
     by: str
@@ -97,7 +97,7 @@ class StudiesFound:
 
 @dataclass(frozen=True, slots=True)
 class SessionsFound:
-    """The sessions of a study as rows of ``store.participants``, what is left out, and how the key was last opened."""
+    """The sessions of a study as rows of ``store.tables.participants``, what is left out, and how the key was last opened."""
 
     folder: Path
     rows: tuple[dict[str, Any], ...]

@@ -12,7 +12,7 @@ import pyarrow as pa  # type: ignore[import-untyped]
 from pyarrow import parquet
 
 from study_app.analysis.delivered import Delivered
-from study_app.store.columns import Column
+from study_app.store.tables.columns import Column
 
 _TYPES: Final = {
     "text": pa.string(),

@@ -20,8 +20,8 @@ from study_app.analysis.reaches import Reach, Targets, reaches, targets_of
 from study_app.analysis.tables import Study
 from study_app.errors import StoreError
 from study_app.haptics.model.layout import LIMITER_NAMES
-from study_app.store.layout import StudyFolder
-from study_app.store.recording import read_samples
+from study_app.store.folders import StudyFolder
+from study_app.store.recording_files import read_samples
 
 OF_TRIALS: Final = ("duration_s", "path_m", "force_mean_n", "force_peak_n", "at_limit_percent")
 OF_REACHES: Final = ("movement_time_s", "path_mm", "overshoot_mm", "submovements")

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any, Final, TypeAlias
 
 from study_app.protocol.blocks import Compared
-from study_app.store.blinding import Key
+from study_app.store.blinded.blinding import Key
 
 Kind: TypeAlias = Compared
 

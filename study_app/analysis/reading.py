@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from study_app.errors import AnalysisError
 from study_app.store.atomic import read_regular
-from study_app.store.columns import LATER, MISSING, SEALED, Column, Kind, columns_held, header
-from study_app.store.formulas import unguarded
-from study_app.store.parsing import parse_json
+from study_app.store.journals.parsing import parse_json
+from study_app.store.tables.columns import LATER, MISSING, SEALED, Column, Kind, columns_held, header
+from study_app.store.tables.formulas import unguarded
 
 _ARRAYS: Final[dict[str, tuple[Any, Callable[[Any, Any], Any]]]] = {
     "integer": (np.int64, pd.arrays.IntegerArray),

@@ -14,10 +14,10 @@ from study_app.analysis import reading
 from study_app.analysis.questions import Block, main_blocks, spoken, text_in
 from study_app.analysis.reading import Whole
 from study_app.errors import AnalysisError
-from study_app.store.blinding import Key
-from study_app.store.columns import TABLES
-from study_app.store.layout import SessionFolder
-from study_app.store.parsing import check_study_name
+from study_app.store.blinded.blinding import Key
+from study_app.store.folders import SessionFolder
+from study_app.store.journals.parsing import check_study_name
+from study_app.store.tables.columns import TABLES
 
 
 @dataclass(frozen=True)

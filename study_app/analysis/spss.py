@@ -21,7 +21,7 @@ from study_app.analysis.measures import LEVELS
 from study_app.analysis.tables import Study
 from study_app.analysis.wide import Cells
 from study_app.errors import AnalysisError
-from study_app.store.columns import Column
+from study_app.store.tables.columns import Column
 
 CANNOT_JUDGE: Final = 98
 NOT_ANSWERED: Final = 99

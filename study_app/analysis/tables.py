@@ -21,14 +21,14 @@ from study_app.analysis.excluding import check_there, with_excluded
 from study_app.analysis.questions import Block, Kind, Setting, settings_of
 from study_app.analysis.sessions import Session, read_session, read_tables
 from study_app.errors import AnalysisError, StoreError
-from study_app.store import blinding
-from study_app.store.abandoned import never_begun
-from study_app.store.blinding import Key
-from study_app.store.columns import SEALED
-from study_app.store.doubts import Doubt, doubts
+from study_app.store.blinded import blinding
+from study_app.store.blinded.blinding import Key
 from study_app.store.exclusions import Exclusion, exclusions
-from study_app.store.layout import SessionFolder, StudyFolder
-from study_app.store.open_session import Place
+from study_app.store.folders import SessionFolder, StudyFolder
+from study_app.store.sessions.open_session import Place
+from study_app.store.sessions.unstarted_sessions import never_begun
+from study_app.store.tables.columns import SEALED
+from study_app.store.verification.integrity import Doubt, doubts
 
 COMPLETED: Final = "completed"
 _TRIAL: Final = ["participant", "session", "trial"]
@@ -38,7 +38,7 @@ _TRIAL: Final = ["participant", "session", "trial"]
 class Study:
     """All sessions of one study.
 
-    ``responses`` and ``trials`` have the columns of ``store.columns``, with ``session_status``, ``excluded``,
+    ``responses`` and ``trials`` have the columns of ``store.tables.columns``, with ``session_status``, ``excluded``,
     ``exclusion_reason`` and ``counted`` added; ``participants`` has a row a session, with the last three. ``blocks``
     are the main blocks that ask something; ``settings`` says what every (block, code) stands for, and is empty while
     the key is sealed; ``exclusions`` is what was decided to leave out; ``doubts`` are files that are not as they were

@@ -12,7 +12,7 @@ from study_app.analysis.delivered import Delivered
 from study_app.analysis.measures import by_participant
 from study_app.analysis.questions import Block, Item, Setting
 from study_app.analysis.tables import Study
-from study_app.store.columns import RESPONSES, Column
+from study_app.store.tables.columns import RESPONSES, Column
 
 _PARTICIPANT = next(column for column in RESPONSES if column.name == "participant")
 _SIMULATED = next(column for column in RESPONSES if column.name == "simulated")

@@ -27,12 +27,13 @@ from study_app.analysis.orders import (
     WriteTables,
 )
 from study_app.errors import StoreError
-from study_app.store import blinding, receipt
+from study_app.store import receipt
 from study_app.store.atomic import cannot_read
+from study_app.store.blinded import blinding
+from study_app.store.blinded.unblinding import unblind
 from study_app.store.exclusions import exclude, exclusions, include
-from study_app.store.layout import StudyFolder
-from study_app.store.participants import participants
-from study_app.store.unblinding import unblind
+from study_app.store.folders import StudyFolder
+from study_app.store.tables.participants import participants
 
 if TYPE_CHECKING:
     from study_app.analysis.questions import Block

@@ -33,8 +33,8 @@ from study_app.gui.session_windows import open_windows
 from study_app.gui.theme import LIGHT
 from study_app.protocol.load import parse
 from study_app.protocol.orders.schedule import Schedule, Trial, build_schedule
-from study_app.store.open_session import SessionStore
-from study_app.store.recording import read_frames
+from study_app.store.recording_files import read_frames
+from study_app.store.sessions.open_session import SessionStore
 
 SIZE_PX: Final = (1920, 1080)
 OPERATOR_PX: Final = (1600, 900)

@@ -15,7 +15,7 @@ from study_app.gui.devices.diagnosis import DiagnosisDialog
 from study_app.gui.devices.place import DevicesPlace
 from study_app.gui.devices.view import DeviceShown, device_named, devices_shown
 from study_app.gui.theme import Theme
-from study_app.store.machine import MachineSettings
+from study_app.store.workstation import MachineSettings
 
 PATIENCE_S = 5.0
 HELD = (

@@ -13,8 +13,8 @@ from study_app.gui.choices import NewSession, draw_seed, resumed, study_results
 from study_app.protocol.load import load
 from study_app.session.resume import is_rehearsal
 from study_app.store import receipt
-from study_app.store.layout import locate, refuse_never_begun
-from study_app.store.machine import remember_protocol
+from study_app.store.folders import locate, refuse_never_begun
+from study_app.store.workstation import remember_protocol
 from study_app.workspace import workspace
 
 

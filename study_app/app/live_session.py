@@ -41,7 +41,7 @@ from study_app.session.resume import FIRST, resume_at
 if TYPE_CHECKING:
     from study_app.app.preflight import Preflight
     from study_app.gui.bridge import SessionBridge
-    from study_app.store.open_session import SessionStore
+    from study_app.store.sessions.open_session import SessionStore
 
 CANCELLED = 130
 BUG = 1

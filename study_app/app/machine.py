@@ -16,8 +16,8 @@ from study_app.gui.graphics import has_card
 from study_app.gui.screens import describe_screen, screen_shown, screens_shown
 from study_app.gui.settings.place import MachinePlace
 from study_app.gui.theme import DARK, LIGHT, Theme
-from study_app.store import machine
-from study_app.store.machine import DEFAULTS, DisplayOffset, MachineSettings
+from study_app.store import workstation
+from study_app.store.workstation import DEFAULTS, DisplayOffset, MachineSettings
 from study_app.user_folder import settings_file
 from study_app.workspace import workspace
 
@@ -36,7 +36,7 @@ CALLED: Final = {
 
 def settings_here() -> tuple[MachineSettings, str]:
     """Return what is set, and in a line why it is the defaults where the file cannot be used ("" where it can)."""
-    settings, trouble = machine.load_or_default()
+    settings, trouble = workstation.load_or_default()
     try:
         kind_of(settings.device)
     except DeviceError as error:
@@ -137,7 +137,7 @@ class MachineDesk(QObject):
     def _keep(self, settings: MachineSettings) -> None:
         self.settings = settings
         try:
-            machine.save(settings)
+            workstation.save(settings)
         except StoreError as error:
             self.troubled.emit("This machine's settings could not be kept", f"{error}.")
         self._show()

@@ -26,8 +26,8 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.protocol.trials.task import Stroke, fastest_stroke
 from study_app.session.preflight import Facts, checks
-from study_app.store import journal
-from study_app.store.layout import locate
+from study_app.store.folders import locate
+from study_app.store.journals import journal
 
 LOOK_MS = 100
 PATIENCE_S = 10.0

@@ -45,7 +45,7 @@ from study_app.gui.results.view import (
     Trouble,
 )
 from study_app.gui.sessions.facts import session_facts
-from study_app.store.layout import StudyFolder
+from study_app.store.folders import StudyFolder
 
 LISTEN_MS: Final = 40
 PATIENCE_S: Final = 0.3

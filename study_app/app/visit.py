@@ -20,7 +20,7 @@ from study_app.gui.home.place import HomePlace
 from study_app.gui.home.workspace import WorkspaceDialog
 from study_app.gui.main_window import MainWindow
 from study_app.gui.screens import place
-from study_app.store.machine import MachineSettings, create_workspace
+from study_app.store.workstation import MachineSettings, create_workspace
 from study_app.workspace import Workspace, chosen_workspace, offered_workspace, workspace
 
 LOOK_AFTER_MS = 300  # the window stands by then

@@ -16,7 +16,7 @@ STARTED = 16  # letters of a time down to the minute
 @click.argument("folder", metavar="[DIR]", required=False, type=Target())
 def workspace(folder: Path | None) -> None:
     """Print the workspace, the folder of protocols and results of this machine; with DIR, change it."""
-    from study_app.store.machine import keep_workspace
+    from study_app.store.workstation import keep_workspace
     from study_app.workspace import WORKSPACE_VARIABLE, Workspace, chosen_workspace
     from study_app.workspace import workspace as workspace_here
 
@@ -33,8 +33,8 @@ def studies() -> None:
     """List the protocols at hand, and the studies in the workspace's results."""
     from study_app.errors import ProtocolError
     from study_app.protocol.load import at_hand, is_scene_file, load
-    from study_app.store.layout import StudyFolder
-    from study_app.store.machine import recent_protocols
+    from study_app.store.folders import StudyFolder
+    from study_app.store.workstation import recent_protocols
     from study_app.workspace import workspace as workspace_here
 
     here = workspace_here()
@@ -60,8 +60,8 @@ def studies() -> None:
 def sessions(named: str | None, results: Path | None) -> None:
     """List the sessions of a study, or of every study in the workspace, as commands take them for SESSION."""
     from study_app.store.exclusions import exclusions
-    from study_app.store.layout import StudyFolder
-    from study_app.store.participants import participants
+    from study_app.store.folders import StudyFolder
+    from study_app.store.tables.participants import participants
     from study_app.workspace import workspace as workspace_here
 
     at = workspace_here().results

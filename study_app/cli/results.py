@@ -51,7 +51,7 @@ def plot(results: Path, to: Path) -> None:
 @click.option("--reason", required=True, metavar="TEXT", help="Why; recorded with the time.")
 def unblind(results: Path, by: str, reason: str) -> None:
     """Open the sealed key of a study, and write the sealed columns; who, when and why are recorded."""
-    from study_app.store.unblinding import unblind as unblind_study
+    from study_app.store.blinded.unblinding import unblind as unblind_study
 
     found = unblind_study(results, by=by, reason=reason)
     for block, codes in found.codes.items():
@@ -95,7 +95,7 @@ def include(results: Path, participant: str, session: int, trial: int | None, by
 @takes_session
 def rebuild(session: Path) -> None:
     """Make a session's tables again from its journal."""
-    from study_app.store.rebuild import rebuild as rebuild_session
+    from study_app.store.sessions.rebuild import rebuild as rebuild_session
 
     made = rebuild_session(session)
     for path in made.rewritten:
@@ -112,7 +112,7 @@ def rebuild(session: Path) -> None:
 @takes_session
 def reproduce(session: Path) -> None:
     """Make a session's orders again from its receipt and compare them with those that were run."""
-    from study_app.store.reproduced import reproduced
+    from study_app.store.verification.reproduction import reproduced
 
     differences = reproduced(session)
     for difference in differences:
@@ -132,7 +132,7 @@ def reproduce(session: Path) -> None:
 )
 def verify(results: Path, fingerprints: Path | None) -> None:
     """Check everything in a study's folder: columns, checksums, receipts, journals, key, recordings, Psych-DS."""
-    from study_app.store.verify import verify as verify_study
+    from study_app.store.verification.verify_study import verify as verify_study
 
     found = verify_study(results, fingerprints)
     for kind, findings in (

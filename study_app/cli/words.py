@@ -105,7 +105,7 @@ def session_at(named: str, results: Path | None) -> Path:
 
     With ``results``, a study's folder, the name is PARTICIPANT/NUMBER.
     """
-    from study_app.store.layout import StudyFolder
+    from study_app.store.folders import StudyFolder
     from study_app.workspace import workspace
 
     path = Path(named)
@@ -121,7 +121,7 @@ def session_at(named: str, results: Path | None) -> Path:
 
 def keep_offered_workspace() -> None:
     """Make the offered workspace this machine's, and say so, where none was chosen: data are about to go there."""
-    from study_app.store.machine import keep_workspace
+    from study_app.store.workstation import keep_workspace
     from study_app.workspace import chosen_workspace, offered_workspace
 
     if chosen_workspace() is None:

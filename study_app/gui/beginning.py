@@ -14,11 +14,11 @@ from study_app.gui.choices import NewSession
 from study_app.protocol.model import Protocol
 from study_app.session.preflight import Facts, Screen
 from study_app.store.clock import SessionClock
-from study_app.store.description import check_study
-from study_app.store.layout import StudyFolder, check_participant, check_unused
-from study_app.store.open_session import SessionStore
-from study_app.store.resume import reopen
-from study_app.store.session import begin
+from study_app.store.folders import StudyFolder, check_participant, check_unused
+from study_app.store.sessions.begin import begin
+from study_app.store.sessions.open_session import SessionStore
+from study_app.store.sessions.reopen import reopen
+from study_app.store.tables.study_description import check_study
 
 MEASURED_S = 2.0  # so long the servo is looked at before a session
 

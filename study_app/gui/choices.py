@@ -15,9 +15,9 @@ from study_app.protocol.load import parse, source_bytes
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import stream
 from study_app.session.resume import find_protocol, source_to_resume
-from study_app.store.layout import locate, refuse_never_begun, study_folder
+from study_app.store.folders import locate, refuse_never_begun, study_folder
 from study_app.store.progress import progress
-from study_app.store.resume import check_can_go_on
+from study_app.store.sessions.reopen import check_can_go_on
 
 MAX_SEED = 999_999
 

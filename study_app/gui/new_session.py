@@ -32,9 +32,9 @@ from study_app.gui.labels import label, set_ink
 from study_app.gui.screens import screens_shown
 from study_app.gui.theme import LIGHT, Theme, font
 from study_app.gui.themed import wear
-from study_app.store.description import check_study
-from study_app.store.layout import MAX_SESSION, StudyFolder, UsedIds, check_participant, used_ids
-from study_app.store.machine import DEFAULTS, MachineSettings
+from study_app.store.folders import MAX_SESSION, StudyFolder, UsedIds, check_participant, used_ids
+from study_app.store.tables.study_description import check_study
+from study_app.store.workstation import DEFAULTS, MachineSettings
 from study_app.workspace import workspace
 
 _NOTES = {

@@ -27,8 +27,8 @@ from study_app.session.resume import REHEARSED_SCREENS
 from study_app.session.simulated import Draw, filled_in, reading_s
 from study_app.session.state import FINAL
 from study_app.store.clock import SessionClock
-from study_app.store.layout import rehearsal_folder
-from study_app.store.simulated import SimulatedSession, SimulatedStudy
+from study_app.store.folders import rehearsal_folder
+from study_app.store.sessions.simulated_sessions import SimulatedSession, SimulatedStudy
 from study_app.workspace import workspace
 
 DEVICE = {"name": "answers-only", "measured": False}

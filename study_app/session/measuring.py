@@ -16,7 +16,7 @@ from study_app.haptics.runtime.telemetry import timing
 from study_app.session.ports import ServoPort
 from study_app.session.preflight import Facts, Screen
 from study_app.store.atomic import probe
-from study_app.store.blinding import sealed_hash
+from study_app.store.blinded.blinding import sealed_hash
 
 LOOK_S = 1 / 60
 

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 from study_app.haptics.model.scene import Scene
 from study_app.session.pages import Page
-from study_app.store.blinding import Key
+from study_app.store.blinded.blinding import Key
 from study_app.store.clock import SessionClock
 
 
@@ -30,7 +30,7 @@ class ServoPort(Protocol):
 
 
 class JournalPort(Protocol):
-    """What is asked of the store (``store.open_session.SessionStore``)."""
+    """What is asked of the store (``store.sessions.open_session.SessionStore``)."""
 
     @property
     def fingerprint(self) -> str: ...  # noqa: D102
@@ -51,7 +51,7 @@ class RecorderPort(Protocol):
 
 
 class KeptSession(JournalPort, Protocol):
-    """What is asked of the store of a rehearsed session (``store.open_session.SessionStore``)."""
+    """What is asked of the store of a rehearsed session (``store.sessions.open_session.SessionStore``)."""
 
     clock: SessionClock
     recorder: Any

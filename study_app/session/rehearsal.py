@@ -38,14 +38,14 @@ from study_app.session.runner import Runner
 from study_app.session.simulated import Draw, Explorer, Reacher, Senses, filled_in, reading_s
 from study_app.session.trial import TankView
 from study_app.session.unkept import Unkept
-from study_app.store import journal
 from study_app.store.clock import SessionClock
-from study_app.store.description import check_study
-from study_app.store.layout import StudyFolder, check_unused, locate, rehearsal_folder
-from study_app.store.open_session import SessionStore
+from study_app.store.folders import StudyFolder, check_unused, locate, rehearsal_folder
+from study_app.store.journals import journal
 from study_app.store.progress import progress_of
-from study_app.store.resume import reopen
-from study_app.store.session import begin
+from study_app.store.sessions.begin import begin
+from study_app.store.sessions.open_session import SessionStore
+from study_app.store.sessions.reopen import reopen
+from study_app.store.tables.study_description import check_study
 from study_app.workspace import workspace
 
 LOOK_S = 0.05  # the session looks at the device so often

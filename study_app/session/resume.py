@@ -12,10 +12,10 @@ from study_app.errors import ProtocolError, SessionError
 from study_app.protocol.load import at_hand, parse, protocol_hash, source_bytes
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import PageStep, Schedule, Step, Trial
-from study_app.store.journal import Line
-from study_app.store.machine import recent_protocols
+from study_app.store.journals.journal import Line
 from study_app.store.progress import Progress, attempts, progress_of
-from study_app.store.resume import sealed_source
+from study_app.store.sessions.reopen import sealed_source
+from study_app.store.workstation import recent_protocols
 
 REHEARSED_SCREENS: dict[str, Any] = {"participant": "simulated", "refresh_hz": 60}
 

@@ -141,7 +141,7 @@ class RunningTrial:
         return self._servo.now_ns() if self._tracker.end_ns is None else self._tracker.end_ns
 
     def summary(self) -> dict[str, Any]:
-        """Return what its row records until now (``store.columns``)."""
+        """Return what its row records until now (``store.tables.columns``)."""
         return self._tracker.summary() | self._statistics.summary(
             samples_dropped=0 if self._serial is None else self._reader.dropped - self._dropped_before,
             worst_gap_s=self._servo.worst_gap_s,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from study_app.store.blinding import Key
+from study_app.store.blinded.blinding import Key
 from study_app.store.clock import SessionClock
 
 

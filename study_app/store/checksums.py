@@ -11,7 +11,7 @@ from pathlib import Path
 import study_app
 from study_app.errors import StoreError
 from study_app.store.atomic import append_line, cannot_read, open_regular, paths_in, read_own, study_root, write_file
-from study_app.store.layout import REBUILT, SessionFolder
+from study_app.store.folders import REBUILT, SessionFolder
 
 _LINE = re.compile(r"([0-9a-f]{64})  (.+)")
 

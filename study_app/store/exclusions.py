@@ -11,14 +11,14 @@ from datetime import datetime
 from pathlib import Path
 
 from study_app.errors import StoreError
-from study_app.store import journal
 from study_app.store.atomic import append_line, cannot_read, read_regular, write_file
-from study_app.store.columns import EXCLUSIONS, MISSING, header
-from study_app.store.formulas import unguarded
-from study_app.store.layout import StudyFolder
-from study_app.store.opening import open_alone
+from study_app.store.folders import StudyFolder
+from study_app.store.journals import journal
 from study_app.store.progress import attempts
-from study_app.store.tables import csv_bytes
+from study_app.store.sessions.folder_lock import open_alone
+from study_app.store.tables.columns import EXCLUSIONS, MISSING, header
+from study_app.store.tables.formulas import unguarded
+from study_app.store.tables.session_tables import csv_bytes
 
 NAMED_IDS = 6
 

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from study_app.errors import StoreError
-from study_app.store import journal
-from study_app.store.journal import Line
-from study_app.store.layout import locate
+from study_app.store.folders import locate
+from study_app.store.journals import journal
+from study_app.store.journals.journal import Line
 
 _ROUNDED_S = 1.1e-6
 

@@ -20,9 +20,9 @@ from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import block_codes
 from study_app.store.atomic import read_own, study_root, write_file
-from study_app.store.events import holds, shortened
-from study_app.store.journal import plain
-from study_app.store.parsing import parse_json
+from study_app.store.journals.journal import plain
+from study_app.store.journals.journal_events import holds, shortened
+from study_app.store.journals.parsing import parse_json
 
 GENERATOR = (
     "random.Random (Mersenne Twister), one per named stream, seeded by SHA-256 of (seed, name); only .random() is "

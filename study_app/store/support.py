@@ -15,7 +15,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Final
 
-from study_app.store import machine, receipt
+from study_app.store import receipt, workstation
 from study_app.store.atomic import write_file
 from study_app.store.program_log import kept_log, last_error, source_place
 from study_app.workspace import workspace
@@ -57,7 +57,7 @@ def write_support(path: Path, diagnosis: str = "") -> None:
 
 
 def _parts(diagnosis: str) -> Iterator[tuple[str, str]]:
-    settings, trouble = machine.load_or_default()
+    settings, trouble = workstation.load_or_default()
     log = kept_log()
     yield "README.txt", ABOUT
     yield "versions.json", _json(receipt.versions() | {name: _version(name) for name in _DRIVERS})
@@ -70,7 +70,7 @@ def _parts(diagnosis: str) -> Iterator[tuple[str, str]]:
         yield f"crash-{number}.txt", trace
 
 
-def _settings(settings: machine.MachineSettings) -> dict[str, object]:
+def _settings(settings: workstation.MachineSettings) -> dict[str, object]:
     """Return the settings; of private ones whether they are set."""
     held = settings.model_dump(mode="json")
     return {name: bool(value) if name in _PRIVATE else value for name, value in held.items()}

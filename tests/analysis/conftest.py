@@ -13,12 +13,13 @@ import pytest
 from study_app.protocol.load import load, parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Trial, build_schedule
-from study_app.store import blinding, receipt
-from study_app.store.blinding import Key
-from study_app.store.columns import RESPONSES, TRIALS, Column
+from study_app.store import receipt
+from study_app.store.blinded import blinding
+from study_app.store.blinded.blinding import Key
 from study_app.store.exclusions import Exclusion, exclusion_bytes, exclusions
-from study_app.store.layout import SessionFolder, StudyFolder
-from study_app.store.tables import csv_bytes
+from study_app.store.folders import SessionFolder, StudyFolder
+from study_app.store.tables.columns import RESPONSES, TRIALS, Column
+from study_app.store.tables.session_tables import csv_bytes
 
 SMALL = """
 format = 1

@@ -12,7 +12,7 @@ import pandas as pd
 from study_app.analysis.decided import NOTHING, Decided
 from study_app.analysis.questions import Block, Item, Setting
 from study_app.analysis.tables import Study
-from study_app.store.columns import RESPONSES, TRIALS, Column
+from study_app.store.tables.columns import RESPONSES, TRIALS, Column
 
 TYPES = {"text": "string", "time": "string", "integer": "Int64", "number": "Float64", "flag": "boolean"}
 ITEMS = ("different", "harder")

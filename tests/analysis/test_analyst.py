@@ -37,7 +37,7 @@ from study_app.analysis.worker import carry_out
 from study_app.errors import AnalysisError, StoreError, StudyError
 from study_app.protocol.load import load
 from study_app.store.exclusions import exclusions
-from study_app.store.layout import StudyFolder
+from study_app.store.folders import StudyFolder
 from tests.studies import rehearsed
 
 SOON_S = 120.0

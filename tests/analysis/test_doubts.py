@@ -14,8 +14,8 @@ from click.testing import CliRunner
 
 from study_app.analysis.tables import load_study
 from study_app.cli import commands
-from study_app.store.layout import SessionFolder, StudyFolder
-from study_app.store.rebuild import rebuild
+from study_app.store.folders import SessionFolder, StudyFolder
+from study_app.store.sessions.rebuild import rebuild
 from tests.analysis.test_sample import SAMPLE
 
 

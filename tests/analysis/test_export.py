@@ -11,8 +11,8 @@ from study_app.analysis.delivered import Delivered
 from study_app.analysis.export import export
 from study_app.analysis.output import write_files
 from study_app.errors import AnalysisError
-from study_app.store.columns import RESPONSES, SEALED, TRIALS, Column, header, unsealed
-from study_app.store.formulas import unguarded
+from study_app.store.tables.columns import RESPONSES, SEALED, TRIALS, Column, header, unsealed
+from study_app.store.tables.formulas import unguarded
 from tests.analysis.conftest import CANNOT_JUDGE, DELAY_ERROR_MS, HIDDEN, Results
 
 NAMES = {

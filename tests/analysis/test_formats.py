@@ -22,7 +22,7 @@ from study_app.analysis.spss import CANNOT_JUDGE, NOT_ANSWERED, names_of
 from study_app.cli import commands
 from study_app.errors import AnalysisError
 from study_app.protocol.load import parse
-from study_app.store.psychds import validate
+from study_app.store.verification.psychds import validate
 from tests.analysis.conftest import HIDDEN, SMALL, Results, make_results
 
 pyreadstat = pytest.importorskip("pyreadstat", reason="the extra spss is not installed")

@@ -13,8 +13,8 @@ from study_app.analysis.performance import performance
 from study_app.analysis.reaches import Targets, path_length_m, reaches, submovements
 from study_app.analysis.tables import load_study
 from study_app.session.rehearsal import rehearse
-from study_app.store.layout import StudyFolder
-from study_app.store.unblinding import unblind
+from study_app.store.blinded.unblinding import unblind
+from study_app.store.folders import StudyFolder
 from tests.compiled import needs_servo
 
 TWO = Targets(np.array([[-0.03, 0, 0], [0.03, 0, 0]]), 0.006, 0.5)

@@ -13,14 +13,15 @@ from study_app.analysis.export import export
 from study_app.analysis.figures import plot
 from study_app.analysis.tables import load_study
 from study_app.session.rehearsal import rehearse
-from study_app.store import journal, receipt
-from study_app.store.blinding import read_key
+from study_app.store import receipt
+from study_app.store.blinded.blinding import read_key
+from study_app.store.blinded.sealing import opened
+from study_app.store.blinded.unblinding import unblind
 from study_app.store.exclusions import exclude
-from study_app.store.layout import SessionFolder, StudyFolder
-from study_app.store.reproduced import reproduced
-from study_app.store.sealing import opened
-from study_app.store.unblinding import unblind
-from study_app.store.verify import verify
+from study_app.store.folders import SessionFolder, StudyFolder
+from study_app.store.journals import journal
+from study_app.store.verification.reproduction import reproduced
+from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
 
 ROOT = Path(__file__).resolve().parents[2]

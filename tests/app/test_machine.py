@@ -21,8 +21,8 @@ from study_app.devices.backends import NONE, READY, Backend
 from study_app.gui.choices import NewSession
 from study_app.gui.dialogs import Notice
 from study_app.gui.theme import DARK, LIGHT
-from study_app.store import machine
-from study_app.store.machine import DEFAULTS, DisplayOffset, MachineSettings, load, save
+from study_app.store import workstation
+from study_app.store.workstation import DEFAULTS, DisplayOffset, MachineSettings, load, save
 from study_app.user_folder import settings_file
 
 MOUSE = Backend("mouse", "the window", READY, "seen, not felt")
@@ -193,7 +193,7 @@ def test_the_display_test_is_one_click_from_home(visit, qtbot):
 
 
 def test_a_damaged_file_is_told_when_the_window_opens(qtbot, tmp_path, monkeypatch):
-    monkeypatch.setattr(machine, "load_or_default", lambda: (DEFAULTS, "the file is no JSON"))
+    monkeypatch.setattr(workstation, "load_or_default", lambda: (DEFAULTS, "the file is no JSON"))
     made = Visit(tmp_path)
     qtbot.addWidget(made.window)
     made.devices._look = lambda: [MOUSE]

@@ -20,9 +20,9 @@ from study_app.errors import StudyError
 from study_app.gui.controls import ActionButton
 from study_app.gui.main_window import MainWindow
 from study_app.gui.place import Place
-from study_app.store.blinding import reveals
+from study_app.store.blinded.blinding import reveals
 from study_app.store.exclusions import exclude, exclusions
-from study_app.store.layout import StudyFolder
+from study_app.store.folders import StudyFolder
 from tests.studies import rehearsed
 
 SOON_MS = 120_000

@@ -32,7 +32,7 @@ from study_app.session.ports import Ports
 from study_app.session.runner import Runner
 from study_app.session.state import Phase
 from study_app.store.clock import SessionClock
-from study_app.store.session import begin
+from study_app.store.sessions.begin import begin
 from tests.session.fakes import FakeServo
 
 

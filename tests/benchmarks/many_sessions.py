@@ -18,13 +18,13 @@ from pathlib import Path
 
 from study_app.gui.sessions.facts import sessions
 from study_app.session.answers_only import rehearse_answers
-from study_app.store import journal
 from study_app.store.checksums import write_checksums
-from study_app.store.fingerprints import fingerprint, note_fingerprint
-from study_app.store.journal import Line, line_bytes
-from study_app.store.layout import SessionFolder, StudyFolder
-from study_app.store.open_session import Place, table_files
-from study_app.store.participants import write_participants
+from study_app.store.folders import SessionFolder, StudyFolder
+from study_app.store.journals import journal
+from study_app.store.journals.journal import Line, line_bytes
+from study_app.store.sessions.open_session import Place, table_files
+from study_app.store.tables.participants import write_participants
+from study_app.store.verification.fingerprints import fingerprint, note_fingerprint
 
 SESSIONS = 3000
 REHEARSED = 5
@@ -35,7 +35,7 @@ LIMIT_LIST_S = 1.0
 VERIFY = """
 import re, sys, time
 from pathlib import Path
-from study_app.store.verify import verify
+from study_app.store.verification.verify_study import verify
 begun = time.process_time()
 found = verify(Path(sys.argv[1]))
 each_s = (time.process_time() - begun) / found.sessions

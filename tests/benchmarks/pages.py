@@ -18,7 +18,7 @@ from study_app.protocol.orders.schedule import build_schedule
 from study_app.session.rehearsal import Machine, Rehearsal
 from study_app.session.resume import REHEARSED_SCREENS
 from study_app.store.clock import SessionClock
-from study_app.store.session import begin
+from study_app.store.sessions.begin import begin
 
 TRIALS = 5000
 COMPARED = 500

@@ -20,7 +20,7 @@ from study_app.haptics.runtime.pack import elements_needed
 from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.load import load
 from study_app.store.recorder import Recorded, Recorder
-from study_app.store.recording import read_samples
+from study_app.store.recording_files import read_samples
 
 LIMIT_MB = 60.0
 HALF_AN_HOUR = 1_800_000

@@ -13,8 +13,8 @@ from pathlib import Path
 
 from study_app.protocol.load import load
 from study_app.session.rehearsal import rehearse
-from study_app.store import journal
-from study_app.store.layout import StudyFolder
+from study_app.store.folders import StudyFolder
+from study_app.store.journals import journal
 
 
 def main(name: str = "rek2024", participants: int = 5) -> None:

@@ -19,7 +19,7 @@ from study_app.gui.application import application_here
 from study_app.gui.home.facts import study_facts
 from study_app.gui.new_session import NewSessionDialog
 from study_app.protocol.load import load, source_bytes
-from study_app.store.session import begin
+from study_app.store.sessions.begin import begin
 
 SESSIONS = 300
 STANDS_S = 4.0

@@ -16,9 +16,9 @@ import numpy as np
 from study_app.haptics.model.layout import LIMITER_NAMES, SAMPLE
 from study_app.protocol.load import load, source_bytes
 from study_app.protocol.orders.schedule import build_schedule
-from study_app.store.rebuild import rebuild
-from study_app.store.session import SessionStore, begin
-from study_app.store.verify import verify
+from study_app.store.sessions.begin import SessionStore, begin
+from study_app.store.sessions.rebuild import rebuild
+from study_app.store.verification.verify_study import verify
 
 LIMIT_MS = 5.0
 LIMIT_VERIFY_S = 20.0

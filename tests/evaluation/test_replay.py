@@ -25,16 +25,16 @@ from study_app.session.ports import Ports
 from study_app.session.rehearsal import rehearse
 from study_app.session.resume import resume_at
 from study_app.session.runner import Runner
-from study_app.store import recording
+from study_app.store import recording_files
 from study_app.store.clock import SessionClock
-from study_app.store.layout import StudyFolder
-from study_app.store.open_session import SessionStore
-from study_app.store.resume import reopen
-from study_app.store.session import begin
+from study_app.store.folders import StudyFolder
+from study_app.store.sessions.begin import begin
+from study_app.store.sessions.open_session import SessionStore
+from study_app.store.sessions.reopen import reopen
 from tests.compiled import needs_servo
 from tests.faults import short
 from tests.session import small
-from tests.store.forging import Lines, forge
+from tests.store.verification.forging import Lines, forge
 
 pytestmark = needs_servo
 
@@ -169,7 +169,7 @@ def test_a_rehearsed_session_comes_out_to_the_last_bit(rehearsed: Path) -> None:
     assert found.recordings == 4
     assert found.lasted_s > 3
     assert found.seconds == sum(
-        len(recording.read_checks(path).device_force)
+        len(recording_files.read_checks(path).device_force)
         for path in session(rehearsed).glob("recordings/trial-00?.parquet")
     )
     assert found.proved

@@ -18,8 +18,8 @@ from pathlib import Path
 from study_app.analysis.export import export
 from study_app.analysis.report.writing import report
 from study_app.session import rehearsal
-from study_app.store.rebuild import rebuild
-from study_app.store.unblinding import unblind
+from study_app.store.blinded.unblinding import unblind
+from study_app.store.sessions.rebuild import rebuild
 from tests.faults.killer import SEED, forked
 
 COMMANDS = {"export": (6, 0.0), "rebuild": (12, 0.0), "unblind": (12, 0.0), "report": (1, 0.9)}

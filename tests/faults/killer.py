@@ -19,7 +19,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from study_app.session import rehearsal
-from study_app.store.rebuild import rebuild
+from study_app.store.sessions.rebuild import rebuild
 
 SEED = 7
 

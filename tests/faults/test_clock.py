@@ -10,10 +10,11 @@ from typing import Any
 import pytest
 
 from study_app.session.state import Phase
-from study_app.store import clock, resume
+from study_app.store import clock
 from study_app.store.clock import SessionClock
-from study_app.store.resume import reopen
-from study_app.store.verify import verify
+from study_app.store.sessions import reopen as resume
+from study_app.store.sessions.reopen import reopen
+from study_app.store.verification.verify_study import verify
 from tests.faults.worlds import StoredWorld
 from tests.session import small
 

@@ -16,8 +16,8 @@ from study_app.session.events import Note
 from study_app.session.pages import EndPage, PausePage, TroublePage
 from study_app.session.runner import RETRY_S
 from study_app.session.state import Phase
-from study_app.store import journal
-from study_app.store.verify import verify
+from study_app.store.journals import journal
+from study_app.store.verification.verify_study import verify
 from tests.faults.worlds import StoredWorld
 from tests.session import small
 

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import pytest
 
-from study_app.store import journal
-from study_app.store.layout import StudyFolder
-from study_app.store.verify import verify
+from study_app.store.folders import StudyFolder
+from study_app.store.journals import journal
+from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
 
 FROZEN_S = 1.5

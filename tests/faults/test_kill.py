@@ -13,9 +13,10 @@ from typing import Any
 import pytest
 
 from study_app.protocol.load import load
-from study_app.store import journal, tables
-from study_app.store.layout import SessionFolder, StudyFolder
-from study_app.store.verify import verify
+from study_app.store.folders import SessionFolder, StudyFolder
+from study_app.store.journals import journal
+from study_app.store.tables import session_tables
+from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
 from tests.faults import short
 
@@ -56,7 +57,7 @@ def rows(study: Path, name: str) -> list[dict[str, str]]:
 def answers(study: Path) -> list[dict[str, str]]:
     """Return the responses of each trial's last attempt without times and attempts."""
     found = rows(study, "responses")
-    last = {(row["trial"], row["attempt"]) for row in tables.latest(typed(found))}
+    last = {(row["trial"], row["attempt"]) for row in session_tables.latest(typed(found))}
     return [
         {name: cell for name, cell in row.items() if name not in TIMES}
         for row in found
@@ -69,7 +70,7 @@ def typed(found: list[dict[str, str]]) -> list[dict[str, Any]]:
 
 
 def last_attempts(study: Path) -> list[tuple[str, ...]]:
-    return [tuple(str(row[name]) for name in WHAT_RAN) for row in tables.latest(typed(rows(study, "trials")))]
+    return [tuple(str(row[name]) for name in WHAT_RAN) for row in session_tables.latest(typed(rows(study, "trials")))]
 
 
 @pytest.mark.parametrize(("resume", "count"), [("trial", 35), ("block", 15)])

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from study_app.store.verify import verify
+from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
 from tests.faults import short
 from tests.faults.command_killer import COMMANDS

@@ -19,8 +19,8 @@ from study_app.gui.participant import ParticipantWindow
 from study_app.protocol.load import load, source_bytes
 from study_app.session.pages import TaskPage
 from study_app.store import receipt
-from study_app.store.layout import StudyFolder
-from study_app.store.leaks import Telltales, leaks, telltales
+from study_app.store.folders import StudyFolder
+from study_app.store.verification.leaks import Telltales, leaks, telltales
 from tests.compiled import needs_servo
 from tests.faults import short
 from tests.faults.windows import Person

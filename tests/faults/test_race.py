@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 
 from study_app.errors import StoreError
-from study_app.store.layout import StudyFolder
-from study_app.store.session import begin
-from study_app.store.verify import verify
+from study_app.store.folders import StudyFolder
+from study_app.store.sessions.begin import begin
+from study_app.store.verification.verify_study import verify
 from tests.session import small
 
 TIMES = 100

@@ -13,8 +13,8 @@ from typing import Any
 import pytest
 
 from study_app.evaluation.replay import replay
-from study_app.store.layout import StudyFolder
-from study_app.store.verify import verify
+from study_app.store.folders import StudyFolder
+from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
 from tests.real_windows import COMPILED_S, needs_display, virtual_display
 

@@ -11,10 +11,10 @@ import pytest
 from study_app.analysis.tables import load_study
 from study_app.session.events import EndAsked, Note, RepeatAsked
 from study_app.session.state import Phase
-from study_app.store import journal
 from study_app.store.exclusions import exclude, exclusions
-from study_app.store.formulas import unguarded
-from study_app.store.verify import verify
+from study_app.store.journals import journal
+from study_app.store.tables.formulas import unguarded
+from study_app.store.verification.verify_study import verify
 from tests.faults.worlds import StoredWorld
 
 TEXTS = (

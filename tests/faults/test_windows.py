@@ -19,10 +19,10 @@ from study_app.gui import beginning
 from study_app.gui.operator import OperatorWindow
 from study_app.gui.participant import ParticipantWindow
 from study_app.session.pages import PausePage, TaskPage
-from study_app.store import journal
-from study_app.store.layout import StudyFolder
+from study_app.store.folders import StudyFolder
+from study_app.store.journals import journal
 from study_app.store.progress import progress_of
-from study_app.store.verify import verify
+from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
 from tests.faults import short
 from tests.faults.windows import Person

@@ -11,8 +11,8 @@ from study_app.session.ports import Ports
 from study_app.session.runner import Runner
 from study_app.session.state import Phase
 from study_app.store.clock import SessionClock
-from study_app.store.open_session import SessionStore
-from study_app.store.session import begin
+from study_app.store.sessions.begin import begin
+from study_app.store.sessions.open_session import SessionStore
 from tests.session import small
 from tests.session.fakes import World
 

@@ -29,10 +29,10 @@ from study_app.gui.preflight import PreflightWindow
 from study_app.gui.theme import PARTICIPANT
 from study_app.protocol.load import parse, source_bytes
 from study_app.session.pages import EndPage, PausePage, QuestionnairePage, TaskPage, TextPage, TroublePage
-from study_app.store import machine
-from study_app.store.machine import MachineSettings
-from study_app.store.open_session import SessionStore
-from study_app.store.resume import check_can_go_on
+from study_app.store import workstation
+from study_app.store.sessions.open_session import SessionStore
+from study_app.store.sessions.reopen import check_can_go_on
+from study_app.store.workstation import MachineSettings
 from tests.compiled import needs_servo
 
 # The platform without a screen cannot limit or raise windows, and says so.
@@ -244,7 +244,7 @@ def test_what_cannot_begin_leaves_nothing_behind(short_demo, results, wrong, ref
 
 
 def test_the_receipt_says_what_is_set_for_the_machine_and_words_are_as_large_as_it_asks(short_demo, results):
-    machine.save(MachineSettings(viewing_distance_mm=1200, screen_width_mm=150))
+    workstation.save(MachineSettings(viewing_distance_mm=1200, screen_width_mm=150))
     scales = []
     person = Person(once=lambda participant: scales.append(participant._text_scale))
     assert app.run(short_demo, participant="P001", windowed=True, device="scripted", results=results) == 0

@@ -11,7 +11,7 @@ from study_app.app import entry
 from study_app.errors import StoreError
 from study_app.gui.choices import NewSession, resumed
 from study_app.protocol.load import load, source_bytes
-from study_app.store.session import SessionStore, begin
+from study_app.store.sessions.begin import SessionStore, begin
 
 
 @pytest.fixture

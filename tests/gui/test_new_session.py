@@ -14,7 +14,7 @@ from study_app.gui.choices import MAX_SEED, draw_seed
 from study_app.gui.home.facts import study_facts
 from study_app.gui.new_session import NewSessionDialog
 from study_app.gui.screens import ScreenShown
-from study_app.store.machine import MachineSettings
+from study_app.store.workstation import MachineSettings
 
 # The platform without a screen cannot limit or raise windows, and says so.
 

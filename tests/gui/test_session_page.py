@@ -16,10 +16,10 @@ from study_app.gui.sessions.record import MOTION_HIDDEN, read_record
 from study_app.gui.theme import LIGHT
 from study_app.protocol.load import load, source_bytes
 from study_app.session.rehearsal import rehearse
+from study_app.store.blinded.unblinding import unblind
 from study_app.store.exclusions import exclusions
-from study_app.store.layout import StudyFolder
-from study_app.store.session import begin
-from study_app.store.unblinding import unblind
+from study_app.store.folders import StudyFolder
+from study_app.store.sessions.begin import begin
 
 
 @pytest.fixture(scope="module")

@@ -19,10 +19,10 @@ from study_app.session import answers_only
 from study_app.session.answers_only import rehearse_answers
 from study_app.session.feelings import Feelings, feelings
 from study_app.session.rehearsal import rehearse
-from study_app.store.blinding import reveal
-from study_app.store.layout import StudyFolder
-from study_app.store.reproduced import reproduced
-from study_app.store.verify import verify
+from study_app.store.blinded.blinding import reveal
+from study_app.store.folders import StudyFolder
+from study_app.store.verification.reproduction import reproduced
+from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
 
 WALL_CLOCK = ("answered_at", "trial_started_at", "session_started_at", "session_ended_at")

@@ -27,11 +27,11 @@ from study_app.session.compose import page
 from study_app.session.machine import open_session
 from study_app.session.pages import TaskPage
 from study_app.session.state import Phase
-from study_app.store.blinding import open_or_draw_key, read_key
-from study_app.store.layout import StudyFolder
-from study_app.store.open_session import SessionStore
-from study_app.store.session import begin
-from study_app.store.verify import verify
+from study_app.store.blinded.blinding import open_or_draw_key, read_key
+from study_app.store.folders import StudyFolder
+from study_app.store.sessions.begin import begin
+from study_app.store.sessions.open_session import SessionStore
+from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
 
 EARLIER = Path(__file__).parents[1] / "store" / "earlier_format"

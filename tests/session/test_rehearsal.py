@@ -24,10 +24,10 @@ from study_app.session.simulated import Reacher, Senses, choices, reading_s
 from study_app.session.strokes import RATE_HZ, exploration
 from study_app.session.tasks import TaskView
 from study_app.session.trial import TankView
-from study_app.store import journal
-from study_app.store.description import write_description
-from study_app.store.layout import StudyFolder
-from study_app.store.session import SessionStore
+from study_app.store.folders import StudyFolder
+from study_app.store.journals import journal
+from study_app.store.sessions.begin import SessionStore
+from study_app.store.tables.study_description import write_description
 from tests.compiled import needs_servo
 from tests.session import small
 

@@ -20,10 +20,10 @@ from study_app.session.ports import Ports
 from study_app.session.runner import BUTTON_STOP, Runner
 from study_app.session.state import Phase
 from study_app.session.trial import SETTLED_S
+from study_app.store.blinded.sealing import opened
 from study_app.store.clock import SessionClock
-from study_app.store.sealing import opened
-from study_app.store.session import begin
-from study_app.store.tables import trials
+from study_app.store.sessions.begin import begin
+from study_app.store.tables.session_tables import trials
 from tests.compiled import needs_servo
 from tests.session import small
 from tests.session.fakes import FakeJournal

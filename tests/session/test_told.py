@@ -15,9 +15,10 @@ from scipy.stats import binomtest
 
 from study_app.protocol.load import source_bytes
 from study_app.session.rehearsal import rehearse
-from study_app.store import blinding, journal
-from study_app.store.layout import StudyFolder
-from study_app.store.unblinding import unblind
+from study_app.store.blinded import blinding
+from study_app.store.blinded.unblinding import unblind
+from study_app.store.folders import StudyFolder
+from study_app.store.journals import journal
 from tests.compiled import needs_servo
 
 pytestmark = needs_servo

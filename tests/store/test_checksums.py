@@ -7,7 +7,7 @@ import pytest
 
 from study_app.errors import StoreError
 from study_app.store.checksums import files, read_checksums, sha256, write_checksums
-from study_app.store.layout import SessionFolder
+from study_app.store.folders import SessionFolder
 
 
 @pytest.fixture

@@ -11,10 +11,10 @@ import pytest
 from study_app.analysis.export import export
 from study_app.analysis.report.writing import report
 from study_app.session import rehearsal
-from study_app.store import journal
-from study_app.store.layout import StudyFolder
-from study_app.store.rebuild import rebuild
-from study_app.store.verify import verify
+from study_app.store.folders import StudyFolder
+from study_app.store.journals import journal
+from study_app.store.sessions.rebuild import rebuild
+from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
 
 HELD = Path(__file__).parent / "earlier_format"

@@ -16,9 +16,9 @@ import pytest
 
 from study_app.errors import StoreError
 from study_app.store.exclusions import Exclusion, exclude, exclusions, include
-from study_app.store.opening import is_open
-from study_app.store.session import SessionStore
-from study_app.store.verify import verify
+from study_app.store.sessions.begin import SessionStore
+from study_app.store.sessions.folder_lock import is_open
+from study_app.store.verification.verify_study import verify
 
 FullDisk = Callable[[int], AbstractContextManager[None]]
 

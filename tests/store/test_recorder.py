@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from study_app.store import recording
+from study_app.store import recording_files as recording
 from study_app.store.recorder import Lost, Recorded, Recorder, recording_files
-from study_app.store.recording import SamplesFile, read_facts, read_frames, read_samples
+from study_app.store.recording_files import SamplesFile, read_facts, read_frames, read_samples
 
 Make = Callable[..., np.ndarray[Any, Any]]
 FullDisk = Callable[[int], AbstractContextManager[None]]

@@ -13,10 +13,10 @@ from click.testing import CliRunner
 
 from study_app import cli
 from study_app.errors import DeviceLost, StoreError, StudyError
-from study_app.store import machine
-from study_app.store.machine import MachineSettings
+from study_app.store import workstation
 from study_app.store.program_log import DEVICE_FAILED, keep_log, kept_log, last_error, log_file
 from study_app.store.support import write_support
+from study_app.store.workstation import MachineSettings
 from study_app.workspace import WORKSPACE_VARIABLE
 
 ID, ANSWER, DENSITY, NONCE, INITIALS = "P9047", "responded6of7", "1013.7", "c0ffee5eed", "ZQX"
@@ -76,7 +76,9 @@ def test_nothing_of_a_study_is_in_it(
         f'  File "/opt/tester-home/study_app/gui/bridge.py", line 12 in start\n{ID} {DENSITY}\n'
     )
     firmware, recent = "/x/tester-home/falcon.bin", ("/x/tester-home/own.toml",)
-    machine.save(MachineSettings(workspace=str(results.parent), operator=INITIALS, firmware=firmware, recent=recent))
+    workstation.save(
+        MachineSettings(workspace=str(results.parent), operator=INITIALS, firmware=firmware, recent=recent)
+    )
     plant(caplog)
     write_support(tmp_path / "help.zip", "1  FOUND  no reply\n")
     found = members(tmp_path / "help.zip")

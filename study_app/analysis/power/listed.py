@@ -12,8 +12,8 @@ from study_app.analysis.power.counting import EFFECTS
 from study_app.analysis.power.drawn import DRAWS
 from study_app.analysis.power.found import WANTED, Curve, Powers, Question, interval
 from study_app.analysis.report.words import enough
-from study_app.store.columns import Column
-from study_app.store.tables import csv_bytes
+from study_app.store.tables.columns import Column
+from study_app.store.tables.session_tables import csv_bytes
 
 COLUMNS: Final = (
     Column("study", "text", "Short name of the study, from its protocol."),

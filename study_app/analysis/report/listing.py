@@ -18,11 +18,11 @@ from study_app.analysis.report.words import name
 from study_app.analysis.results import Against, BlockFound, Results, Tested, plain
 from study_app.analysis.statistics.outcome import Outcome
 from study_app.analysis.tables import Study
-from study_app.store import blinding
+from study_app.store.blinded import blinding
 from study_app.store.checksums import sha256
-from study_app.store.columns import Column
-from study_app.store.layout import StudyFolder
-from study_app.store.tables import csv_bytes
+from study_app.store.folders import StudyFolder
+from study_app.store.tables.columns import Column
+from study_app.store.tables.session_tables import csv_bytes
 
 FORMAT: Final = 1
 LIBRARIES: Final = ("numpy", "scipy", "pandas", "matplotlib", "pyarrow")

@@ -25,7 +25,7 @@ from study_app.analysis.report.words import counted
 from study_app.analysis.results import Results
 from study_app.analysis.tables import Study, load_study
 from study_app.errors import AnalysisError
-from study_app.store import blinding
+from study_app.store.blinded import blinding
 
 HASHES_SHOWN = 12
 """Of so few files the page shows the hashes one by one; of more, one over all of them."""

@@ -8,8 +8,8 @@ from typing import Final
 
 from study_app.protocol.load import load, source_bytes
 from study_app.session.answers_only import rehearse_answers
-from study_app.store import blinding
-from study_app.store.session import begin
+from study_app.store.blinded import blinding
+from study_app.store.sessions.begin import begin
 
 STUDY: Final = "rek2024"
 PARTICIPANTS: Final = 12

@@ -15,11 +15,12 @@ from study_app.protocol.load import at_hand, is_scene_file, load
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import PageStep, Schedule, build_schedule
 from study_app.session.resume import find_protocol, is_rehearsal, resume_at, source_to_resume
-from study_app.store import journal, receipt
-from study_app.store.layout import locate
-from study_app.store.machine import recent_protocols
-from study_app.store.opening import is_open
+from study_app.store import receipt
+from study_app.store.folders import locate
+from study_app.store.journals import journal
 from study_app.store.progress import progress_of
+from study_app.store.sessions.folder_lock import is_open
+from study_app.store.workstation import recent_protocols
 
 LANGUAGES = {"en": "English", "nl": "Dutch", "de": "German", "fr": "French", "es": "Spanish", "it": "Italian"}
 

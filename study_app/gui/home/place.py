@@ -41,7 +41,7 @@ from study_app.gui.screens import screens_shown
 from study_app.gui.sessions.facts import SessionFacts, sessions
 from study_app.gui.sessions.page import SessionPage
 from study_app.gui.themed import dress
-from study_app.store.machine import DEFAULTS, MachineSettings
+from study_app.store.workstation import DEFAULTS, MachineSettings
 from study_app.workspace import workspace
 
 STACKED_BELOW = 1080

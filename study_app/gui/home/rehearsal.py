@@ -13,7 +13,7 @@ from study_app.gui.home.facts import StudyFacts
 from study_app.gui.labels import label, set_ink
 from study_app.gui.theme import LIGHT, Theme
 from study_app.gui.themed import wear
-from study_app.store.layout import rehearsal_folder
+from study_app.store.folders import rehearsal_folder
 
 MAX_PARTICIPANTS = 200
 PATIENCE_MS = 2000

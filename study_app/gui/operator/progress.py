@@ -11,8 +11,8 @@ from typing import Any, TypeAlias
 
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import PageStep, Schedule, Trial
-from study_app.store.columns import SEALED
-from study_app.store.tables import beyond_limits
+from study_app.store.tables.columns import SEALED
+from study_app.store.tables.session_tables import beyond_limits
 
 # A block of more trials than this is one row of the rail ("Delay settings 1 to 7"), so that a day's study fits it.
 ROWS_PER_BLOCK = 4

@@ -18,7 +18,7 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, Trial
 from study_app.session.preflight import Check, Facts
 from study_app.session.resume import resume_at
-from study_app.store.journal import Line
+from study_app.store.journals.journal import Line
 
 WAITING = "measuring …"
 BINS_PER_DECADE = 10

@@ -11,8 +11,8 @@ from typing import Any, Literal, TypeAlias
 
 from study_app.errors import StoreError
 from study_app.store.exclusions import Exclusion, exclusions
-from study_app.store.layout import StudyFolder
-from study_app.store.participants import participants_at_once
+from study_app.store.folders import StudyFolder
+from study_app.store.tables.participants import participants_at_once
 
 Kind: TypeAlias = Literal["", "pilot", "simulated", "sample"]
 KINDS: dict[Kind, str] = {"": "Participants", "pilot": "Pilot", "simulated": "Simulated", "sample": "Sample"}

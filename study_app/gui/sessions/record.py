@@ -14,12 +14,13 @@ from numpy.typing import NDArray
 from study_app.devices import is_falcon
 from study_app.errors import StoreError
 from study_app.gui.sessions.facts import SessionFacts, counted, session_facts
-from study_app.store import journal, tables
+from study_app.store.blinded.sealing import opened, opened_key
 from study_app.store.exclusions import Exclusion, exclusions
-from study_app.store.journal import Line
-from study_app.store.layout import SessionFolder, locate
-from study_app.store.participants import row_of
-from study_app.store.sealing import opened, opened_key
+from study_app.store.folders import SessionFolder, locate
+from study_app.store.journals import journal
+from study_app.store.journals.journal import Line
+from study_app.store.tables import session_tables
+from study_app.store.tables.participants import row_of
 
 MOST_POINTS = 2000  # of a drawn curve
 LIMIT_WORDS: Mapping[str, tuple[str, str]] = {
@@ -89,7 +90,7 @@ def read_record(folder: Path) -> SessionRecord:
     (facts,) = session_facts(study.path, row_of(session, key), listed, {})
     own = tuple(one for one in listed if one.what[:2] == (facts.participant, facts.session))
     start = lines[0]
-    rows = tables.trials(lines)
+    rows = session_tables.trials(lines)
     trials = _trials(session, rows, lines, start.get("limits", {}), own)
     felt = is_falcon(str(start.get("device")))
     return SessionRecord(
@@ -128,7 +129,7 @@ def motion(recording: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     StoreError
         It cannot be read.
     """
-    from study_app.store.recording import read_samples  # noqa: PLC0415 - pyarrow: only once it is needed
+    from study_app.store.recording_files import read_samples  # noqa: PLC0415 - pyarrow: only once it is needed
 
     samples = read_samples(recording)
     thinned = samples[:: max(1, -(-len(samples) // MOST_POINTS))]
@@ -146,7 +147,7 @@ def _trials(
     reasons = {one.trial: one.reason for one in own}
     answered: dict[tuple[int, int], int] = {}
     open_choices = _unconfirmed(lines)
-    for row in tables.responses(lines):
+    for row in session_tables.responses(lines):
         which = (row["trial"], row["attempt"])
         answered[which] = answered.get(which, 0) + (row["first_choice_s"] is not None)
     return tuple(
@@ -156,7 +157,7 @@ def _trials(
             words=_words(row),
             outcome=row["outcome"] or "running",
             valid=row["valid"],
-            broken=tuple(broken_words(*one) for one in tables.beyond_limits(row, limits)),
+            broken=tuple(broken_words(*one) for one in session_tables.beyond_limits(row, limits)),
             answers=answered.get((row["trial"], row["attempt"]), 0),
             unconfirmed=tuple(open_choices.get((row["trial"], row["attempt"]), ())),
             notes=" · ".join((["marked"] if row["marked"] else []) + (row["notes"] or "").splitlines()),
@@ -197,7 +198,7 @@ def _words(row: Mapping[str, Any]) -> str:
 
 
 def _about(lines: Sequence[Line]) -> str:
-    start, row = lines[0], tables.participant(lines)
+    start, row = lines[0], session_tables.participant(lines)
     ended = row["session_ended_at"]
     said = [
         f"Device {start['device']}",

@@ -15,7 +15,7 @@ from study_app.gui.screens import ScreenShown
 from study_app.gui.settings.measure import LEAST_WORDS, Measure
 from study_app.gui.settings.offset import OffsetForm
 from study_app.gui.theme import PARTICIPANT, RADIUS_CONTROL, font
-from study_app.store.machine import DISTANCE_MM, LEAST_X_HEIGHT_DEG, WIDTH_MM, MachineSettings
+from study_app.store.workstation import DISTANCE_MM, LEAST_X_HEIGHT_DEG, WIDTH_MM, MachineSettings
 
 SAMPLE = "I think this feels like interacting with a liquid."
 MOST_SAMPLE = 2.4

@@ -23,7 +23,7 @@ from study_app.gui.settings.patterns import GreyRamp, LineField
 from study_app.gui.tank.patch import paint_patch, patch_place
 from study_app.gui.theme import PARTICIPANT
 from study_app.gui.themed import wear
-from study_app.store.machine import DisplayOffset
+from study_app.store.workstation import DisplayOffset
 
 TOLD_MS = 500
 INTERVAL_MS = (50.0, 5000.0)

@@ -11,7 +11,7 @@ from study_app.gui.fields import NumberField, read_number, write_number
 from study_app.gui.labels import label
 from study_app.gui.settings.measure import LEAST_WORDS
 from study_app.gui.theme import font
-from study_app.store.machine import OFFSET_MS, SPREAD_MS, DisplayOffset
+from study_app.store.workstation import OFFSET_MS, SPREAD_MS, DisplayOffset
 
 HOWS = ("photodiode", "high-speed camera", "data sheet")
 DECIMALS = 2

@@ -19,7 +19,7 @@ from study_app.gui.settings.display_test import DisplayTest
 from study_app.gui.settings.identify import ScreenNumber, identify
 from study_app.gui.theme import font
 from study_app.gui.themed import dress
-from study_app.store.machine import DEFAULTS, MachineSettings
+from study_app.store.workstation import DEFAULTS, MachineSettings
 
 STACKED_BELOW = 1000
 

@@ -32,7 +32,7 @@ from study_app.cli import commands
 from study_app.errors import AnalysisError
 from study_app.protocol.load import load, parse
 from study_app.protocol.questions.simulated_answers import Felt
-from study_app.store.cells import problems
+from study_app.store.verification.table_checks import problems
 from tests.analysis.conftest import SMALL
 
 SIZES = (5, 9)

@@ -23,9 +23,9 @@ from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.load import load
 from study_app.session import rehearsal
 from study_app.session.strokes import exploration
-from study_app.store.layout import StudyFolder
-from study_app.store.unblinding import unblind
-from study_app.store.verify import verify
+from study_app.store.blinded.unblinding import unblind
+from study_app.store.folders import StudyFolder
+from study_app.store.verification.verify_study import verify
 
 STUDY = "rek2024"
 HALF_M = (0.05, 0.03, 0.03)

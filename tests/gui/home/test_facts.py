@@ -19,8 +19,8 @@ from study_app.protocol.load import load, source_bytes
 from study_app.protocol.orders.schedule import PageStep, build_schedule
 from study_app.session.resume import REHEARSED_SCREENS
 from study_app.store.exclusions import exclude
-from study_app.store.opening import open_alone
-from study_app.store.session import begin
+from study_app.store.sessions.begin import begin
+from study_app.store.sessions.folder_lock import open_alone
 
 
 def start(results, participant, status=None, *, simulated=False):

@@ -18,9 +18,9 @@ from study_app.gui.table import GAP
 from study_app.gui.theme import DARK, font
 from study_app.protocol.load import load, source_bytes
 from study_app.store.exclusions import exclude
-from study_app.store.layout import rehearsal_folder
-from study_app.store.machine import MachineSettings
-from study_app.store.session import begin
+from study_app.store.folders import rehearsal_folder
+from study_app.store.sessions.begin import begin
+from study_app.store.workstation import MachineSettings
 
 # The platform without a screen cannot limit or raise windows, and says so.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from study_app.gui.operator.progress import SessionProgress, progress_after, stages
 from study_app.protocol.load import load
 from study_app.protocol.orders.schedule import build_schedule
-from study_app.store.tables import within_limits
+from study_app.store.tables.session_tables import within_limits
 
 
 def test_pages_and_trials_move_the_step_and_keep_their_durations(told):

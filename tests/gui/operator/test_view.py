@@ -8,8 +8,8 @@ import pytest
 
 from study_app.gui.operator.view import MEASURES, duration_words, grouped, minutes
 from study_app.protocol.model import Limits
-from study_app.store.columns import TRIALS, header
-from study_app.store.tables import beyond_limits
+from study_app.store.tables.columns import TRIALS, header
+from study_app.store.tables.session_tables import beyond_limits
 
 SECRETS = ("thin", "thick", "prompt", "200")
 

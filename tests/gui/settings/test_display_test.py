@@ -14,7 +14,7 @@ from study_app.gui.settings.offset import offset_words
 from study_app.gui.settings.patterns import GREYS, GreyRamp, LineField, lines, steps
 from study_app.gui.tank.patch import PATCH
 from study_app.protocol.wording.languages import words
-from study_app.store.machine import DisplayOffset
+from study_app.store.workstation import DisplayOffset
 from tests.gui.small import task_page
 
 WHITE, BLACK = QColor("#ffffff"), QColor("#000000")

@@ -12,7 +12,7 @@ from study_app.gui.settings import place as module
 from study_app.gui.settings.place import MachinePlace
 from study_app.gui.theme import DARK, font
 from study_app.gui.themed import wear
-from study_app.store.machine import DEFAULTS, STATEMENT_X_HEIGHT_PX, DisplayOffset, MachineSettings
+from study_app.store.workstation import DEFAULTS, STATEMENT_X_HEIGHT_PX, DisplayOffset, MachineSettings
 
 ONE = ScreenShown(1, "eDP-1", 1366, 768, 60.0, 1.0, 344.0, 194.0)
 TWO = ScreenShown(2, "DP-1", 1920, 1080, 144.0, 1.0, 527.0, 296.0)

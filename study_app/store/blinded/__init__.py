@@ -1,0 +1,1 @@
+"""Blinding: the sealed key, sealed columns, unblinding."""

@@ -1,0 +1,326 @@
+"""Which code stands for which condition: drawn once per study, sealed, and opened only with a name and a reason.
+
+``blinding/key.sealed`` is base64 of a JSON object with the codes, the conditions' and liquids' tables and a 256-bit
+nonce. It is encoded, not encrypted: that stops accidental sight, and its SHA-256 in every receipt proves it unchanged;
+only its owner may read the file. The nonce keeps the hash from telling the key, however few keys there are, and
+encrypts what tells a condition in the journals (see ``sealing``). A real study's key comes from the operating system's
+randomness, a rehearsal's from its seed, and a folder holds one or the other.
+"""
+
+from __future__ import annotations
+
+import base64
+import contextlib
+import hashlib
+import json
+import secrets
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from datetime import datetime
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Final, Literal, TypeAlias
+
+from study_app.errors import StoreError
+from study_app.protocol.model import Protocol
+from study_app.protocol.orders.schedule import block_codes, draw_key
+from study_app.store import receipt
+from study_app.store.atomic import append_line, create_folder, is_there, read_own
+from study_app.store.folders import SessionFolder, StudyFolder
+from study_app.store.journals import journal
+from study_app.store.journals.journal_events import holds
+from study_app.store.journals.parsing import parse_json
+
+Codes: TypeAlias = dict[str, dict[str, str]]
+
+NO_FILES: Final[Mapping[str, str]] = MappingProxyType({})
+_FORMAT = 1
+_NONCE_BYTES = 32
+
+
+@dataclass(frozen=True, slots=True)
+class Key:
+    """The opened key. Never print, log or show what it holds before it was revealed.
+
+    ``codes`` is block → code → condition id; ``tables`` holds the protocol's tables ``conditions`` and ``liquids``,
+    ``files`` the texts of its liquid files by their names;
+    ``drawn`` says where its randomness came from; ``hash`` is the SHA-256 of the sealed file; ``nonce`` is as secret as
+    the codes.
+    """
+
+    hash: str
+    drawn: Literal["system", "seed"]
+    codes: Codes = field(repr=False)
+    tables: dict[str, Any] = field(repr=False)
+    tables_hash: str = field(repr=False)
+    nonce: bytes = field(repr=False)
+    files: dict[str, str] = field(repr=False, default_factory=dict)
+
+    def condition(self, block: str, code: str) -> str:
+        """Return the id of the condition that ``code`` of ``block`` stands for."""
+        try:
+            return self.codes[block][code]
+        except KeyError:
+            raise StoreError(
+                f"the sealed key knows no code {code!r} of block {block!r}: it is of another study"
+            ) from None
+
+    def delay_ms(self, block: str, code: str) -> float:
+        """Return the visual delay that was asked for [ms]."""
+        return float(self.tables["conditions"][self.condition(block, code)]["delay_ms"])
+
+    def liquids(self, block: str, code: str) -> tuple[str, ...]:
+        """Return the ids of the liquids that were felt."""
+        condition = self.tables["conditions"][self.condition(block, code)]
+        return tuple(condition["liquids"]) if condition["liquid"] is None else (str(condition["liquid"]),)
+
+
+def sealed_hash(folder: Path) -> str | None:
+    """Return the SHA-256 of a study's sealed key, as in its receipts; None where there is none, or none readable."""
+    try:
+        return hashlib.sha256(read_own(StudyFolder(folder).key, folder)).hexdigest()
+    except StoreError:
+        return None
+
+
+def open_or_draw_key(
+    folder: Path,
+    protocol: Protocol,
+    random: Callable[[], float] | None = None,
+    files: Mapping[str, str] = NO_FILES,
+) -> Key:
+    """Return the study's key; draw and seal it where there is none.
+
+    Of two programs that start at once one draws, and the other reads what the first drew.
+
+    Parameters
+    ----------
+    folder : Path
+        The study folder.
+    random : callable, optional
+        Uniform numbers in [0, 1): a seeded stream's for a rehearsal. By default the operating system's randomness.
+    files : mapping of str to str
+        The texts of the protocol's liquid files by their names.
+
+    Raises
+    ------
+    StoreError
+        The key is missing though sessions ran under it, unreadable, changed, of a rehearsal where this is none (or the
+        other way round), or of a protocol with other conditions.
+    """
+    study = StudyFolder(folder)
+    drawn: Literal["system", "seed"] = "system" if random is None else "seed"
+    if not is_there(study.key):
+        _refuse_if_lost(study)
+        content = _seal(protocol, drawn, random or secrets.SystemRandom().random, files)
+        create_folder(study.blinding, {study.key.name: content}, mode=0o600)
+    key = _verified_key(study)
+    if key.drawn != drawn:
+        kinds = {"system": "real sessions", "seed": "a rehearsal"}
+        raise StoreError(
+            f"{folder} holds {kinds[key.drawn]}: {kinds[drawn]} would mix with it; use another results folder"
+        )
+    if key.tables_hash != _tables_hash(protocol):
+        raise StoreError(
+            f"{study.key} was sealed for other conditions than this protocol's: run the changed protocol into another "
+            "results folder"
+        )
+    return key
+
+
+def same_conditions(folder: Path, protocol: Protocol) -> bool:
+    """Return whether ``protocol`` has the liquids, conditions and blocks of conditions that the key was sealed for.
+
+    Raises
+    ------
+    StoreError
+        The key is missing, unreadable or not the one the sessions ran under.
+    """
+    return _verified_key(StudyFolder(folder)).tables_hash == _tables_hash(protocol)
+
+
+def reveal(folder: Path, by: str, reason: str) -> Codes:
+    """Record who opens the key and why, then return block → code → condition id.
+
+    Raises
+    ------
+    StoreError
+        ``by`` or ``reason`` is empty, or the key is missing, unreadable or not the one the sessions ran under.
+    """
+    for name, text in (("by", by), ("reason", reason)):
+        if not text.strip():
+            raise StoreError(f"--{name} is empty: opening the key is recorded with a name and a reason")
+    study = StudyFolder(folder)
+    if not is_there(study.key) and not study.sessions():
+        raise StoreError(
+            f"{folder} is no study's folder (it has no {study.key.name}): name one such as results/rek2024"
+        )
+    key = _verified_key(study)
+    record = {
+        "at": datetime.now().astimezone().isoformat(timespec="seconds"),
+        "by": by.strip(),
+        "reason": reason.strip(),
+        "key_hash": key.hash,
+    }
+    line = json.dumps(record, ensure_ascii=False).encode("utf-8", "backslashreplace")
+    append_line(study.reveals, line + b"\n")
+    return key.codes
+
+
+def revealed(folder: Path) -> Codes | None:
+    """Return block → code → condition id if the key was revealed, else None."""
+    key = revealed_key(folder)
+    return None if key is None else key.codes
+
+
+def revealed_key(folder: Path) -> Key | None:
+    """Return the key with the conditions' tables if it was revealed, else None.
+
+    Raises
+    ------
+    StoreError
+        It was revealed, and is now missing, unreadable or changed.
+    """
+    study = StudyFolder(folder)
+    return _verified_key(study) if reveals(folder) else None
+
+
+def reveals(folder: Path) -> tuple[dict[str, str], ...]:
+    """Return the recorded reveals, first to last: ``at``, ``by``, ``reason``, ``key_hash``."""
+    return tuple(record for _, _, record in _reveal_lines(folder) if record is not None)
+
+
+def unreadable_reveals(folder: Path) -> tuple[tuple[int, bool], ...]:
+    """Return the numbers of the lines that record no reveal, and whether a power cut may have torn them."""
+    lines = [(number, line, record) for number, line, record in _reveal_lines(folder) if record is None]
+    begins = b'{"at": "'
+    return tuple((number, line[:8] == begins[: len(line)] and not line.endswith(b"}")) for number, line, _ in lines)
+
+
+def _reveal_lines(folder: Path) -> Iterator[tuple[int, bytes, dict[str, str] | None]]:
+    """Yield number, line and record of every line that is not empty."""
+    path = StudyFolder(folder).reveals
+    if not is_there(path):
+        return
+    for number, line in enumerate(read_own(path, folder).split(b"\n"), start=1):
+        try:
+            record = parse_json(line)
+        except ValueError:
+            record = None
+        if line:
+            yield number, line, record if _is_reveal(record) else None
+
+
+def _is_reveal(record: object) -> bool:
+    """Return whether a line says when the key was opened, by whom, why, and which."""
+    return (
+        _is_texts(record)
+        and isinstance(record, dict)
+        and holds("at", record.get("at"))
+        and all(record.get(name, "").strip() for name in ("by", "reason", "key_hash"))
+    )
+
+
+def _seal(protocol: Protocol, drawn: str, random: Callable[[], float], files: Mapping[str, str]) -> bytes:
+    content: dict[str, Any] = {
+        "format": _FORMAT,
+        "drawn": drawn,
+        "nonce": bytes(int(random() * 256) for _ in range(_NONCE_BYTES)).hex(),
+        "codes": draw_key(protocol, random),
+        "tables": protocol.model_dump(mode="json", include={"conditions", "liquids"}),
+        "tables_hash": _tables_hash(protocol),
+    }
+    if files:
+        content["files"] = dict(files)
+    return base64.encodebytes(json.dumps(content, ensure_ascii=False).encode())
+
+
+def _tables_hash(protocol: Protocol) -> str:
+    """Return the hash of the conditions as their author wrote them (a later version's new defaults change nothing)."""
+    written = {
+        **protocol.model_dump(mode="json", include={"conditions", "liquids"}, exclude_unset=True),
+        "blocks": {name: [block_codes(block), block.conditions] for name, block in protocol.blocks.items()},
+    }
+    return hashlib.sha256(json.dumps(written, sort_keys=True).encode()).hexdigest()
+
+
+def _verified_key(study: StudyFolder) -> Key:
+    """Read the key and compare its hash with what every session published."""
+    key = read_key(study.path)
+    for session in study.sessions():
+        if _published_hash(session) not in {None, key.hash}:
+            raise StoreError(
+                f"{study.key} is not the key that {session.path} ran under (its SHA-256 differs from the published): "
+                "restore it from a copy"
+            )
+    return key
+
+
+def _published_hash(session: SessionFolder) -> str | None:
+    """Return the key's hash that a session published.
+
+    In its receipt; where that cannot be read in its journal's first line, so that one damaged session stops no other;
+    None where neither can be.
+    """
+    with contextlib.suppress(StoreError):
+        return str(receipt.read(session.receipt)["key_hash"])
+    with contextlib.suppress(StoreError):
+        for line in journal.scan(session.journal).lines[:1]:
+            return str(line.get("key_hash"))
+    return None
+
+
+def read_key(folder: Path) -> Key:
+    """Open the key without looking whether it is the one the sessions ran under. Never print what it holds.
+
+    Raises
+    ------
+    StoreError
+        It is missing or no key.
+    """
+    path = StudyFolder(folder).key
+    sealed = read_own(path, folder)
+    try:
+        content = parse_json(base64.b64decode(sealed, validate=False))
+        if content["format"] != _FORMAT:
+            raise StoreError(
+                f"{path} has format {content['format']!r}, this version reads {_FORMAT}: use a newer version"
+            )
+        _check_content(content)
+        return Key(
+            hash=hashlib.sha256(sealed).hexdigest(),
+            drawn=content["drawn"],
+            codes=content["codes"],
+            tables=content["tables"],
+            tables_hash=content["tables_hash"],
+            nonce=bytes.fromhex(content["nonce"]),
+            files=content.get("files", {}),
+        )
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise StoreError(f"{path} is no sealed key any more: restore it from a copy") from error
+
+
+def _check_content(content: dict[str, Any]) -> None:
+    """Refuse a key whose codes or conditions are of other types (ValueError, KeyError, TypeError, AttributeError)."""
+    conditions = content["tables"]["conditions"].values()
+    if (
+        content["drawn"] not in ("system", "seed")
+        or not all(map(_is_texts, content["codes"].values()))
+        or not isinstance(content["tables"]["liquids"], dict)
+        or not _is_texts(content.get("files", {}))
+        or not all(isinstance(condition["delay_ms"], int | float) for condition in conditions)
+    ):
+        raise ValueError("its codes or conditions are none")
+
+
+def _is_texts(value: object) -> bool:
+    return isinstance(value, dict) and all(isinstance(text, str) for text in value.values())
+
+
+def _refuse_if_lost(study: StudyFolder) -> None:
+    under = [session for session in study.sessions() if is_there(session.receipt)]
+    if under and not is_there(study.key):  # asked again: another program may just have drawn it
+        raise StoreError(
+            f"{study.key} is missing, though {len(under)} sessions ran under it: restore it from a copy; without it no "
+            "code can be translated"
+        )

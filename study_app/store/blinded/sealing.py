@@ -1,0 +1,98 @@
+"""What was measured of a trial and can tell its condition: unreadable in the journal until the study's key is opened.
+
+A line ``trial_ended`` holds these columns as one text, ``sealed``: in hexadecimal digits a tag, and their JSON
+encrypted with the nonce of the sealed key. The tag is the HMAC-SHA256 of session, trial and JSON; the JSON is combined
+with SHAKE-256 of nonce and tag by exclusive or. So equal numbers of two trials look different, and a changed or moved
+text is found (a synthetic initialisation vector as in RFC 5297, with the standard library's hashes). Spaces make all
+texts equally long.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import hmac
+import json
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from study_app.errors import StoreError
+from study_app.store.blinded.blinding import Key, read_key, reveals
+from study_app.store.folders import StudyFolder
+from study_app.store.journals.journal import Line, plain
+from study_app.store.journals.journal_events import holds
+from study_app.store.journals.parsing import parse_json
+from study_app.store.tables.columns import SEALED
+
+_TAG_BYTES = 16
+_BLOCK_BYTES = 1024
+
+
+def sealed(start: Mapping[str, Any], event: str, fields: dict[str, Any], key: Key) -> dict[str, Any]:
+    """Return the fields of a line as the journal of a session that began with the line ``start`` holds them."""
+    measured = {name: value for name, value in fields.items() if name in SEALED}
+    if event != "trial_ended" or not start.get("measures_sealed") or not measured:
+        return fields
+    said = json.dumps(plain(measured), allow_nan=False, separators=(",", ":")).encode()
+    said = said.ljust(-(-len(said) // _BLOCK_BYTES) * _BLOCK_BYTES)
+    tag = _tag(start, fields, said, key)
+    text = (tag + _combined(said, tag, key)).hex()
+    return {**{name: value for name, value in fields.items() if name not in SEALED}, "sealed": text}
+
+
+def opened(lines: Iterable[Line], key: Key | None) -> list[Line]:
+    """Return a journal's lines with what is sealed in them; as they are without a ``key``.
+
+    Raises
+    ------
+    StoreError
+        What is sealed was changed, is of another trial, or was sealed with another key.
+    """
+    lines = list(lines)
+    if key is None:
+        return lines
+    return [_opened(lines[0], line, key) if "sealed" in line else line for line in lines]
+
+
+def opened_key(folder: StudyFolder) -> Key | None:
+    """Return the study's key where it was opened, None while it is sealed.
+
+    Raises
+    ------
+    StoreError
+        It was opened, and is now missing or unreadable.
+    """
+    return read_key(folder.path) if reveals(folder.path) else None
+
+
+def _opened(start: Line, line: Line, key: Key) -> Line:
+    try:
+        content = bytes.fromhex(line["sealed"])
+    except ValueError:
+        content = b""
+    tag = content[:_TAG_BYTES]
+    said = _combined(content[_TAG_BYTES:], tag, key)
+    if not hmac.compare_digest(tag, _tag(start, line, said, key)):
+        raise StoreError(
+            f"the journal's line {line['n']} does not open with the study's key: it was changed; restore it from a copy"
+        )
+    return {**{name: value for name, value in line.items() if name != "sealed"}, **_measured(said)}
+
+
+def _measured(said: bytes) -> dict[str, Any]:
+    """Return the columns in a text whose tag is right; none of what whoever holds the key forged."""
+    try:
+        measured = parse_json(said)
+    except ValueError:
+        return {}
+    items = measured.items() if isinstance(measured, dict) else ()
+    return {name: value for name, value in items if name in SEALED and holds(name, value)}
+
+
+def _tag(start: Mapping[str, Any], line: Mapping[str, Any], said: bytes, key: Key) -> bytes:
+    whose = [start["participant"], start["session"], line["trial"], line["attempt"]]
+    return hmac.digest(key.nonce, json.dumps(whose).encode() + said, "sha256")[:_TAG_BYTES]
+
+
+def _combined(text: bytes, tag: bytes, key: Key) -> bytes:
+    stream = hashlib.shake_256(key.nonce + tag).digest(len(text))
+    return (int.from_bytes(text) ^ int.from_bytes(stream)).to_bytes(len(text))

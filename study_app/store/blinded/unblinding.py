@@ -1,0 +1,107 @@
+"""Opening a study: the reveal is recorded, and what was sealed appears in tables, their checksums and the description.
+
+Whatever ends the program in between, the journals hold everything, and opening the study again finishes it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from dataclasses import dataclass
+from pathlib import Path
+
+from study_app.errors import StoreError
+from study_app.protocol.model import StudyHead
+from study_app.store import receipt
+from study_app.store.atomic import is_there, write_file
+from study_app.store.blinded.blinding import Codes, Key, read_key, reveal
+from study_app.store.checksums import replace_checksums
+from study_app.store.folders import SessionFolder, StudyFolder
+from study_app.store.journals import journal
+from study_app.store.journals.journal import Line
+from study_app.store.sessions.folder_lock import open_alone
+from study_app.store.sessions.open_session import Place, table_files
+from study_app.store.tables.columns import LATER, SEALED, TABLES
+from study_app.store.tables.participants import write_participants
+from study_app.store.tables.session_tables import in_columns_of
+from study_app.store.tables.study_description import described_study, write_description
+
+
+@dataclass(frozen=True, slots=True)
+class Unblinded:
+    """``codes`` is block → code → condition id; ``left`` says of each table left as it was why, and what to do."""
+
+    codes: Codes
+    left: tuple[str, ...]
+
+
+def unblind(folder: Path, by: str, reason: str) -> Unblinded:
+    """Open a study's key, record who did so and why, and write the sealed columns into its tables.
+
+    A table that is not what its journal gives is left alone, as is a session that runs or cannot be read.
+
+    Raises
+    ------
+    StoreError
+        As `blinding.reveal`, and then nothing has changed.
+    """
+    codes = reveal(folder, by, reason)
+    study, key = StudyFolder(folder), read_key(folder)
+    left: list[str] = []
+    for session in study.sessions():
+        try:
+            left += _open_tables(study, session, key)
+        except StoreError as error:
+            left.append(f"{error}; then: liquid-study rebuild {session.path}")
+    try:
+        _open_study(study)
+    except StoreError as error:
+        left.append(f"{error}; then unblind again")
+    return Unblinded(codes, tuple(left))
+
+
+def _open_tables(study: StudyFolder, session: SessionFolder, key: Key) -> list[str]:
+    """Write a session's tables with what was sealed; return what is wrong with those that are left as they are."""
+    if not is_there(session.journal):
+        return []
+    lines = journal.read(session.journal)
+    if not lines or not lines[0].get("measures_sealed"):
+        return []
+    opening = open_alone(session.path)
+    try:
+        return list(_rewrite(Place(study, session, lines[0]["study"]), lines, key))
+    finally:
+        opening.release()
+
+
+def _rewrite(place: Place, lines: list[Line], key: Key) -> list[str]:
+    """Write the sealed columns; a table of an earlier version goes on without columns that it did not know."""
+    left: list[str] = []
+    ours: dict[str, tuple[bytes, bytes]] = {}
+    before, after = (dict(table_files(place, lines, one)) for one in (None, key))
+    for path, columns in zip(after, (TABLES["responses"], TABLES["trials"]), strict=True):
+        held = path.read_bytes() if is_there(path) else b""
+        sealed, content = (in_columns_of(held, whole[path], columns, LATER - SEALED)[0] for whole in (before, after))
+        if held not in (sealed, content):
+            left.append(
+                f"{path} is not what the journal gives, so it was left as it is: "
+                f"liquid-study rebuild {place.folder.path} makes it again"
+            )
+            continue
+        if held != content:
+            write_file(path, content)
+        ours[path.name] = sealed, content
+    if is_there(place.folder.checksums):
+        replace_checksums(place.folder, ours)
+    return left
+
+
+def _open_study(study: StudyFolder) -> None:
+    """Bring the table of participants and the description up to date."""
+    name = described_study(study)
+    if name is not None:
+        write_participants(study, name)
+    for session in study.sessions():
+        with contextlib.suppress(StoreError, KeyError, TypeError, ValueError):  # another receipt will do
+            head = StudyHead.model_validate(receipt.read(session.receipt)["protocol"]["study"])
+            write_description(study, head)
+            return

@@ -1,0 +1,1 @@
+"""The journal: lines, events, writing, reading, damage."""

@@ -1,0 +1,99 @@
+"""Whether other files of a session tell more than its journal: then it has lost lines, and nothing is made from it."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from study_app.errors import StoreError
+from study_app.store import receipt
+from study_app.store.atomic import is_there, paths_in, read_own
+from study_app.store.folders import SessionFolder
+from study_app.store.journals.journal import Line
+from study_app.store.journals.journal_events import unknown_events
+from study_app.store.journals.parsing import RECORDING_NAME
+from study_app.store.progress import attempts
+from study_app.store.recorder import recording_files
+from study_app.store.sessions.open_session import Place
+from study_app.store.tables import session_tables
+from study_app.store.verification.fingerprints import listed, place_of
+
+RESTORE = "restore the journal from a copy"
+
+
+def refuse_if_cut(place: Place, lines: Sequence[Line]) -> None:
+    """Refuse a journal that tells this version less than the session's other files may: they would be replaced.
+
+    Raises
+    ------
+    StoreError
+        Names the file that tells more, or an event of another version; or one of them cannot be read.
+    """
+    for name in unknown_events(lines):
+        raise StoreError(
+            f"{place.folder.journal} has events {name!r}, which this version does not know: use the version that wrote "
+            "them"
+        )
+    for path, what in (*beyond(place, lines), *_ended_or_recorded(place, lines)):
+        raise StoreError(f"{path} {what}: {RESTORE}")
+
+
+def beyond(place: Place, lines: Sequence[Line]) -> Iterator[tuple[Path, str]]:
+    """Yield each of receipt, checksums and tables that tells more than the journal, and what.
+
+    A session that has ended has a whole journal. After a power cut the trials table may tell of one trial more, since
+    nobody waits until the disk has the line of a trial's start; answers are waited for.
+
+    Raises
+    ------
+    StoreError
+        The receipt is there and cannot be read.
+    """
+    folder = place.folder
+    ended = lines[-1]["event"] == "session_ended"
+    held = receipt.read(folder.receipt) if is_there(folder.receipt) else {}
+    if not ended and (status := held.get("status", receipt.UNFINISHED)) != receipt.UNFINISHED:
+        yield folder.receipt, f"its status is {status!r}, the journal's {receipt.UNFINISHED!r}"
+    if len(held.get("resumed", ())) > sum(line["event"] == "session_resumed" for line in lines):
+        yield folder.receipt, "tells that the session was resumed more often than the journal does"
+    if ended:
+        return
+    if is_there(folder.checksums):
+        yield folder.checksums, "was made when the session had ended, though the journal has no end"
+    for name, rows, spare in (
+        ("responses", session_tables.responses(lines), 0),
+        ("trials", session_tables.trials(lines), 1),
+    ):
+        path = folder.table(place.study, name)
+        if (there := _rows(path, place.study_folder.path)) > len(rows) + spare:
+            yield path, f"has {there} rows, and the journal gives {len(rows)}"
+
+
+def _ended_or_recorded(place: Place, lines: Sequence[Line]) -> Iterator[tuple[Path, str]]:
+    """Yield the study's fingerprints and the recordings that tell more than a journal without an end."""
+    folder, study = place.folder, place.study_folder
+    if lines[-1]["event"] == "session_ended":
+        return
+    if place_of(study, folder) in {session for _, session in listed(study.fingerprints)}:
+        yield study.fingerprints, f"lists {place_of(study, folder)} as ended, though its journal has no end"
+    of_trials = {path for which in attempts(lines) for path in recording_files(folder.recordings, *which)}
+    for path in sorted(set(_recordings(folder)) - of_trials):
+        yield path, "is of a trial that the journal never started"
+
+
+def _recordings(folder: SessionFolder) -> Iterator[Path]:
+    for path in paths_in(folder.recordings):
+        if RECORDING_NAME.fullmatch(path.relative_to(folder.path).as_posix()):
+            yield path
+
+
+def _rows(path: Path, root: Path) -> int:
+    """Return how many rows a table has; none where it is no table, which is made again without a loss."""
+    try:
+        text = read_own(path, root).decode("utf-8", "replace")
+        names, *rows = list(csv.reader(io.StringIO(text, newline=""))) or [[]]
+    except (StoreError, csv.Error):
+        return 0
+    return sum(len(row) == len(names) > 1 for row in rows)

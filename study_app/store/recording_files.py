@@ -1,0 +1,396 @@
+"""The files of a trial's recording: every sample of the servo, and every frame that was shown, as Parquet.
+
+Times and positions are kept to the last bit, so that the trial can be computed again from them; velocities and forces,
+which then come out again, are rounded to steps far below what a device or a hand can tell, so that half an hour at
+1 kHz takes 30 to 56 MB. What was computed is proved by the CRC-32 of its exact numbers, one of every second.
+
+Positions, velocities and forces are in the frames of ``haptics.model.layout.SAMPLE``. Readers need no code of ours: any
+Parquet reader gives the columns, with unit and meaning in each column's metadata.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import zlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+import pyarrow as pa  # type: ignore[import-untyped]
+from numpy.typing import NDArray
+from pyarrow import parquet
+
+from study_app.errors import StoreError
+from study_app.haptics.model.device_dynamics import BELIEVED_TICKS
+from study_app.haptics.model.layout import SAMPLE, records
+from study_app.store.atomic import beside, cannot_read, sync_folder
+from study_app.store.journals.journal import plain
+from study_app.store.journals.parsing import parse_json
+from study_app.store.tables.columns import Column
+from study_app.store.tables.recorded_columns import FRAMES, SAMPLES
+
+FORMAT = 2
+SPEED_STEP_MPS = 2.0**-12
+FORCE_STEP_N = 2.0**-14
+ROUNDED_TO = {
+    "velocity_mps": SPEED_STEP_MPS,
+    "wake_mps": SPEED_STEP_MPS,
+    "device_force_n": FORCE_STEP_N,
+    "command_n": FORCE_STEP_N,
+    "force_n": FORCE_STEP_N,
+}
+"""Fields of ``layout.SAMPLE`` that are recorded rounded, and the step."""
+GROUP_SECONDS = 30  # rows of so many seconds are compressed together
+
+FRAME = np.dtype([("painted_ns", np.int64), ("sample_ns", np.int64), ("age_ns", np.int64)])
+
+_FACTS = b"liquid_study"
+_COMPRESSION = ("zstd", 9)
+_AXES = ("x", "y", "z")
+_LATER = frozenset({"delay_ticks", *(f"undelivered_{axis}_n" for axis in _AXES)})  # columns that format 1 lacks
+_SHORT = frozenset({"buttons", "delay_ticks", "limiters", "scene", "status"})
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """A file that is whole on the disk."""
+
+    path: Path
+    rows: int
+    sha256: str
+
+
+@dataclass(frozen=True, slots=True)
+class Checks:
+    """CRC-32 of the float64 forces (little-endian, x y z a row): of every ``rows`` rows, and of the rest at the end."""
+
+    rows: int
+    device_force: tuple[int, ...]
+    effect_force: tuple[int, ...]
+
+
+class SamplesFile:
+    """A recording being written: not there under its name until ``finish``.
+
+    Parameters
+    ----------
+    path : Path
+        Where it is to be.
+    facts : mapping
+        What the samples are of; kept in the file. Nothing that tells a condition.
+    rate_hz : float
+        Samples a second, nominally.
+
+    Raises
+    ------
+    OSError
+        From every method: the disk does not take it.
+    """
+
+    def __init__(self, path: Path, facts: Mapping[str, Any], rate_hz: float) -> None:
+        self.path = path
+        self.check_rows = max(1, round(rate_hz))
+        self.group_rows = self.check_rows * GROUP_SECONDS
+        self.rows = 0
+        self._facts = {**facts, "rate_hz": rate_hz}
+        self._half = _Half(path, SAMPLES)
+        self._device: list[int] = []
+        self._effect: list[int] = []
+
+    def write(self, samples: Any) -> None:
+        """Add a group of samples (array of ``SAMPLE``): ``group_rows`` of them, except the last time."""
+        if self.rows == 0:
+            self._facts["first_device_force_n"] = plain(samples["device_force_n"][:1].ravel())
+            self._facts["first_command_n"] = plain(samples["command_n"][:1].ravel())
+        self._device += crcs(samples["device_force_n"], self.check_rows)
+        self._effect += crcs(samples["force_n"], self.check_rows)
+        self._half.write(sample_columns(samples))
+        self.rows += len(samples)
+
+    def finish(self, dropped: int = 0) -> Written:
+        """Close the file and put it in its place; ``dropped`` samples are known to be missing."""
+        checks = {"rows": self.check_rows, "device_force": self._device, "effect_force": self._effect}
+        facts = {"format": FORMAT, "kind": "samples", **self._facts, "dropped": dropped, "crc32": checks}
+        return self._half.finish(facts, self.rows)
+
+    def abandon(self) -> None:
+        """Take away what was written."""
+        self._half.abandon()
+
+
+def write_frames(path: Path, frames: NDArray[np.int64], facts: Mapping[str, Any]) -> Written:
+    """Write what was shown: when painted and of which moment (n, 2) [ns, the servo's clock].
+
+    Raises
+    ------
+    OSError
+        The disk does not take it; nothing is left.
+    """
+    half = _Half(path, FRAMES)
+    try:
+        painted, shown = frames[:, 0], frames[:, 1]
+        half.write({"painted_ns": painted, "sample_ns": shown, "age_ns": painted - shown})
+        return half.finish({"format": FORMAT, "kind": "frames", **facts}, len(frames))
+    except OSError:
+        half.abandon()
+        raise
+
+
+def read_samples(path: Path) -> Any:
+    """Return the samples (n,) as a recarray of ``SAMPLE``; ``busy_ns``, which is not recorded, is 0.
+
+    The first sample's force on the hand, from which the next one moves, is exact. Recordings of format 1 were made
+    where every device was taken to send what it was asked for, one tick late.
+
+    Raises
+    ------
+    StoreError
+        It cannot be read, or is no recording of samples.
+    """
+    columns, facts = _read(path, "samples")
+    samples = records(SAMPLE, len(columns["tick"]))
+    for name in ("tick", "time_ns", "fresh", "buttons", "limiters", "scene", "status"):
+        samples[name] = columns[name]
+    samples["delay_ticks"] = columns.get("delay_ticks", BELIEVED_TICKS)
+    samples["lateness_ns"] = columns["time_ns"] - columns["due_ns"]
+    for i, axis in enumerate(_AXES):
+        samples["position_m"][:, i] = columns[f"position_{axis}_m"]
+        samples["velocity_mps"][:, i] = columns[f"velocity_{axis}_mps"]
+        samples["wake_mps"][:, i] = columns[f"wake_{axis}_mps"]
+        device = columns[f"device_force_{axis}_n"].astype(np.float64)
+        samples["device_force_n"][:, i] = device
+        samples["command_n"][:, i] = device + columns.get(f"undelivered_{axis}_n", 0.0)
+        samples["force_n"][:, i] = device + columns[f"withheld_{axis}_n"]
+    if len(samples) and None not in facts["first_device_force_n"]:
+        samples["device_force_n"][0] = facts["first_device_force_n"]
+        samples["command_n"][0] = facts.get("first_command_n", facts["first_device_force_n"])
+    return samples
+
+
+def read_frames(path: Path) -> Any:
+    """Return the frames (n,) as a recarray: when painted, of which moment, and the difference [ns].
+
+    Raises
+    ------
+    StoreError
+        It cannot be read, or is no recording of frames.
+    """
+    columns, _ = _read(path, "frames")
+    frames = records(FRAME, len(columns["painted_ns"]))
+    for name in FRAME.names or ():
+        frames[name] = columns[name]
+    return frames
+
+
+def read_facts(path: Path) -> dict[str, Any]:
+    """Return what the file says of itself, without reading its rows: facts, ``kind``, ``rows``.
+
+    Raises
+    ------
+    StoreError
+        It cannot be read, or is no recording of ours.
+    """
+    try:
+        metadata = parquet.read_metadata(path)
+    except OSError as error:
+        raise cannot_read(path, error) from error
+    except (pa.ArrowException, UnicodeDecodeError) as error:
+        raise _damaged(path, error) from error
+    return _facts(path, metadata)
+
+
+def read_checks(path: Path) -> Checks:
+    """Return the CRCs of a recording of samples.
+
+    Raises
+    ------
+    StoreError
+        It cannot be read, or has none.
+    """
+    facts = read_facts(path)
+    if facts["kind"] != "samples":
+        raise StoreError(f"{path} holds {facts['kind']}, not samples: name the recording itself")
+    checks = facts["crc32"]
+    return Checks(checks["rows"], tuple(checks["device_force"]), tuple(checks["effect_force"]))
+
+
+def crcs(forces: NDArray[np.float64], rows: int) -> list[int]:
+    """Return the CRC-32 of every ``rows`` forces (n, 3) [N], and of those left at the end."""
+    exact = np.ascontiguousarray(forces, "<f8")
+    return [zlib.crc32(exact[first : first + rows].tobytes()) for first in range(0, len(exact), rows)]
+
+
+def sample_columns(samples: Any) -> dict[str, NDArray[Any]]:
+    """Return the columns of ``samples`` as they are kept: times and positions exact, the rest rounded."""
+    columns: dict[str, NDArray[Any]] = {
+        "tick": samples["tick"],
+        "time_ns": samples["time_ns"],
+        "due_ns": samples["time_ns"] - samples["lateness_ns"],
+        **{name: samples[name] for name in ("fresh", "buttons", "delay_ticks", "limiters", "scene", "status")},
+    }
+    with np.errstate(invalid="ignore", over="ignore"):  # a fault's numbers are kept as they are
+        device = _rounded(samples["device_force_n"], FORCE_STEP_N)
+        undelivered = _rounded(samples["command_n"], FORCE_STEP_N) - device
+        withheld = _rounded(samples["force_n"], FORCE_STEP_N) - device
+        for i, axis in enumerate(_AXES):
+            columns[f"position_{axis}_m"] = samples["position_m"][:, i]
+            columns[f"velocity_{axis}_mps"] = _rounded(samples["velocity_mps"][:, i], SPEED_STEP_MPS)
+            columns[f"wake_{axis}_mps"] = _rounded(samples["wake_mps"][:, i], SPEED_STEP_MPS)
+            columns[f"device_force_{axis}_n"] = device[:, i]
+            columns[f"undelivered_{axis}_n"] = undelivered[:, i]
+            columns[f"withheld_{axis}_n"] = withheld[:, i]
+        return {name: np.ascontiguousarray(column, _NUMPY_TYPES[name]) for name, column in columns.items()}
+
+
+def _rounded(values: NDArray[np.float64], step: float) -> NDArray[np.float64]:
+    rounded: NDArray[np.float64] = np.rint(values / step) * step
+    return rounded
+
+
+class _Half:
+    """A Parquet file under a temporary name, until it is whole."""
+
+    def __init__(self, path: Path, columns: Sequence[Column]) -> None:
+        self._path = path
+        self._temporary = beside(path)
+        self._schema = _schema(columns)
+        self._file: BinaryIO = self._temporary.open("xb")
+        self._writer = parquet.ParquetWriter(
+            self._file,
+            self._schema,
+            compression=_COMPRESSION[0],
+            compression_level=_COMPRESSION[1],
+            use_dictionary=False,
+            write_statistics=False,
+            column_encoding={field.name: _encoding(field.type) for field in self._schema},
+        )
+
+    def write(self, columns: Mapping[str, NDArray[Any]]) -> None:
+        arrays = [_array(columns[field.name], field.type) for field in self._schema]
+        self._writer.write_batch(pa.RecordBatch.from_arrays(arrays, schema=self._schema))
+
+    def finish(self, facts: Mapping[str, Any], rows: int) -> Written:
+        self._writer.add_key_value_metadata({_FACTS: json.dumps(facts, ensure_ascii=False)})
+        self._writer.close()
+        self._file.flush()
+        os.fsync(self._file.fileno())
+        self._file.close()
+        with self._temporary.open("rb") as file:
+            digest = hashlib.file_digest(file, "sha256").hexdigest()
+        self._temporary.replace(self._path)
+        sync_folder(self._path.parent)
+        return Written(self._path, rows, digest)
+
+    def abandon(self) -> None:
+        for end in (self._writer.close, self._file.close):
+            try:
+                end()
+            except OSError:  # what it could not write is not wanted
+                continue
+        self._temporary.unlink(missing_ok=True)
+
+
+def _schema(columns: Sequence[Column]) -> pa.Schema:
+    fields = []
+    for column in columns:
+        told = {"description": column.description, **({"unit": column.unit} if column.unit else {})}
+        fields.append(pa.field(column.name, _type(column), nullable=False, metadata=told))
+    return pa.schema(fields)
+
+
+def _type(column: Column) -> pa.DataType:
+    if column.kind == "flag":
+        return pa.bool_()
+    if column.kind == "integer":
+        return pa.int32() if column.name in _SHORT else pa.int64()
+    return pa.float64() if column.name.startswith("position_") else pa.float32()
+
+
+_NUMPY_TYPES = {column.name: _type(column).to_pandas_dtype() for column in (*SAMPLES, *FRAMES)}
+
+
+def _encoding(of: pa.DataType) -> str:
+    if pa.types.is_boolean(of):
+        return "RLE"
+    return "BYTE_STREAM_SPLIT" if pa.types.is_floating(of) else "DELTA_BINARY_PACKED"
+
+
+def _array(values: NDArray[Any], of: pa.DataType) -> pa.Array:
+    """Return ``values`` for Arrow without a copy, and without the library that it would load to look at them."""
+    kept = np.packbits(values, bitorder="little") if pa.types.is_boolean(of) else np.ascontiguousarray(values)
+    return pa.Array.from_buffers(of, len(values), [None, pa.py_buffer(kept)])
+
+
+def _read(path: Path, kind: str) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+    try:
+        with parquet.ParquetFile(path) as file:
+            facts = _facts(path, file.metadata)
+            if facts["kind"] != kind:
+                raise StoreError(f"{path} holds {facts['kind']}, not {kind}: name the other file of the trial")
+            table = file.read().combine_chunks()
+    except OSError as error:
+        raise cannot_read(path, error) from error
+    except (pa.ArrowException, UnicodeDecodeError) as error:
+        raise _damaged(path, error) from error
+    if not _are_of(table, SAMPLES if kind == "samples" else FRAMES, facts["rows"]):
+        raise StoreError(f"{path} is damaged (its columns are others than those of {kind}): restore it from a copy")
+    return {name: _numbers(table.column(name), facts["rows"]) for name in table.column_names}, facts
+
+
+def _are_of(table: pa.Table, columns: Sequence[Column], rows: int) -> bool:
+    """Return whether a table has these columns, each once and whole, but for those that format 1 lacks."""
+    expected = {column.name: _type(column) for column in columns}
+    held = {field.name: field.type for field in table.schema}
+    return (
+        table.num_rows == rows
+        and len(table.column_names) == len(held)
+        and held.items() <= expected.items()
+        and expected.keys() - held.keys() <= _LATER
+        and not any(column.null_count for column in table.columns)
+    )
+
+
+def _numbers(column: pa.ChunkedArray, rows: int) -> NDArray[Any]:
+    if rows == 0:
+        return np.empty(0)
+    array = column.chunk(0)
+    raw, end = array.buffers()[1], array.offset + rows
+    if pa.types.is_boolean(array.type):
+        return np.unpackbits(np.frombuffer(raw, np.uint8), count=end, bitorder="little")[array.offset :]
+    return np.frombuffer(raw, array.type.to_pandas_dtype(), count=end)[array.offset :]
+
+
+def _facts(path: Path, metadata: Any) -> dict[str, Any]:
+    try:
+        facts = parse_json(metadata.metadata[_FACTS])
+        if facts["format"] not in range(1, FORMAT + 1):
+            found, readable = facts["format"], f"1 to {FORMAT}"
+            raise StoreError(f"{path} has format {found!r}, this version reads {readable}: use a newer version")
+        if facts["kind"] == "samples":
+            _check_facts_of_samples(facts, metadata.num_rows)
+        return {**facts, "kind": facts["kind"], "rows": metadata.num_rows}
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise StoreError(f"{path} is no recording of ours: restore it from a copy") from error
+
+
+def _check_facts_of_samples(facts: Mapping[str, Any], rows: int) -> None:
+    """Refuse facts that are no numbers where readers compute with them (KeyError, TypeError or ValueError)."""
+    if rows and "first_device_force_n" not in facts:
+        raise KeyError("first_device_force_n")
+    checks = facts["crc32"]
+    whole = (checks["rows"], *checks["device_force"], *checks["effect_force"])
+    if not all(isinstance(number, int) for number in whole):
+        raise ValueError("its checks are none")
+    for name in {"first_device_force_n", "first_command_n"} & facts.keys():
+        first = facts[name]
+        if len(first) not in (0, 3) or not all(number is None or isinstance(number, int | float) for number in first):
+            raise ValueError(f"{name} is no force")
+
+
+def _damaged(path: Path, error: Exception) -> StoreError:
+    reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+    return StoreError(f"{path} is damaged ({reason}): restore it from a copy")

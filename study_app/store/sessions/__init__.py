@@ -1,0 +1,1 @@
+"""Session folders from the first claim to the end."""

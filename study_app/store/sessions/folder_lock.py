@@ -1,0 +1,202 @@
+"""Who has a folder open: a marker in it while a program writes there, so that no second one does.
+
+Every opening has a marker of its own name, which says machine, process and when that process began; so a marker that a
+killed program left is told from a living one's, and can be taken away without meeting a newer one. A program puts its
+marker first and then looks for others: of two that come at once none or one goes on, never both.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import json
+import os
+import platform
+import re
+import secrets
+import sys
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from study_app.errors import StoreError
+from study_app.store.atomic import cannot_write, create_folder, is_there, sync_folder, write_file
+from study_app.store.journals.parsing import parse_json
+
+_MARKER = re.compile(r"\.open-[0-9a-f]{8}\.json")
+_BOOT = Path("/proc/sys/kernel/random/boot_id")
+
+
+@dataclass(frozen=True, slots=True)
+class Opening:
+    """A folder that this program has open until ``release``."""
+
+    marker: Path
+
+    def release(self) -> None:
+        """Let other programs have it; a marker that cannot be taken away means nothing once this program has ended."""
+        with contextlib.suppress(OSError):
+            self.marker.unlink(missing_ok=True)
+
+
+def open_alone(folder: Path) -> Opening:
+    """Mark ``folder`` as open in this program.
+
+    Raises
+    ------
+    StoreError
+        Another program has it open, or the marker cannot be written. Nothing is left behind.
+    """
+    opening = Opening(folder / f".open-{secrets.token_hex(4)}.json")
+    write_file(opening.marker, json.dumps(_this_program()).encode())
+    try:
+        for marker in markers(folder):
+            if marker != opening.marker:
+                _pass(marker)
+        sync_folder(folder)
+    except OSError as error:
+        opening.release()
+        raise cannot_write(folder, error) from error
+    except StoreError:
+        opening.release()
+        raise
+    return opening
+
+
+def create_opened(folder: Path) -> Opening | None:
+    """Create ``folder``, open in this program from the first moment on; None where there is one that holds something.
+
+    Raises
+    ------
+    StoreError
+        It is not there and cannot be created.
+    """
+    opening = Opening(folder / f".open-{secrets.token_hex(4)}.json")
+    try:
+        created = create_folder(folder, {opening.marker.name: json.dumps(_this_program()).encode()})
+    except StoreError:
+        if is_there(folder):
+            return None
+        raise
+    return opening if created else None
+
+
+def markers(folder: Path) -> tuple[Path, ...]:
+    """Return the markers in ``folder``, of living programs or not."""
+    return tuple(sorted(path for path in folder.glob(".open-*.json") if _MARKER.fullmatch(path.name)))
+
+
+def is_open(folder: Path) -> bool:
+    """Return whether a program, perhaps this one, has ``folder`` open."""
+    return any(_lives(_holder(marker)) for marker in markers(folder))
+
+
+def refuse_if_open(folder: Path) -> None:
+    """Refuse a folder that a program, perhaps this one, has open; nothing is changed.
+
+    Raises
+    ------
+    StoreError
+        Says which program, and since when.
+    """
+    for marker in markers(folder):
+        holder = _holder(marker)
+        if _lives(holder):
+            raise _is_open(marker, holder)
+
+
+def _pass(marker: Path) -> None:
+    """Take away the marker of a program that is gone; refuse where it lives."""
+    holder = _holder(marker)
+    if _lives(holder):
+        raise _is_open(marker, holder)
+    marker.unlink(missing_ok=True)
+
+
+def _is_open(marker: Path, holder: dict[str, Any]) -> StoreError:
+    return StoreError(
+        f"{marker.parent} is open in another program (process {holder.get('pid')} on {holder.get('host')}, since "
+        f"{holder.get('at')}): wait for it, or end it there; if that program is gone, delete {marker}"
+    )
+
+
+def _holder(marker: Path) -> dict[str, Any]:
+    """Return what the marker says; nothing where it is gone meanwhile."""
+    try:
+        holder = parse_json(marker.read_bytes())
+    except FileNotFoundError:
+        return {"gone": True}
+    except (OSError, ValueError):
+        return {}
+    return holder if isinstance(holder, dict) else {}
+
+
+def _this_program() -> dict[str, Any]:
+    return {
+        "host": platform.node(),
+        "pid": os.getpid(),
+        "began": process_began(os.getpid()),
+        "at": datetime.now().astimezone().isoformat(timespec="seconds"),
+    }
+
+
+def _lives(holder: dict[str, Any]) -> bool:
+    """Return whether the program that wrote a marker may still run; of another machine's nothing is known."""
+    if holder.get("gone"):
+        return False
+    if holder.get("host") != platform.node() or not isinstance(holder.get("pid"), int):
+        return True
+    began = process_began(holder["pid"])
+    return began is not None and began == holder.get("began")
+
+
+def process_began(process: int) -> str | None:
+    """Return what tells the running process of that number from all others that ever had it; None if none runs.
+
+    On Linux the boot and the time within it, on Windows the time; elsewhere there is no such word, and a process of the
+    same number passes for the same.
+    """
+    if sys.platform == "win32":
+        return _began_on_windows(process)
+    else:
+        return _began_on_linux(process) if _BOOT.exists() else _began_elsewhere(process)
+
+
+def _began_on_linux(process: int) -> str | None:
+    try:
+        after_name = Path(f"/proc/{process}/stat").read_text(encoding="utf-8", errors="replace").rpartition(")")[2]
+        boot = _BOOT.read_text(encoding="ascii").strip()
+    except OSError:
+        return None
+    state, *numbers = after_name.split()
+    return None if state in {"Z", "X"} else f"{boot} {numbers[18]}"
+
+
+def _began_elsewhere(process: int) -> str | None:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return None
+    except PermissionError:  # it runs, and is another user's
+        pass
+    return "unknown"
+
+
+if sys.platform == "win32":
+
+    def _began_on_windows(process: int) -> str | None:
+        kernel = ctypes.WinDLL("kernel32", use_last_error=True)
+        kernel.OpenProcess.restype = ctypes.c_void_p
+        query_limited_information, still_active = 0x1000, 259
+        handle = ctypes.c_void_p(kernel.OpenProcess(query_limited_information, False, process))
+        if not handle:
+            return None
+        try:
+            code = ctypes.c_ulong()
+            times = [ctypes.c_ulonglong() for _ in range(4)]
+            running = kernel.GetExitCodeProcess(handle, ctypes.byref(code)) and code.value == still_active
+            known = kernel.GetProcessTimes(handle, *(ctypes.byref(moment) for moment in times))
+            return str(times[0].value) if running and known else None
+        finally:
+            kernel.CloseHandle(handle)

@@ -1,0 +1,229 @@
+"""A session that is open: appended to while it runs, closed with a status.
+
+While it runs it is open in one program alone. The journal is the truth; tables, receipt and checksums follow from it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from study_app.errors import StoreError
+from study_app.store import receipt
+from study_app.store.blinded.blinding import Key
+from study_app.store.blinded.sealing import opened, opened_key, sealed
+from study_app.store.checksums import write_checksums
+from study_app.store.folders import SessionFolder, StudyFolder
+from study_app.store.journals.journal import Line
+from study_app.store.journals.journal_writer import Journal
+from study_app.store.recorder import Kept, Recorder, event_of, hashes_of
+from study_app.store.sessions.folder_lock import Opening
+from study_app.store.tables import session_tables
+from study_app.store.tables.columns import RESPONSES
+from study_app.store.tables.growing_tables import GrowingTables
+from study_app.store.tables.participants import write_participants
+from study_app.store.verification.fingerprints import fingerprint, note_fingerprint
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a session's files go: the study's folder, the session's in it, and the study's name."""
+
+    study_folder: StudyFolder
+    folder: SessionFolder
+    study: str
+
+
+class SessionStore:
+    """The open session: ``append`` adds to its journal, tables follow the journal, ``finish`` says how it ended.
+
+    ``key`` translates codes while the session runs; ``clock`` is the one the journal is stamped from; ``recorder``
+    takes the trials' samples and frames, or is None in a session without recordings; ``behind`` is why the tables on
+    disk are older than the journal, or None; ``fingerprint`` is empty until the session has ended. Made by `begin`; by
+    ``resume.reopen`` from ``lines`` written before.
+    """
+
+    def __init__(
+        self,
+        place: Place,
+        journal: Journal,
+        key: Key,
+        session_receipt: dict[str, Any],
+        opening: Opening,
+        *,
+        lines: Sequence[Line] = (),
+        recorder: Recorder | None = None,
+    ) -> None:
+        self.place = place
+        self.key = key
+        self.clock = journal.clock
+        self.recorder = recorder
+        self.behind: StoreError | None = None
+        self.fingerprint = ""
+        self._journal = journal
+        self._receipt = session_receipt
+        self._opening = opening
+        self._lines: list[Line] = list(lines)
+        self._tables = GrowingTables(*(place.folder.table(place.study, name) for name in ("responses", "trials")))
+        self._kept: list[Kept] = []
+        self._over = False
+
+    @property
+    def folder(self) -> SessionFolder:
+        """The session's folder."""
+        return self.place.folder
+
+    @property
+    def lines(self) -> tuple[Line, ...]:
+        """The journal so far."""
+        return tuple(self._lines)
+
+    def append(self, event: str, *, t_s: float | None = None, waits: bool = True, **fields: Any) -> None:
+        """Put an event into the journal; with ``waits`` it is on the disk when this returns, else soon after.
+
+        ``t_s`` is when it happened [s since the clock's origin], by default now. What tells a condition is sealed.
+
+        Raises
+        ------
+        StoreError
+            It was not written, or is not on the disk; the journal is as before and can be tried again.
+        """
+        if self._lines:
+            fields = sealed(self._lines[0], event, fields, self.key)
+        self._lines.append(self._journal.append(event, t_s=t_s, waits=waits, **fields))
+
+    def check_flushed(self) -> None:
+        """Raise if lines that nobody waited for could not be flushed, and still are not on the disk.
+
+        Raises
+        ------
+        StoreError
+            Says why.
+        """
+        self._journal.check_flushed()
+
+    def write_tables(self) -> None:
+        """Bring the session's tables up to date with its journal.
+
+        While the session runs only rows that changed are written, and nobody waits until the disk has them, for the
+        participant waits for the next page; at its end the tables are written as wholes and flushed. A table that
+        cannot be written now (open in another program, no space) stops no session: nothing is lost, since tables are
+        made from the journal. ``behind`` says why, and the next call tries again. What became of recordings since the
+        last call is journalled first.
+        """
+        try:
+            self._keep_recordings()
+            self._tables.write(self._lines, opened_key(self.place.study_folder), whole=self._journal.closed)
+        except StoreError as error:
+            self.behind = error
+        else:
+            self.behind = None
+
+    def finish(self, status: str, reason: str = "") -> None:
+        """Write the session's last line, its receipt, all tables, checksums and fingerprint, and close it.
+
+        Raises
+        ------
+        StoreError
+            One of them could not be written; what was journalled before is safe. Called again, it goes on from there.
+        """
+        if self._over or not self._journal.closed:
+            if self.recorder is not None:
+                self.recorder.close()
+            self._keep_recordings()
+            self.append("session_ended", status=status, reason=reason)
+            self._journal.close()
+            self._receipt |= {"status": status, "reason": reason, "ended_at": self._lines[-1]["at"]}
+        self.write_tables()
+        failures = [] if self.behind is None else [self.behind]
+        for write in (self._write_receipt, self._write_participants, self._write_checksums):
+            try:
+                write()
+            except StoreError as error:
+                failures.append(error)
+        self._opening.release()
+        if failures:
+            raise failures[0]
+        self._over = True
+
+    def close(self) -> None:
+        """Let go of the session without an end; it stays unfinished.
+
+        Raises
+        ------
+        StoreError
+            The last lines could not be flushed.
+        """
+        self._over = True
+        if self.recorder is not None:
+            self.recorder.close()
+        if not self._journal.closed:
+            with contextlib.suppress(StoreError):  # `reopen` finds the files that no line tells of
+                self._keep_recordings()
+        try:
+            self._journal.close()
+        finally:
+            self._opening.release()
+
+    def note_resumed(self, what: Mapping[str, Any]) -> None:
+        """Add to the receipt what the session goes on with.
+
+        Raises
+        ------
+        StoreError
+            The receipt cannot be written.
+        """
+        self._receipt["resumed"] = [*self._receipt.get("resumed", ()), dict(what)]
+        self._write_receipt()
+
+    def _write_receipt(self) -> None:
+        receipt.write(self.folder.receipt, self._receipt)
+
+    def _write_participants(self) -> None:
+        write_participants(self.place.study_folder, self.place.study)
+
+    def _write_checksums(self) -> None:
+        found = fingerprint(write_checksums(self.folder, hashes_of(self._lines)))
+        if not self.fingerprint:
+            note_fingerprint(self.place.study_folder, self.folder, found)
+        self.fingerprint = found
+
+    def _keep_recordings(self) -> None:
+        """Journal what became of recordings: which files they are, or why there are none."""
+        if self.recorder is not None:
+            self._kept += self.recorder.kept()
+        while self._kept:
+            event, fields = event_of(self._kept[0])
+            self.append(event, waits=False, **fields)
+            del self._kept[0]
+
+    def __enter__(self) -> SessionStore:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        try:
+            self.close()
+        except StoreError as failed:
+            if error is None:
+                raise
+            error.add_note(str(failed))
+
+
+def table_files(place: Place, lines: Sequence[Line], key: Key | None) -> tuple[tuple[Path, bytes], ...]:
+    """Return the session's tables as files: paths and contents, from the journal's lines alone.
+
+    ``key`` is the study's once it was opened; without it the sealed columns are left out.
+    """
+    lines = opened(lines, key)
+    rows = session_tables.SessionRows(lines)
+    columns = session_tables.trial_columns(lines, opened=key is not None)
+    return (
+        (place.folder.table(place.study, "responses"), session_tables.csv_bytes(RESPONSES, rows.responses)),
+        (place.folder.table(place.study, "trials"), session_tables.csv_bytes(columns, rows.trials)),
+    )

@@ -1,0 +1,233 @@
+"""Going on with a session whose program had ended: the journal is opened where it stopped, and says so."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import time
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import study_app
+from study_app.errors import StoreError
+from study_app.protocol.differences import CONDITIONS_DIFFER, differences
+from study_app.protocol.load import protocol_hash
+from study_app.protocol.model import Protocol
+from study_app.protocol.orders.schedule import stream
+from study_app.protocol.source.liquid_files import bundled, unbundled
+from study_app.store import receipt
+from study_app.store.atomic import is_there, sweep
+from study_app.store.blinded.blinding import Key, open_or_draw_key, read_key, same_conditions
+from study_app.store.checksums import sha256
+from study_app.store.clock import SessionClock
+from study_app.store.folders import SessionFolder, StudyFolder, locate, refuse_never_begun
+from study_app.store.journals import journal
+from study_app.store.journals.cut_journal import refuse_if_cut
+from study_app.store.journals.journal import Contents, Line
+from study_app.store.journals.journal_writer import Journal
+from study_app.store.progress import attempts, progress_of
+from study_app.store.recorder import Lost, Recorded, event_of, recording_files
+from study_app.store.sessions.begin import make_recorder, surroundings
+from study_app.store.sessions.folder_lock import open_alone, refuse_if_open
+from study_app.store.sessions.open_session import Place, SessionStore
+from study_app.store.tables.participants import write_participants
+from study_app.store.tables.study_description import write_description
+
+SHOWN_DIFFERENCES = 6
+MOST_GAP_S = 366 * 86400.0
+"""A wall clock that tells of a longer gap was wrong before it, or is now."""
+
+
+def reopen(
+    session_folder: Path,
+    protocol: Protocol,
+    source: bytes,
+    *,
+    operator: str,
+    device: Mapping[str, Any],
+    screens: Mapping[str, Any],
+    now_ns: Callable[[], int] = time.monotonic_ns,
+    now: datetime | None = None,
+) -> SessionStore:
+    """Open an unfinished session to go on with it; ``progress.progress_of(store.lines)`` says where.
+
+    A torn tail of the journal is moved to a file of its own, half-written files are taken away, and
+    ``session_resumed`` is journalled with the gap since the last line (null where the wall clock was set back or
+    is wrong by years, so that nobody knows). The session's clock goes on from there, so that its times never go back.
+
+    Parameters
+    ----------
+    source : bytes
+        The protocol's file as it is; its hash must be the one the session began with.
+    now_ns : callable
+        The monotonic clock [ns] to go on with: the servo's.
+    now : datetime, optional
+        Wall time with its zone; by default the system's.
+
+    Raises
+    ------
+    StoreError
+        It is no session's folder, open in another program, finished, damaged, with a journal that tells less than the
+        other files, or of another protocol (the differences are named where they are not blinded); the key is not
+        in order; or the folder cannot be written. But for the torn tail nothing has changed then.
+    """
+    study_folder, folder = locate(session_folder)
+    refuse_never_begun(folder)
+    opening = open_alone(folder.path)
+    try:
+        left = _left(study_folder, folder, protocol, source)
+        contents = left.contents
+        gap_s, clock = _go_on(contents.lines, now_ns, now)
+        recorder = make_recorder(left.place, left.start, clock)
+        opened = Journal.reopen(folder.journal, contents, clock)
+    except BaseException:
+        opening.release()
+        raise
+    store = SessionStore(left.place, opened, left.key, left.receipt, opening, lines=contents.lines, recorder=recorder)
+    told: dict[str, Any] = {"gap_s": gap_s, "operator": operator}
+    with contextlib.ExitStack() as failing:
+        failing.callback(store.close)
+        at_s = round(clock.seconds(), 6)
+        facts: dict[str, Any] = {
+            "torn_bytes": contents.torn_bytes,
+            "device": device.get("name"),
+            "version": study_app.__version__,
+        }
+        store.append("session_resumed", t_s=at_s, **told, **facts)
+        _sweep(folder)
+        for event, fields in _recordings_found(folder, contents.lines) if left.start.get("recordings") else ():
+            store.append(event, **fields)
+        store.note_resumed({"at": clock.at(at_s), **told, **surroundings(device, screens, clock)})
+        store.write_tables()
+        write_description(study_folder, protocol.study)
+        write_participants(study_folder, left.place.study)
+        failing.pop_all()
+    return store
+
+
+def check_can_go_on(session_folder: Path, protocol: Protocol, source: bytes) -> None:
+    """Refuse what `reopen` would refuse, before anything is made ready for it; nothing is touched.
+
+    Raises
+    ------
+    StoreError
+        As `reopen`.
+    """
+    study_folder, folder = locate(session_folder)
+    refuse_never_begun(folder)
+    refuse_if_open(folder.path)
+    _left(study_folder, folder, protocol, source)
+
+
+def sealed_source(session_folder: Path, source: bytes) -> bytes:
+    """Return a protocol's source with the liquid files as they were sealed with the key of a session's study.
+
+    Raises
+    ------
+    StoreError
+        It is no session's folder.
+    """
+    study_folder, _ = locate(session_folder)
+    try:
+        files = read_key(study_folder.path).files
+    except StoreError:  # `reopen` says so
+        return source
+    return bundled(unbundled(source)[0], files.get) if files else source
+
+
+@dataclass(frozen=True, slots=True)
+class _Left:
+    """What an interrupted session left that can go on."""
+
+    place: Place
+    contents: Contents
+    start: Line
+    receipt: dict[str, Any]
+    key: Key
+
+
+def _left(study_folder: StudyFolder, folder: SessionFolder, protocol: Protocol, source: bytes) -> _Left:
+    """Read what an interrupted session left; refuse what cannot go on with this protocol."""
+    contents = journal.whole(folder.journal)
+    start = _unfinished(folder, contents.lines)
+    place = Place(study_folder, folder, start["study"])
+    first = receipt.read(folder.receipt)
+    if receipt.other_format(first, start):
+        raise StoreError(f"{folder.journal} has another format than its receipt says: restore it from a copy")
+    refuse_if_cut(place, contents.lines)
+    _same_protocol(place, first, start, protocol, source)
+    draw = stream(start["seed"], "blinding").random if start["simulated"] else None
+    return _Left(place, contents, start, first, open_or_draw_key(study_folder.path, protocol, draw))
+
+
+def _unfinished(folder: SessionFolder, lines: list[Line]) -> Line:
+    """Return the first line of a session that can go on."""
+    if not lines:
+        raise StoreError(
+            f"{folder.journal} holds no line: the program ended before the session had begun; use a new session number"
+        )
+    done = progress_of(lines)
+    if done.ended is not None:
+        raise StoreError(
+            f"{folder.path} is finished ({done.ended}): it cannot go on; use a new session number for another visit"
+        )
+    return done.start
+
+
+def _same_protocol(place: Place, first: Mapping[str, Any], start: Line, protocol: Protocol, source: bytes) -> None:
+    """Refuse a protocol whose file is not the one the session began with, and say what differs."""
+    if protocol_hash(source) == start["protocol_hash"]:
+        return
+    found = list(differences(first["protocol"], json.loads(json.dumps(receipt.without_conditions(protocol)))))
+    if not same_conditions(place.study_folder.path, protocol):
+        found.append(CONDITIONS_DIFFER)
+    if not found:
+        found.append("comments, order or notation, nothing that is run")
+    listed = "; ".join(found[:SHOWN_DIFFERENCES])
+    more = f"; and {len(found) - SHOWN_DIFFERENCES} more" if len(found) > SHOWN_DIFFERENCES else ""
+    raise StoreError(
+        f"{place.folder.path} began with another protocol file and goes on with that one only: put it back, or use a "
+        f"new session number. What differs: {listed}{more}"
+    )
+
+
+def _go_on(lines: list[Line], now_ns: Callable[[], int], now: datetime | None) -> tuple[float | None, SessionClock]:
+    """Return the gap since the last line, if it is known [s], and the clock that goes on after it."""
+    now = now if now is not None else datetime.now().astimezone()
+    gap_s = (now - datetime.fromisoformat(lines[-1]["at"])).total_seconds()
+    known = 0 <= gap_s <= MOST_GAP_S
+    shown_s = progress_of(lines).t_s + (gap_s if known else 0.0)
+    clock = SessionClock(now_ns, now - timedelta(seconds=shown_s), shown_s=shown_s)
+    return (round(gap_s, 3) if known else None), clock
+
+
+def _sweep(folder: SessionFolder) -> None:
+    sweep(folder.path)
+    if is_there(folder.recordings):
+        sweep(folder.recordings)
+
+
+def _recordings_found(folder: SessionFolder, lines: list[Line]) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield the lines about recordings that the ended program did not write: whole after all, or lost."""
+    from study_app.store import (  # noqa: PLC0415 - loads the Parquet library, where there are recordings
+        recording_files as recording,
+    )
+
+    told = {(line["trial"], line["attempt"]) for line in lines if line["event"] in ("recorded", "recording_lost")}
+    for trial, attempt in attempts(lines):
+        if (trial, attempt) in told:
+            continue
+        samples, frames = recording_files(folder.recordings, trial, attempt)
+        try:
+            facts = recording.read_facts(samples)
+            shown = recording.Written(frames, recording.read_facts(frames)["rows"], sha256(frames))
+            felt = recording.Written(samples, facts["rows"], sha256(samples))
+            yield event_of(Recorded(trial, attempt, felt, shown, facts["dropped"]))
+        except StoreError:
+            if not is_there(samples):  # frames are put in their place first, and are no recording alone
+                with contextlib.suppress(OSError):
+                    frames.unlink(missing_ok=True)
+            yield event_of(Lost(trial, attempt, "the program ended before it was whole"))

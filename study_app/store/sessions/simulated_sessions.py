@@ -1,0 +1,179 @@
+"""Sessions of simulated answers, each written whole when it is over.
+
+That an answer is on the disk before anything follows from it protects what people said. Simulated answers can be
+simulated again from their seed, so nothing here waits for the disk: a session is there with all its files, or not at
+all, and a power cut may take the last ones. The files are those that a session leaves which was held.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from study_app.protocol.model import Protocol
+from study_app.protocol.orders.schedule import stream
+from study_app.protocol.source.liquid_files import unbundled
+from study_app.store.atomic import cannot_write, create_folder
+from study_app.store.blinded.blinding import open_or_draw_key, reveals
+from study_app.store.blinded.sealing import opened, opened_key, sealed
+from study_app.store.checksums import checksum_bytes
+from study_app.store.clock import SessionClock
+from study_app.store.folders import StudyFolder, check_participant, check_unused, used_id
+from study_app.store.journals.journal import Line, line_bytes, line_of, plain
+from study_app.store.sessions.begin import first_words, make_folder
+from study_app.store.sessions.folder_lock import Opening, open_alone
+from study_app.store.sessions.open_session import Place, table_files
+from study_app.store.tables import session_tables
+from study_app.store.tables.participants import write_participants
+from study_app.store.tables.study_description import check_study, write_description
+from study_app.store.verification.fingerprints import fingerprint, note_fingerprint
+
+
+class SimulatedStudy:
+    """A study folder that takes sessions of simulated answers; the table of participants follows with the block's end.
+
+    Until then the study's folder itself is open in this program.
+
+    Parameters
+    ----------
+    results : study folder
+    source : the protocol's file as it is, hashed into the receipts
+    participants : ids of all that are to come; none may be used
+    seed : of the sessions and of the key
+    device, screens : descriptions for the receipts
+
+    Raises
+    ------
+    StoreError
+        The folder holds something else, or an id is used or misspelt, and then nothing was touched; or it cannot be
+        written.
+    """
+
+    def __init__(
+        self,
+        results: Path,
+        protocol: Protocol,
+        source: bytes,
+        participants: tuple[str, ...],
+        *,
+        seed: int,
+        device: Mapping[str, Any],
+        screens: Mapping[str, Any],
+    ) -> None:
+        self.folder = StudyFolder(Path(results))
+        check_study(self.folder, protocol.study.name)
+        for person in participants:
+            check_participant(person)
+            if self.folder.data.exists():
+                check_unused(self.folder, person, 1)
+        make_folder(self.folder.path)
+        self.key = open_or_draw_key(self.folder.path, protocol, stream(seed, "blinding").random, unbundled(source)[1])
+        self.protocol = protocol
+        self._rows: dict[Path, session_tables.Row] = {}
+        self._opening: Opening | None = None
+        self._told: dict[str, Any] = {
+            "session": 1,
+            "seed": seed,
+            "operator": "",
+            "language": protocol.study.languages[0],
+            "device": dict(device),
+            "screens": dict(screens),
+            "simulated": True,
+            "pilot": False,
+            "recordings": False,
+            "key_hash": self.key.hash,
+            "measures_sealed": not reveals(self.folder.path),
+        }
+        started, receipt = first_words(protocol, source, "", **self._told, clock=SessionClock())
+        self.started, self._receipt = started, plain(receipt)
+
+    def begin(self, participant: str, clock: SessionClock) -> SimulatedSession:
+        """Return the session of a participant, of which nothing is on the disk before it is finished."""
+        return SimulatedSession(self, participant, clock)
+
+    def keep(self, session: SimulatedSession) -> None:
+        """Put a finished session in its place.
+
+        Raises
+        ------
+        StoreError
+            Another program was first, or it cannot be written.
+        """
+        place, lines, key = session.place, session.lines, opened_key(self.folder)
+        told = {"participant": place.folder.participant, "started_at": session.clock.at(0)}
+        ended = {"status": lines[-1]["status"], "reason": lines[-1]["reason"], "ended_at": lines[-1]["at"]}
+        clock = {"origin_ns": session.clock.origin_ns, "origin_at": session.clock.at(0)}
+        text = json.dumps({**self._receipt, **told, **ended, "clock": clock}, indent=2, ensure_ascii=False)
+        files = {
+            place.folder.journal.name: bytes(session.content),
+            place.folder.receipt.name: f"{text}\n".encode("utf-8", "backslashreplace"),
+            **{path.name: content for path, content in table_files(place, lines, key)},
+        }
+        sums = {name: hashlib.sha256(content).hexdigest() for name, content in files.items()}
+        path = place.folder.path
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise cannot_write(path, error) from error
+        if not create_folder(path, {**files, place.folder.checksums.name: checksum_bytes(sums)}, waits=False):
+            raise used_id(self.folder, place.folder.participant, place.folder.number)
+        note_fingerprint(self.folder, place.folder, fingerprint(sums), waits=False)
+        self._rows[path] = session_tables.participant(opened(lines, key))
+
+    def __enter__(self) -> Self:
+        """Describe the study, so that its folder is known for what it is from the first session on."""
+        self._opening = open_alone(self.folder.path)
+        write_description(self.folder, self.protocol.study)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Bring the table of participants up to date with the sessions that were finished."""
+        try:
+            write_participants(self.folder, self.protocol.study.name, self._rows)
+        finally:
+            if self._opening is not None:
+                self._opening.release()
+
+
+class SimulatedSession:
+    """One session while it is simulated: takes what ``open_session.SessionStore`` takes, and keeps it until its end."""
+
+    def __init__(self, study: SimulatedStudy, participant: str, clock: SessionClock) -> None:
+        name = study.protocol.study.name
+        self.place = Place(study.folder, study.folder.session(participant, 1), name)
+        self.clock = clock
+        self.lines: list[Line] = []
+        self.content = bytearray()  # of the journal
+        self._hash = hashlib.sha256()
+        self._study = study
+        self.append("session_started", t_s=0.0, **{**study.started, "participant": participant})
+
+    def append(self, event: str, *, t_s: float | None = None, **fields: Any) -> None:
+        """Keep a line of the journal; ``t_s`` is when it happened, by default now."""
+        if self.lines:
+            fields = sealed(self.lines[0], event, fields, self._study.key)
+        previous = self._hash.hexdigest()
+        self.lines.append(line_of(len(self.lines) + 1, event, self.clock, t_s, fields, previous=previous))
+        content = line_bytes(self.lines[-1])
+        self.content += content
+        self._hash.update(content)
+
+    def write_tables(self) -> None:
+        """Do nothing: tables are written with the rest."""
+
+    def finish(self, status: str, reason: str = "") -> None:
+        """Write the session, all of it.
+
+        Raises
+        ------
+        StoreError
+            It cannot be written, or is there already.
+        """
+        self.append("session_ended", status=status, reason=reason)
+        self._study.keep(self)

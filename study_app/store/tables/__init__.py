@@ -1,0 +1,1 @@
+"""Tables of sessions and studies, their columns and descriptions."""

@@ -1,0 +1,74 @@
+"""The column dictionary as text: the tables of README's section "What is on disk".
+
+``python -m study_app.store.tables.column_dictionary`` prints what stands there between the two comments.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+
+from study_app.store.journals.journal_events import EVENTS
+from study_app.store.tables.columns import EXCLUSIONS, MISSING, PARTICIPANTS, RESPONSES, TRIALS, Column
+from study_app.store.tables.recorded_columns import FRAMES, SAMPLES
+
+SECTIONS: tuple[tuple[str, str, str, Sequence[Column]], ...] = (
+    ("Responses", "subject-…_description-responses_data.csv", "a row a response", RESPONSES),
+    ("Trials", "subject-…_description-trials_data.csv", "a row a presentation of a trial", TRIALS),
+    ("Participants", "study-…_description-participants_data.csv", "a row a session", PARTICIPANTS),
+    ("Exclusions", "exclusions.csv", "a row a session or trial that the analysis leaves out", EXCLUSIONS),
+    ("Samples", "recordings/trial-….parquet", "a row a turn of the servo", SAMPLES),
+    ("Frames", "recordings/trial-…_frames.parquet", "a row a frame shown", FRAMES),
+)
+"""Title, file, what a row of it is, and its columns."""
+
+_KINDS = {"integer": "whole number", "flag": "true, false", "time": "ISO 8601"}
+
+
+def dictionary_markdown() -> str:
+    """Return every file's columns, and the journal's events, as Markdown: a table a file, folded until it is opened."""
+    return "\n".join((*(_table(*section) for section in SECTIONS), _journal()))
+
+
+def _table(title: str, file: str, row: str, columns: Sequence[Column]) -> str:
+    rows = [f"| `{column.name}` | {_kind(column)} | {_meaning(column)} |" for column in columns]
+    return _folded(title, file, row, ("| column | kind | meaning |", "| --- | --- | --- |", *rows))
+
+
+def _folded(title: str, file: str, row: str, lines: Sequence[str]) -> str:
+    summary = f"<summary><b>{title}</b>: <code>{file}</code>, {row}</summary>"
+    return "\n".join(("<details>", summary, "", *lines, "", "</details>", ""))
+
+
+def _journal() -> str:
+    head = (
+        "Every line has `n` (from 1, without a gap), `event`, `t_s` (on the session's clock), `at` (ISO 8601) and "
+        "`previous` (SHA-256 of all bytes before it). `session_started` has `format` 2; format 1 has no `previous`.",
+        "",
+        "| event | fields | meaning |",
+        "| --- | --- | --- |",
+    )
+    fields = [", ".join(f"`{name}`" for name in event.fields) for event in EVENTS]
+    rows = [
+        f"| `{event.name}` | {listed} | {event.description} |" for event, listed in zip(EVENTS, fields, strict=True)
+    ]
+    return _folded("Journal", "journal.jsonl", "a line an event", (*head, *rows))
+
+
+def _kind(column: Column) -> str:
+    kind = ", ".join(f"`{level}`" for level, _ in column.levels) or _KINDS.get(column.kind, column.kind)
+    bounds = (column.minimum, column.maximum)
+    if column.maximum is not None:
+        kind += f", {bounds[0]:g} to {bounds[1]:g}"
+    unit = f" [{column.unit}]" if column.unit else ""
+    return f"{kind}{unit}" + (f", or {MISSING}" if column.may_miss else "")
+
+
+def _meaning(column: Column) -> str:
+    levels = "; ".join(f"`{level}`: {meaning}" for level, meaning in column.levels)
+    meaning = f"{column.description} {levels}." if levels else column.description
+    return f"{meaning} **Sealed until unblinding.**" if column.sealed else meaning
+
+
+if __name__ == "__main__":
+    sys.stdout.write(dictionary_markdown())

@@ -1,0 +1,191 @@
+"""What would tell a condition, and where it stands: the search that proves that blinding holds.
+
+A condition is told by its id, its liquid's id, the liquid's parameters and its delay. None of them may stand in a file
+or a name of a study folder, but for the sealed key, for the statements (whose words are shown to the participant
+anyway), for the moments of events and for the recordings, where forces and the ages of frames are measured.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TypeAlias
+
+from study_app.protocol.model import Protocol
+from study_app.store.atomic import cannot_read, paths_in
+from study_app.store.folders import StudyFolder
+from study_app.store.journals.parsing import parse_json
+
+Tables: TypeAlias = Mapping[str, Any]
+
+_STATEMENTS = frozenset({"item", "items"})  # in journal, receipt and tables
+_CLOCKS = frozenset({"t_s", "onset_s", "first_choice_s", "last_change_s", "trial_started_s"})
+_PASSED_OVER = _STATEMENTS | _CLOCKS  # a moment may be any number: 1.717 s is no wake of 1717 ticks
+_SETTINGS = frozenset(
+    {"id", "effects", "kind", "axes"}
+)  # words of the force model that tell no condition by themselves
+_TELLING_DIGITS = 5  # digits that do not stand somewhere by chance
+
+
+@dataclass(frozen=True, slots=True)
+class Leak:
+    """A word that tells a condition, and the file and line it stands in; the word is not for showing."""
+
+    place: str
+    word: str = field(repr=False)
+
+
+class Telltales:
+    """Words that tell conditions; made by `telltales` and `certain_telltales`."""
+
+    def __init__(self, words: Iterable[str]) -> None:
+        self.words = frozenset(words)
+        longest_first = sorted(self.words, key=lambda word: (-len(word), word))
+        listed = "|".join(re.escape(word) for word in longest_first)
+        self._pattern = re.compile(rf"(?<!\w)(?<!\d\.)(?:{listed})(?!\w|\.\d)" if listed else r"(?!)")
+
+    def in_text(self, text: str) -> list[str]:
+        """Return the words that stand by themselves in ``text``: a window's title, a line of a log, a cell."""
+        return self._pattern.findall(text)
+
+
+def telltales(protocol: Protocol) -> Telltales:
+    """Return all that tells a condition of ``protocol``: ids, and numbers in every unit they are used in."""
+    return Telltales(_words(protocol.model_dump(mode="json", include={"liquids", "conditions"}, exclude_unset=True)))
+
+
+def certain_telltales(tables: Tables, published: Any) -> Telltales:
+    """Return what tells a condition and stands nowhere by chance: no short number, no word of the ``published`` part.
+
+    ``tables`` are the sealed key's, ``published`` is the receipt's protocol.
+    """
+    known = " ".join(text for _, text in _texts(published, "", frozenset()))
+    words = (word for word in _words(tables) if not word[0].isdigit() or _digits(word) >= _TELLING_DIGITS)
+    return Telltales(word for word in words if not Telltales([word]).in_text(known))
+
+
+def leaks(folder: Path, protocol: Protocol) -> list[Leak]:
+    """Return where in a study folder, or one like it, a condition of ``protocol`` is told.
+
+    Raises
+    ------
+    StoreError
+        A file cannot be read.
+    """
+    return find_leaks(folder, telltales(protocol))
+
+
+def find_leaks(folder: Path, words: Telltales) -> list[Leak]:
+    """Return where in ``folder`` one of ``words`` stands: in a name or in a text, statements and recordings aside.
+
+    Raises
+    ------
+    StoreError
+        A file cannot be read.
+    """
+    found: list[Leak] = []
+    key = StudyFolder(folder).key
+    for path in paths_in(folder):
+        name = path.relative_to(folder).as_posix()
+        found += [Leak(f"the name {name}", word) for word in words.in_text(name)]
+        if path.is_file() and path != key and path.suffix != ".parquet":
+            found += _in_file(path, name, words)
+    return found
+
+
+def _in_file(path: Path, name: str, words: Telltales) -> Iterator[Leak]:
+    try:
+        content = path.read_bytes().decode("utf-8", "replace")
+    except FileNotFoundError:  # a running program has just taken it away
+        return
+    except OSError as error:
+        raise cannot_read(path, error) from error
+    if not words.in_text(content):
+        return
+    for place, text in _fragments(path.suffix, content):
+        for word in words.in_text(text):
+            yield Leak(f"{name}{place}", word)
+
+
+def _fragments(suffix: str, content: str) -> Iterator[tuple[str, str]]:
+    """Yield place and text of what a file holds beside statements."""
+    if suffix == ".csv":
+        yield from _cells(content)
+    elif suffix == ".json":
+        yield from _parsed(content, "")
+    else:
+        for number, line in enumerate(content.splitlines(), start=1):
+            yield from _parsed(line, f", line {number}")
+
+
+def _cells(content: str) -> Iterator[tuple[str, str]]:
+    header: list[str] = []
+    for number, row in enumerate(csv.reader(io.StringIO(content, newline="")), start=1):
+        header = header or row
+        for column, cell in zip(header, row, strict=False):
+            if column not in _PASSED_OVER:
+                yield f", row {number}, {column}", cell
+
+
+def _parsed(text: str, place: str) -> Iterator[tuple[str, str]]:
+    """Yield what a JSON text holds, or the text itself where it is none."""
+    try:
+        value = parse_json(text)
+    except ValueError:
+        yield place, text
+        return
+    yield from _texts(value, place, _PASSED_OVER)
+
+
+def _texts(value: Any, place: str, passed_over: frozenset[str]) -> Iterator[tuple[str, str]]:
+    """Yield every name and value in a JSON value as text."""
+    if isinstance(value, dict):
+        for name, inner in value.items():
+            yield place, name
+            if name not in passed_over:
+                yield from _texts(inner, f"{place}, {name}", passed_over)
+    elif isinstance(value, list):
+        for inner in value:
+            yield from _texts(inner, place, passed_over)
+    elif value is not None and not isinstance(value, bool):
+        yield place, str(value)
+
+
+def _words(tables: Tables) -> set[str]:
+    found: set[str] = set()
+
+    def collect(value: Any) -> None:
+        if isinstance(value, Mapping):
+            for name, inner in value.items():
+                if name not in _SETTINGS:
+                    collect(inner)
+        elif isinstance(value, list | tuple):
+            for inner in value:
+                collect(inner)
+        elif isinstance(value, str):
+            found.add(value)
+        elif isinstance(value, int | float) and not isinstance(value, bool) and value:
+            found.update(_spelled(value))
+
+    for table in ("liquids", "conditions"):
+        collect(tables[table])
+        found.update(tables[table])
+    return found
+
+
+def _spelled(value: float) -> Iterator[str]:
+    """Yield a number as it may be written: as it is, and of milliseconds also as s, µs and ns."""
+    for scaled in (value, value / 1000, value * 1000, value * 1_000_000):
+        yield repr(scaled)
+        if float(scaled).is_integer():
+            yield str(int(scaled))
+            yield repr(float(scaled))
+
+
+def _digits(word: str) -> int:
+    """Return how many digits of a number are not mere zeros at its ends."""
+    return len(re.sub(r"[^0-9]", "", word.partition("e")[0]).strip("0"))

@@ -1,0 +1,253 @@
+"""Whether a study folder is what it says: every file against the journals, the dictionary, the checksums and the key.
+
+Nothing is changed. An error is a file that cannot be trusted as it is; a warning is something to know before the
+analysis, such as a session that was not finished. No sentence shows a condition. What another program is writing is
+looked at again before it is called an error.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, TypeAlias
+
+from study_app.errors import StoreError
+from study_app.protocol.model import StudyHead
+from study_app.store import exclusions, receipt
+from study_app.store.atomic import is_there, read_own, read_regular, temporaries
+from study_app.store.blinded import blinding
+from study_app.store.blinded.blinding import Key
+from study_app.store.folders import StudyFolder
+from study_app.store.sessions.folder_lock import is_open
+from study_app.store.sessions.open_session import Place
+from study_app.store.tables import session_tables
+from study_app.store.tables.columns import EXCLUSIONS, PARTICIPANTS
+from study_app.store.tables.participants import opened_or_none, row_of
+from study_app.store.tables.study_description import described_study, describes_alike, description_bytes, names_sealed
+from study_app.store.verification import psychds, table_checks
+from study_app.store.verification.fingerprints import listed, place_of, read_copy, unreadable
+from study_app.store.verification.leaks import certain_telltales, find_leaks
+from study_app.store.verification.verify_session import BETWEEN_S, LOOKS, Checked, check_session, check_table
+from study_app.store.verification.violations import Finding, Gathered
+
+Sessions: TypeAlias = list[Checked]
+Rows: TypeAlias = list[tuple[session_tables.Row, bool]]  # and whether the session runs
+Proofs: TypeAlias = Sequence[tuple[str, str]]  # fingerprint and session
+
+
+@dataclass(frozen=True, slots=True)
+class Findings:
+    """What `verify` found in so many sessions; ``psychds`` is what a validator of that format would say."""
+
+    errors: tuple[Finding, ...]
+    warnings: tuple[Finding, ...]
+    psychds: psychds.PsychDs
+    sessions: int
+    running: int
+
+    @property
+    def sound(self) -> bool:
+        """Whether there is no error, nor one of the format's."""
+        return not self.errors and not self.psychds.errors
+
+
+def verify(folder: Path, fingerprints: Path | None = None) -> Findings:
+    """Check the study in ``folder``, all of it.
+
+    Parameters
+    ----------
+    fingerprints : Path, optional
+        A copy of the study's ``fingerprints.txt`` that was kept elsewhere: every session that ended must be in it, and
+        be the same.
+
+    Raises
+    ------
+    StoreError
+        It is no study's folder, or ``fingerprints`` no copy of fingerprints.
+    """
+    copy = None if fingerprints is None else read_copy(fingerprints)
+    study = StudyFolder(folder)
+    name = described_study(study)
+    if name is None:
+        raise StoreError(
+            f"{folder} is no study's folder (no {study.description.name}): name one such as results/rek2024"
+        )
+    found = Gathered(folder)
+    key = _key(study, found)
+    early = listed(study.fingerprints)
+    sessions = [check_session(Place(study, one, name), key, found) for one in study.sessions()]
+    _participants(study, name, sessions, found)
+    _chains(study, sessions, found)
+    _fingerprints(study, sessions, early, found)
+    if fingerprints is not None and copy is not None:
+        _copy(study, sessions, copy, fingerprints, found)
+    _description(study, found)
+    _exclusions(study, sessions, found)
+    _reveals(study, key, found)
+    _blinding(study, key, found)
+    for path in (*temporaries(folder), *temporaries(study.data)):
+        found.warning(path, "was left half-written by a program that was ended, or is just being written")
+    running = sum(one.running for one in sessions)
+    whole = not is_open(folder)  # else a program writes tables that the rules ask for when it ends
+    rules = psychds.validate(folder)
+    rules = rules if whole else replace(rules, errors=())
+    return Findings(tuple(found.errors), tuple(found.warnings), rules, len(sessions), running)
+
+
+def _key(study: StudyFolder, found: Gathered) -> Key | None:
+    try:
+        return blinding.read_key(study.path)
+    except StoreError as error:
+        found.failure(study.key, error)
+        return None
+
+
+def _participants(study: StudyFolder, name: str, sessions: Sessions, found: Gathered) -> None:
+    """Check the table of all sessions, where each session's journal could be read.
+
+    Where it differs, journals and table are read again, until no program is about to write the table.
+    """
+    if not all(one.readable for one in sessions):
+        return
+    path = study.participants(name)
+    rows: Rows = [(one.row, one.running) for one in sessions if one.row is not None]
+    before: Rows | None = None
+    for _ in range(LOOKS):
+        if is_open(study.path):  # by a program that writes the table when it ends
+            return
+        content = session_tables.csv_bytes(PARTICIPANTS, [row for row, _ in rows])
+        behind = [running or row["status"] == receipt.UNFINISHED for row, running in rows]
+        late = {number for number, may_be in enumerate(behind, start=2) if may_be}
+        seen = found.alike()
+        check_table(path, content, "participants", seen, may_be_behind=late.__contains__)
+        if not seen.errors or (rows == before and not any(running for _, running in rows)):
+            break
+        time.sleep(BETWEEN_S)
+        open_now = {session.path for session in study.sessions() if is_open(session.path)}
+        again = [(row, one.path in open_now) for one in study.sessions() for row in row_of(one, opened_or_none(study))]
+        before, rows = rows, again
+    found.take(seen)
+
+
+def _chains(study: StudyFolder, sessions: Sessions, found: Gathered) -> None:
+    if early := sum(one.row is not None and not one.chained for one in sessions):
+        many = "1 journal is" if early == 1 else f"{early} journals are"
+        found.warning(study.data, f"{many} of format 1, whose lines do not tell whether a line before was changed")
+
+
+def _fingerprints(study: StudyFolder, sessions: Sessions, early: Proofs, found: Gathered) -> None:
+    """Compare the sessions with the study's own list, as it was before they were checked.
+
+    A session that ended without being listed then is looked up again: it may have ended meanwhile.
+    """
+    path = study.fingerprints
+    for number in unreadable(path):
+        found.error(path, f"line {number} is no fingerprint: restore it from a copy")
+    _compare(study, sessions, early, path.name, found)
+    ended = [place_of(study, one.place.folder) for one in sessions if one.fingerprint and one.chained]
+    lacking = _lacking(path, ended)
+    if lacking and is_open(study.path):  # by a program that lists a session just after it is there
+        time.sleep(BETWEEN_S)
+        lacking = _lacking(path, ended)
+    for place in lacking:
+        found.error(path, f"lacks {place}, which has ended; rebuild of it adds it")
+
+
+def _lacking(path: Path, ended: Sequence[str]) -> list[str]:
+    known = {place for _, place in listed(path)}
+    return [place for place in ended if place not in known]
+
+
+def _copy(study: StudyFolder, sessions: Sessions, copy: Proofs, path: Path, found: Gathered) -> None:
+    """Compare the sessions with a list that was kept elsewhere."""
+    _compare(study, sessions, copy, str(path), found)
+    known = {place for _, place in copy}
+    for one in sessions:
+        if one.fingerprint and place_of(study, one.place.folder) not in known:
+            lacks = f"(its fingerprint is {one.fingerprint}) is not in {path}"
+            found.error(one.place.folder.path, f"{lacks}: it was added, or ended, after that copy was made")
+
+
+def _compare(study: StudyFolder, sessions: Sessions, proofs: Proofs, name: str, found: Gathered) -> None:
+    there = {place_of(study, one.place.folder): one for one in sessions}
+    for proof, place in proofs:
+        one, path = there.get(place), study.path / place
+        if one is None:
+            found.error(path, f"is missing, though {name} lists it: it was deleted after it had ended")
+            continue
+        proved = _left(one).fingerprint
+        if proof != proved:
+            now = f"its fingerprint is {proved}" if proved else "it has no end any more"
+            found.error(path, f"is not the session that {name} lists as {proof}: it was changed ({now})")
+
+
+def _left(one: Checked) -> Checked:
+    """Return a session as it is when its program has let go of it, which it does just after it has listed it."""
+    for _ in range(LOOKS if one.running else 0):
+        if not is_open(one.place.folder.path):
+            break
+        time.sleep(BETWEEN_S)
+    return check_session(one.place, None, Gathered(one.place.folder.path)) if one.running else one
+
+
+def _description(study: StudyFolder, found: Gathered) -> None:
+    """Compare the description with what this version writes for the study as one of the receipts has it."""
+    held = read_own(study.description, study.path)
+    sealed = not (blinding.reveals(study.path) or names_sealed(held))
+    heads: set[bytes] = set()
+    for protocol in _published(study):
+        with contextlib.suppress(KeyError, TypeError, ValueError):  # said of the receipt already
+            heads.add(description_bytes(StudyHead.model_validate(protocol["study"]), sealed=sealed))
+    if not heads or held in heads:
+        return
+    if any(describes_alike(held, head) for head in heads):
+        found.warning(study.description, "describes the columns as an earlier version of the program did")
+    else:
+        found.error(study.description, "is not what this version writes for the study in the receipts")
+
+
+def _published(study: StudyFolder) -> Iterator[dict[str, Any]]:
+    """Yield the protocols of the receipts that can be read."""
+    for session in study.sessions():
+        with contextlib.suppress(StoreError):  # said of the receipt already
+            protocol = receipt.read(session.receipt).get("protocol")
+            if isinstance(protocol, dict):
+                yield protocol
+
+
+def _exclusions(study: StudyFolder, sessions: Sessions, found: Gathered) -> None:
+    with found.reading(study.exclusions):
+        rows = exclusions.exclusions(study.path)
+        if not is_there(study.exclusions):
+            return
+        for problem in table_checks.problems(exclusions.without_mark(read_regular(study.exclusions)), EXCLUSIONS):
+            found.error(study.exclusions, problem)
+        trials = {(one.place.folder.participant, one.place.folder.number): one.trials for one in sessions}
+        for row in rows:
+            known = trials.get((row.participant, row.session))
+            if known is None or (row.trial is not None and row.trial not in known):
+                found.error(study.exclusions, f"there is no {exclusions.named(row)}")
+
+
+def _reveals(study: StudyFolder, key: Key | None, found: Gathered) -> None:
+    with found.reading(study.reveals):
+        for number, torn in blinding.unreadable_reveals(study.path):
+            if torn:
+                found.warning(study.reveals, f"line {number} records no reveal: it was torn by a power cut")
+            else:
+                found.error(study.reveals, f"line {number} records no reveal: it was changed; restore it from a copy")
+        for number, record in enumerate(blinding.reveals(study.path), start=1):
+            if key is not None and record["key_hash"] != key.hash:
+                found.error(study.reveals, f"reveal {number} was of another key")
+
+
+def _blinding(study: StudyFolder, key: Key | None, found: Gathered) -> None:
+    """Say where a condition is told before the key was revealed, but not which."""
+    published = next(_published(study), None)
+    if key is None or blinding.reveals(study.path) or published is None:
+        return
+    for leak in find_leaks(study.path, certain_telltales(key.tables, published)):
+        found.warning(study.path, f"{leak.place} tells a condition, though the key is sealed")

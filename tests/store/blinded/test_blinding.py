@@ -1,0 +1,321 @@
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import os
+import random
+import stat
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from study_app.errors import StoreError
+from study_app.protocol.model import Protocol
+from study_app.protocol.orders.schedule import stream
+from study_app.store.blinded import blinding
+from study_app.store.blinded.blinding import (
+    open_or_draw_key,
+    reveal,
+    revealed,
+    revealed_key,
+    reveals,
+    unreadable_reveals,
+)
+from study_app.store.blinded.unblinding import unblind
+from study_app.store.sessions.begin import SessionStore
+from study_app.store.verification.verify_study import verify
+
+
+def names_in(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir())
+
+
+def sealed(folder: Path) -> Path:
+    return folder / "blinding" / "key.sealed"
+
+
+def content_of(folder: Path) -> dict[str, Any]:
+    content: dict[str, Any] = json.loads(base64.b64decode(sealed(folder).read_bytes()))
+    return content
+
+
+@pytest.mark.skipif(os.name != "posix", reason="elsewhere files have no such modes")
+@pytest.mark.parametrize("mask", [0o000, 0o022])
+def test_only_its_owner_may_read_the_key(tmp_path: Path, protocol: Protocol, mask: int) -> None:
+    before = os.umask(mask)
+    try:
+        open_or_draw_key(tmp_path, protocol)
+    finally:
+        os.umask(before)
+    assert stat.S_IMODE(sealed(tmp_path).stat().st_mode) == 0o600
+
+
+def test_the_key_gives_every_code_its_condition(tmp_path: Path, protocol: Protocol) -> None:
+    key = open_or_draw_key(tmp_path, protocol)
+    assert {key.condition("liquids", code) for code in ("L1", "L2")} == {"feel_quagmire", "feel_mildew"}
+    assert {key.condition("delays", code) for code in ("D1", "D2")} == {"see_prompt", "see_tardy"}
+    assert key.condition("practice", "practice") == "learn"
+    tardy = next(code for code in ("D1", "D2") if key.condition("delays", code) == "see_tardy")
+    assert key.delay_ms("delays", tardy) == 137
+    assert key.liquids("delays", tardy) == ("quagmire",)
+
+
+def test_several_liquids_of_a_condition_are_named_in_order(
+    tmp_path: Path, tables_of_study: Callable[..., dict[str, Any]]
+) -> None:
+    tables = tables_of_study()
+    tables["conditions"]["learn"] = {"liquids": ["spare", "mildew"]}
+    key = open_or_draw_key(tmp_path, Protocol.model_validate(tables))
+    assert key.liquids("practice", "practice") == ("spare", "mildew")
+
+
+def test_a_code_that_is_not_in_the_key_is_refused(tmp_path: Path, protocol: Protocol) -> None:
+    with pytest.raises(StoreError, match="knows no code 'L9' of block 'liquids'"):
+        open_or_draw_key(tmp_path, protocol).condition("liquids", "L9")
+
+
+def test_the_file_is_encoded_and_its_sha256_is_the_keys_hash(tmp_path: Path, protocol: Protocol) -> None:
+    key = open_or_draw_key(tmp_path, protocol)
+    raw = sealed(tmp_path).read_bytes()
+    assert key.hash == hashlib.sha256(raw).hexdigest()
+    assert not any(word in raw for word in (b"quagmire", b"mildew", b"see_tardy", b"1013.7"))
+    assert set(content_of(tmp_path)["tables"]) == {"conditions", "liquids"}
+    assert len(bytes.fromhex(content_of(tmp_path)["nonce"])) == 32
+    assert "quagmire" not in repr(key)
+
+
+def test_the_key_is_drawn_once_and_then_shared(tmp_path: Path, protocol: Protocol) -> None:
+    first = open_or_draw_key(tmp_path, protocol)
+    raw = sealed(tmp_path).read_bytes()
+    assert all(open_or_draw_key(tmp_path, protocol) == first for _ in range(5))
+    assert sealed(tmp_path).read_bytes() == raw
+
+
+def test_who_comes_second_reads_what_the_first_drew(
+    tmp_path: Path, protocol: Protocol, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The second has found no key and drawn its own; before it can put it down, the first has."""
+    first: list[blinding.Key] = []
+    create = blinding.create_folder
+
+    def after_the_first(path: Path, files: dict[str, bytes], *, mode: int) -> bool:
+        monkeypatch.setattr(blinding, "create_folder", create)
+        first.append(open_or_draw_key(tmp_path, protocol))
+        return create(path, files, mode=mode)
+
+    monkeypatch.setattr(blinding, "create_folder", after_the_first)
+    assert open_or_draw_key(tmp_path, protocol) == first[0]
+
+
+def test_a_real_key_comes_from_the_systems_randomness(
+    tmp_path: Path, protocol: Protocol, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Seeding the global generator fixes nothing; the draws are ``secrets.SystemRandom``'s."""
+    drawn: list[float] = []
+
+    class Watched(random.SystemRandom):
+        def random(self) -> float:
+            drawn.append(super().random())
+            return drawn[-1]
+
+    monkeypatch.setattr(blinding.secrets, "SystemRandom", Watched)
+    keys = []
+    for folder in (tmp_path / "first", tmp_path / "second"):
+        folder.mkdir()
+        random.seed(1)
+        keys.append(open_or_draw_key(folder, protocol))
+    assert keys[0].hash != keys[1].hash
+    assert len(drawn) == 2 * (32 + 2)  # the nonce, and one draw for each block of two
+    assert keys[0].drawn == "system"
+
+
+def test_real_keys_give_each_condition_to_each_code_equally_often(tmp_path: Path, protocol: Protocol) -> None:
+    given: Counter[str] = Counter()
+    for number in range(200):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        given[open_or_draw_key(folder, protocol).condition("liquids", "L1")] += 1
+    assert set(given) == {"feel_quagmire", "feel_mildew"}
+    assert min(given.values()) > 60  # 1 in 100 million by chance
+
+
+def test_a_rehearsals_key_follows_from_its_seed(tmp_path: Path, protocol: Protocol) -> None:
+    for name in ("one", "two", "three"):
+        (tmp_path / name).mkdir()
+    one = open_or_draw_key(tmp_path / "one", protocol, stream(1, "blinding").random)
+    two = open_or_draw_key(tmp_path / "two", protocol, stream(1, "blinding").random)
+    three = open_or_draw_key(tmp_path / "three", protocol, stream(2, "blinding").random)
+    assert one == two
+    assert one.hash != three.hash
+    assert one.drawn == "seed"
+
+
+def test_rehearsals_and_real_sessions_do_not_mix(tmp_path: Path, protocol: Protocol) -> None:
+    real, rehearsed = tmp_path / "real", tmp_path / "rehearsed"
+    real.mkdir()
+    rehearsed.mkdir()
+    open_or_draw_key(real, protocol)
+    open_or_draw_key(rehearsed, protocol, stream(1, "blinding").random)
+    with pytest.raises(StoreError, match="rehearsed holds a rehearsal: real sessions would mix with it"):
+        open_or_draw_key(rehearsed, protocol)
+    with pytest.raises(StoreError, match="real holds real sessions: a rehearsal would mix with it"):
+        open_or_draw_key(real, protocol, stream(1, "blinding").random)
+
+
+@pytest.mark.parametrize("what", ["a liquid", "a delay", "the list of a block", "a block's letter"])
+def test_a_protocol_with_other_conditions_is_refused_without_naming_them(
+    tmp_path: Path, protocol: Protocol, tables_of_study: Callable[..., dict[str, Any]], what: str
+) -> None:
+    open_or_draw_key(tmp_path, protocol)
+    tables = tables_of_study()
+    if what == "a liquid":
+        tables["liquids"]["mildew"]["density_kg_m3"] = 1200
+    elif what == "a delay":
+        tables["conditions"]["see_tardy"]["delay_ms"] = 139
+    elif what == "the list of a block":
+        tables["blocks"]["liquids"]["conditions"].reverse()
+    else:
+        tables["blocks"]["liquids"]["code_prefix"] = "Q"
+    with pytest.raises(StoreError, match="was sealed for other conditions than this protocol's") as refusal:
+        open_or_draw_key(tmp_path, Protocol.model_validate(tables))
+    assert not any(word in str(refusal.value) for word in ("mildew", "tardy", "139", "1200"))
+
+
+def test_a_protocol_with_other_texts_keeps_its_key(
+    tmp_path: Path, protocol: Protocol, tables_of_study: Callable[..., dict[str, Any]]
+) -> None:
+    key = open_or_draw_key(tmp_path, protocol)
+    tables = tables_of_study()
+    tables["pages"]["consent"]["body"] = "Other words."
+    assert open_or_draw_key(tmp_path, Protocol.model_validate(tables)) == key
+
+
+@pytest.mark.parametrize("content", [b"", b"not base64 \xff", b"aGVsbG8=\n", b"W10=\n", b"e30=\n"])
+def test_an_unreadable_key_is_an_error_that_names_it(tmp_path: Path, protocol: Protocol, content: bytes) -> None:
+    open_or_draw_key(tmp_path, protocol)
+    sealed(tmp_path).write_bytes(content)
+    with pytest.raises(StoreError, match=r"key\.sealed is no sealed key any more"):
+        open_or_draw_key(tmp_path, protocol)
+
+
+def test_a_key_of_a_later_format_is_refused(tmp_path: Path, protocol: Protocol) -> None:
+    open_or_draw_key(tmp_path, protocol)
+    sealed(tmp_path).write_bytes(base64.encodebytes(json.dumps(content_of(tmp_path) | {"format": 2}).encode()))
+    with pytest.raises(StoreError, match="has format 2, this version reads 1"):
+        open_or_draw_key(tmp_path, protocol)
+
+
+def test_a_tampered_key_is_found_by_the_receipts(start: Callable[..., SessionStore], tmp_path: Path) -> None:
+    start("P001").finish("completed")
+    folder = tmp_path / "study"
+    content = content_of(folder)
+    codes = content["codes"]["liquids"]
+    codes["L1"], codes["L2"] = codes["L2"], codes["L1"]
+    sealed(folder).write_bytes(base64.encodebytes(json.dumps(content).encode()))
+    for attempt in (lambda: start("P002"), lambda: reveal(folder, "AB", "analysis")):
+        with pytest.raises(StoreError, match=r"is not the key that .*sub-P001.* ran under"):
+            attempt()
+    assert not (folder / "data" / "sub-P002").exists()
+    assert reveals(folder) == ()
+
+
+@pytest.mark.parametrize("content", [b"", b"{}", b'{"key_hash', b"\xff\xfe", None])
+def test_a_damaged_receipt_stops_no_session_but_its_own(
+    start: Callable[..., SessionStore], tmp_path: Path, content: bytes | None
+) -> None:
+    with start("P001"):
+        pass
+    with start("P002") as store:
+        damaged = store.folder.receipt
+    if content is None:
+        damaged.unlink()
+    else:
+        damaged.write_bytes(content)
+    start("P003").finish("completed")
+    assert set(unblind(tmp_path / "study", by="AK", reason="done").codes) == {"practice", "liquids", "delays"}
+    assert [error.place for error in verify(tmp_path / "study").errors] == ["data/sub-P002/ses-01/receipt.json"]
+
+
+def test_a_tampered_key_is_found_by_the_journal_of_a_session_whose_receipt_is_damaged(
+    start: Callable[..., SessionStore], tmp_path: Path
+) -> None:
+    with start() as store:
+        store.folder.receipt.write_bytes(b"?")
+    content = content_of(tmp_path / "study") | {"nonce": "0" * 64}
+    sealed(tmp_path / "study").write_bytes(base64.encodebytes(json.dumps(content).encode()))
+    with pytest.raises(StoreError, match=r"is not the key that .*ses-01 ran under"):
+        start("P008")
+
+
+def test_a_lost_key_is_not_drawn_anew(start: Callable[..., SessionStore], tmp_path: Path) -> None:
+    start("P001").finish("completed")
+    sealed(tmp_path / "study").unlink()
+    with pytest.raises(StoreError, match=r"key\.sealed is missing, though 1 sessions ran under it"):
+        start("P002")
+    assert not sealed(tmp_path / "study").exists()
+
+
+def test_a_reveal_is_recorded_before_it_tells(start: Callable[..., SessionStore], tmp_path: Path) -> None:
+    store = start("P001")
+    store.finish("completed")
+    folder = tmp_path / "study"
+    assert revealed(folder) is None
+    assert revealed_key(folder) is None
+    codes = reveal(folder, " Dr. Ørsted ", 'end of data, "n = 1"\n')
+    assert codes == store.key.codes == revealed(folder)
+    assert revealed_key(folder) == store.key
+    reveal(folder, "CD", "again")
+    first, second = reveals(folder)
+    assert (first["by"], first["reason"], first["key_hash"]) == ("Dr. Ørsted", 'end of data, "n = 1"', store.key.hash)
+    assert first["at"] <= second["at"]
+    assert (folder / "blinding" / "reveals.jsonl").read_bytes().count(b"\n") == 2
+
+
+@pytest.mark.parametrize(("by", "reason", "named"), [("", "done", "--by"), ("AB", " \n", "--reason")])
+def test_a_reveal_needs_a_name_and_a_reason(
+    start: Callable[..., SessionStore], tmp_path: Path, by: str, reason: str, named: str
+) -> None:
+    start("P001").finish("completed")
+    with pytest.raises(StoreError, match=f"{named} is empty"):
+        reveal(tmp_path / "study", by, reason)
+    assert not (tmp_path / "study" / "blinding" / "reveals.jsonl").exists()
+
+
+def test_a_reveal_that_cannot_be_recorded_tells_nothing(start: Callable[..., SessionStore], tmp_path: Path) -> None:
+    start("P001").finish("completed")
+    (tmp_path / "study" / "blinding" / "reveals.jsonl").mkdir()
+    with pytest.raises(StoreError, match=r"reveals\.jsonl cannot be"):
+        reveal(tmp_path / "study", "AB", "analysis")
+
+
+def test_a_torn_reveal_reveals_nothing(tmp_path: Path, protocol: Protocol) -> None:
+    open_or_draw_key(tmp_path, protocol)
+    (tmp_path / "blinding" / "reveals.jsonl").write_bytes(b'{"at": "2026-0')
+    assert revealed(tmp_path) is None
+
+
+@pytest.mark.parametrize("line", [b"5", b"null", b'"by AB"', b"[1]", b"xat: 2026"])
+def test_a_line_that_is_no_reveal_is_told_and_the_others_count(
+    start: Callable[..., SessionStore], tmp_path: Path, line: bytes
+) -> None:
+    start("P001").finish("completed")
+    folder = tmp_path / "study"
+    path = folder / "blinding" / "reveals.jsonl"
+    path.write_bytes(line + b"\n")
+    assert revealed(folder) is None
+    unblind(folder, "AB", "done")
+    assert unreadable_reveals(folder) == ((1, False),)
+    assert [one["by"] for one in reveals(folder)] == ["AB"]
+    assert [str(one) for one in verify(folder).errors] == [
+        "blinding/reveals.jsonl: line 1 records no reveal: it was changed; restore it from a copy"
+    ]
+
+
+def test_a_folder_without_a_key_is_named(tmp_path: Path) -> None:
+    with pytest.raises(StoreError, match=r"is no study's folder \(it has no key\.sealed\): name one"):
+        reveal(tmp_path, "AB", "analysis")
+    assert names_in(tmp_path) == []

@@ -1,0 +1,104 @@
+"""What tells a condition cannot be read in a journal, opens whole with the key, and not when it was changed."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from study_app.errors import StoreError
+from study_app.store.blinded.blinding import Key
+from study_app.store.blinded.sealing import opened, sealed
+from study_app.store.tables.columns import SEALED, TRIALS
+
+START = {"n": 1, "event": "session_started", "participant": "P007", "session": 1, "measures_sealed": True}
+WHICH = {"trial": 3, "attempt": 1, "outcome": "complete"}
+MEASURED = {column.name: 0 if column.kind == "integer" else 0.1 + 0.2 for column in TRIALS if column.sealed}
+
+
+def key(nonce: bytes = bytes(32)) -> Key:
+    return Key(hash="", drawn="system", codes={}, tables={}, tables_hash="", nonce=nonce)
+
+
+def ended(measured: dict[str, Any], **changes: Any) -> dict[str, Any]:
+    return {"n": 2, "event": "trial_ended", **sealed(START, "trial_ended", WHICH | measured | changes, key())}
+
+
+def test_what_tells_a_condition_is_sealed_and_nothing_else() -> None:
+    """Forces, limiters, shares withheld, speed and pace, and the delay achieved; not how the program kept time."""
+    told = ("force_mean_n", "limiter_slope", "withheld_share", "mean_speed_mps", "duration_s", "delay_error_p95_ms")
+    assert set(told) < SEALED
+    assert not {"tick_rate_hz", "lateness_p99_ms", "worst_gap_ms", "overruns", "first_frame_gap_ms", "valid"} & SEALED
+    line = ended(MEASURED, overruns=3)
+    assert line.keys() == {"n", "event", "sealed", "overruns", *WHICH}
+    assert line["overruns"] == 3
+
+
+def test_it_opens_whole_and_numpys_numbers_plain() -> None:
+    line = ended(MEASURED | {"force_mean_n": np.float64(0.25), "ticks": np.int64(7), "withheld_share": math.nan})
+    _, there = opened([START, line], key())
+    assert there == {
+        "n": 2,
+        "event": "trial_ended",
+        **WHICH,
+        **MEASURED,
+        "force_mean_n": 0.25,
+        "ticks": 7,
+        "withheld_share": None,
+    }
+    assert opened([START, line], None) == [START, line]
+
+
+@given(st.dictionaries(st.sampled_from(sorted(SEALED)), st.one_of(st.none(), st.integers(0, 10**18), st.floats(0, 1))))
+def test_all_texts_are_equally_long_and_every_number_comes_back(measured: dict[str, Any]) -> None:
+    """So that not even the length of a line says how many digits the force has."""
+    integers = {column.name for column in TRIALS if column.kind == "integer"}
+    measured = {
+        name: int(value) if name in integers and value is not None else value for name, value in measured.items()
+    }
+    line = ended(measured)
+    if measured:
+        assert len(line["sealed"]) == len(ended(MEASURED)["sealed"])
+    assert opened([START, line], key())[1] == {"n": 2, "event": "trial_ended", **WHICH, **measured}
+
+
+def test_equal_numbers_of_two_trials_look_different() -> None:
+    first, second = (ended(MEASURED, trial=number)["sealed"] for number in (3, 4))
+    alike = sum(one == other for one, other in zip(first, second, strict=True)) / len(first)
+    assert alike < 0.15
+
+
+def test_a_session_of_an_opened_study_and_other_events_are_written_as_they_are() -> None:
+    fields = WHICH | MEASURED
+    assert sealed(START | {"measures_sealed": False}, "trial_ended", fields, key()) == fields
+    assert sealed({"event": "session_started"}, "trial_ended", fields, key()) == fields
+    assert sealed(START, "note", fields, key()) == fields
+    assert sealed(START, "trial_ended", WHICH, key()) == WHICH
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"sealed": "00" * 500},
+        {"sealed": ""},
+        {"sealed": "no digits"},
+        {"trial": 4},
+        {"attempt": 2},
+    ],
+    ids=json.dumps,
+)
+def test_what_was_changed_or_moved_does_not_open(change: dict[str, Any]) -> None:
+    with pytest.raises(StoreError, match=r"line 2 does not open with the study's key"):
+        opened([START, ended(MEASURED) | change], key())
+
+
+def test_it_opens_with_its_own_key_alone() -> None:
+    with pytest.raises(StoreError, match="does not open"):
+        opened([START, ended(MEASURED)], key(bytes([1] * 32)))
+    with pytest.raises(StoreError, match="does not open"):
+        opened([START | {"participant": "P008"}, ended(MEASURED)], key())

@@ -1,0 +1,274 @@
+"""Before unblinding no table tells a condition; after it every table is what an open study's would have been."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable
+from datetime import datetime, timedelta, timezone
+from itertools import count
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from study_app.cli import commands
+from study_app.errors import StoreError
+from study_app.protocol.model import Protocol, StudyHead
+from study_app.store import receipt
+from study_app.store.blinded import unblinding as module
+from study_app.store.blinded.blinding import open_or_draw_key, reveal
+from study_app.store.blinded.sealing import opened
+from study_app.store.blinded.unblinding import unblind
+from study_app.store.checksums import replace_checksums
+from study_app.store.folders import REBUILT, StudyFolder
+from study_app.store.journals import journal
+from study_app.store.sessions.begin import SessionStore
+from study_app.store.sessions.rebuild import rebuild
+from study_app.store.sessions.reopen import reopen
+from study_app.store.tables.columns import SEALED, TRIALS, header, unsealed
+from study_app.store.tables.session_tables import csv_bytes, read_table
+from study_app.store.tables.study_description import description_bytes
+from study_app.store.verification.verify_study import verify
+from tests.store.conftest import SOURCE
+from tests.store.verification.forging import Lines, cover_up, forge
+
+Start = Callable[..., SessionStore]
+Attend = Callable[[SessionStore], None]
+
+
+def ticking() -> journal.SessionClock:
+    ticks = count(5_000_000_000, 1_000_000)
+    origin = datetime(2026, 3, 1, 10, 0, tzinfo=timezone(timedelta(hours=1)))
+    return journal.SessionClock(lambda: next(ticks), origin)
+
+
+def names(path: Path) -> set[str]:
+    with path.open(encoding="utf-8", newline="") as file:
+        return set(next(csv.reader(file)))
+
+
+def tables_in(folder: Path) -> dict[str, bytes]:
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*.csv")}
+
+
+def sound(folder: Path) -> bool:
+    findings = verify(folder)
+    assert not [str(error) for error in (*findings.errors, *findings.psychds.errors)]
+    return findings.sound
+
+
+def test_a_sealed_study_holds_no_column_that_tells_a_condition(tmp_path: Path, start: Start, attend: Attend) -> None:
+    store = start()
+    attend(store)
+    store.finish("completed")
+    folder = tmp_path / "study"
+    assert names(store.folder.table("brackish", "trials")) == set(header(unsealed(TRIALS)))
+    for path in folder.rglob("*.*"):
+        if path.is_file():
+            held = path.read_bytes()
+            assert not [name for name in SEALED if f'"{name}"'.encode() in held], path
+    assert sound(folder)
+
+
+def test_unblinding_gives_what_an_open_study_would_have_held(
+    tmp_path: Path, protocol: Protocol, start: Start, attend: Attend
+) -> None:
+    """Of one key, one is opened before its sessions and one after; the tables are the same, byte for byte."""
+    folders = [tmp_path / name / "study" for name in ("before", "after")]
+    for folder in folders:
+        folder.mkdir(parents=True)
+        open_or_draw_key(folder, protocol, iter([0.5, *(number / 97 % 1 for number in range(1000))]).__next__)
+    reveal(folders[0], "AB", "no blinding")
+    for folder in folders:
+        for name in ("P007", "P008"):
+            store = start(name, results=folder, clock=ticking(), simulated=True)
+            attend(store)
+            store.append("trial_started", trial=6, attempt=1, block="b", phase="main", part=2, index=9, of=9, code="D1")
+            store.append("trial_ended", trial=6, attempt=1, outcome="complete", withheld_share=0.9)
+            store.finish("completed")
+    before, sealed_tables = (tables_in(folder) for folder in folders)
+    assert before.keys() == sealed_tables.keys()
+    assert before != sealed_tables
+    found = unblind(folders[1], "AB", "done")
+    assert found.left == ()
+    assert set(found.codes) == {"practice", "liquids", "delays"}
+    assert tables_in(folders[1]) == before
+    assert b",0.9," in before["data/sub-P007/ses-01/subject-P007_session-01_task-brackish_description-trials_data.csv"]
+    assert b",invalid\n" in before["data/study-brackish_description-participants_data.csv"]
+    description, ours = (StudyFolder(folder).description.read_bytes() for folder in folders)
+    assert ours == description
+    assert sound(folders[0])
+    assert sound(folders[1])
+    assert not list(folders[1].rglob(REBUILT)), "unblinding makes no proof again"
+
+
+def test_opening_again_changes_no_table_and_finishes_what_was_broken_off(
+    tmp_path: Path, start: Start, attend: Attend, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ended between a session's table and its checksum."""
+    for name in ("P007", "P008"):
+        store = start(name)
+        attend(store)
+        store.finish("completed")
+    folder = tmp_path / "study"
+
+    def killed(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(module, "replace_checksums", killed)
+    with pytest.raises(KeyboardInterrupt):
+        unblind(folder, "AB", "done")
+    monkeypatch.undo()
+    monkeypatch.setattr("os.fsync", lambda _: None)
+    assert not verify(folder).sound
+    assert unblind(folder, "AB", "again").left == ()
+    assert sound(folder)
+    held = tables_in(folder)
+    assert unblind(folder, "AB", "once more").left == ()
+    assert tables_in(folder) == held
+
+
+def test_what_is_not_the_journals_is_left_and_named(tmp_path: Path, start: Start, attend: Attend) -> None:
+    """A changed table, a session that runs, a damaged journal: the others are opened, and these are after rebuild."""
+    stores = {name: start(name) for name in ("P001", "P002", "P003", "P004")}
+    for name, store in stores.items():
+        attend(store)
+        if name != "P002":
+            store.finish("completed")
+    folder = tmp_path / "study"
+    changed = stores["P001"].folder.table("brackish", "trials")
+    changed.write_bytes(changed.read_bytes().replace(b"complete", b"timeout", 1))
+    damaged = stores["P003"].folder.journal
+    whole = damaged.read_bytes()
+    damaged.write_bytes(whole.replace(b'"trial_started"', b'"trial_sta\xffted"', 1))
+    left = unblind(folder, "AB", "done").left
+    assert len(left) == 3
+    assert "P001" in left[0]
+    assert "is not what the journal gives, so it was left as it is: liquid-study rebuild " in left[0]
+    assert "is open in another program" in left[1]
+    assert "damaged" in left[2]
+    assert not SEALED & names(changed)
+    assert names(stores["P004"].folder.table("brackish", "trials")) == set(header(TRIALS))
+    damaged.write_bytes(whole)
+    stores["P002"].append("note", kind="note", text="the tables of a session that runs follow with its next page")
+    stores["P002"].write_tables()
+    assert names(stores["P002"].folder.table("brackish", "trials")) == set(header(TRIALS))
+    stores["P002"].finish("completed")
+    for name in ("P001", "P003"):
+        rebuild(stores[name].folder.path)
+    assert sound(folder)
+
+
+def test_the_command_names_the_codes_and_what_it_left(start: Start, attend: Attend) -> None:
+    store = start()
+    attend(store)
+    store.finish("completed")
+    table = store.folder.table("brackish", "trials")
+    table.unlink()
+    asked = ["unblind", str(store.place.study_folder.path), "--by", "AB", "--reason", "done"]
+    done = CliRunner().invoke(commands, asked)
+    assert done.exit_code == 0
+    codes = {line.split()[1] for line in done.stdout.splitlines()}
+    assert codes == {"practice", "L1", "L2", "D1", "D2"}
+    assert done.stderr.splitlines() == [
+        f"warning: {table} is not what the journal gives, so it was left as it is: "
+        f"liquid-study rebuild {store.folder.path} makes it again"
+    ]
+
+
+def test_a_session_goes_on_as_it_began(tmp_path: Path, protocol: Protocol, start: Start, attend: Attend) -> None:
+    """Sealed before and after the key was opened: the tables have everything once it was."""
+    with start() as store:
+        attend(store)
+    unblind(tmp_path / "study", "AB", "done")
+    again = reopen(store.folder.path, protocol, SOURCE, operator="AB", device={"name": "scripted"}, screens={})
+    told = {"block": "delays", "phase": "main", "part": 2, "index": 2, "of": 2, "code": "D1"}
+    again.append("trial_started", trial=6, attempt=1, **told)
+    again.append("trial_ended", trial=6, attempt=1, outcome="complete", force_mean_n=1.25)
+    again.finish("completed")
+    assert "sealed" in journal.read(again.folder.journal)[-2]
+    assert b",1.25," in again.folder.table("brackish", "trials").read_bytes().splitlines()[-1]
+    assert sound(tmp_path / "study")
+
+
+def test_a_sealed_text_that_was_changed_is_found(tmp_path: Path, start: Start, attend: Attend) -> None:
+    """Before unblinding too, though nothing is shown."""
+    store = start()
+    attend(store)
+    store.finish("completed")
+
+    def change(lines: Lines) -> None:
+        line = next(line for line in lines if "sealed" in line)
+        text = line["sealed"]
+        line["sealed"] = text[:100] + ("0" if text[100] != "0" else "1") + text[101:]
+
+    forge(store.folder.journal, change)
+    assert "does not open with the study's key: it was changed" in "\n".join(
+        map(str, verify(tmp_path / "study").errors)
+    )
+    (left,) = unblind(tmp_path / "study", "AB", "done").left
+    assert "does not open" in left
+
+
+def in_clear(store: SessionStore, study: StudyHead) -> None:
+    """Make of a finished session one of an earlier version, which sealed nothing."""
+    lines = opened(journal.read(store.folder.journal), store.key)
+    del lines[0]["measures_sealed"]
+
+    def clear(held: Lines) -> None:
+        held[:] = lines
+
+    forge(store.folder.journal, clear)
+    cover_up(store.place.study_folder.path)
+    store.place.study_folder.description.write_bytes(description_bytes(study, sealed=False))
+
+
+def test_a_study_of_an_earlier_version_stays_sound_sealed_and_opened(
+    tmp_path: Path, protocol: Protocol, start: Start, attend: Attend
+) -> None:
+    store = start()
+    attend(store)
+    store.finish("completed")
+    in_clear(store, protocol.study)
+    folder = tmp_path / "study"
+    assert names(store.folder.table("brackish", "trials")) == set(header(TRIALS))
+    assert sound(folder)
+    assert rebuild(store.folder.path).rewritten == ()
+    later = start("P008")
+    attend(later)
+    later.finish("completed")
+    assert not SEALED & names(later.folder.table("brackish", "trials"))
+    assert sound(folder)
+    held = store.folder.table("brackish", "trials").read_bytes()
+    assert unblind(folder, "AB", "done").left == ()
+    assert store.folder.table("brackish", "trials").read_bytes() == held
+    assert names(later.folder.table("brackish", "trials")) == set(header(TRIALS))
+    assert sound(folder)
+
+
+def test_without_a_reason_nothing_is_opened(tmp_path: Path, start: Start, attend: Attend) -> None:
+    store = start()
+    attend(store)
+    store.finish("completed")
+    held = tables_in(tmp_path / "study")
+    with pytest.raises(StoreError, match="--reason is empty"):
+        unblind(tmp_path / "study", "AB", " ")
+    assert tables_in(tmp_path / "study") == held
+    assert receipt.read(store.folder.receipt)["status"] == "completed"
+
+
+def test_a_table_of_an_earlier_version_is_opened_without_the_column_that_it_did_not_know(
+    start: Start, attend: Attend
+) -> None:
+    store = start()
+    attend(store)
+    store.finish("completed")
+    folder, path = store.place.study_folder.path, store.folder.table(store.place.study, "trials")
+    earlier = tuple(column for column in unsealed(TRIALS) if column.name != "recording_lost")
+    sealed = path.read_bytes()
+    path.write_bytes(csv_bytes(earlier, read_table(sealed, earlier)))
+    replace_checksums(store.folder, {path.name: (sealed, path.read_bytes())})
+    for _ in range(2):
+        assert unblind(folder, by="AB", reason="a test").left == ()
+        assert names(path) == set(header(TRIALS)) - {"recording_lost"}
+    assert verify(folder).errors == ()

@@ -1,0 +1,472 @@
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import re
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from datetime import datetime, timedelta, timezone
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from study_app.errors import StoreError
+from study_app.store.clock import SessionClock
+from study_app.store.journals.journal import plain, read, scan
+from study_app.store.journals.journal_writer import Journal
+
+AWKWARD = 'comma, "quote",\nnew line\r\n\ttab 🌊 \u2028\x85 =SUM(A1)' + "é" * 10_000
+
+
+def three_answers(path: Path) -> Path:
+    with Journal.create(path) as journal:
+        journal.append("began", participant="P007")
+        for trial in (1, 2, 3):
+            journal.append("counted", trial=trial, item="calm", value=trial, text='naïve 🌊, "q"\n')
+    return path
+
+
+def test_a_line_explains_itself_and_is_returned_as_it_will_be_read(tmp_path: Path, clock: SessionClock) -> None:
+    path = tmp_path / "journal.jsonl"
+    with Journal.create(path, clock) as journal:
+        written = [
+            journal.append("shown", page="consent"),
+            journal.append("counted", t_s=12.3456789, item="calm", value=None),
+        ]
+    assert read(path) == written
+    assert written[1] == {
+        "n": 2,
+        "event": "counted",
+        "t_s": 12.345679,
+        "at": "2026-03-01T10:00:12.345+01:00",
+        "item": "calm",
+        "value": None,
+        "previous": hashlib.sha256(path.read_bytes().splitlines(keepends=True)[0]).hexdigest(),
+    }
+
+
+def test_a_line_is_on_the_disk_when_append_returns(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The file was flushed, whole, before the caller goes on."""
+    path = tmp_path / "journal.jsonl"
+    flushed: list[bytes] = []
+    with Journal.create(path) as journal:
+        monkeypatch.setattr(
+            "study_app.store.journals.journal_writer.os.fsync", lambda _: flushed.append(path.read_bytes())
+        )
+        for count in (1, 2, 3):
+            journal.append("counted", value=count)
+            assert len(flushed) == count
+            assert flushed[-1] == path.read_bytes()
+    assert flushed[-1].count(b"\n") == 3
+
+
+def test_cut_at_any_byte_it_reads_to_the_last_whole_line(tmp_path: Path) -> None:
+    path = three_answers(tmp_path / "journal.jsonl")
+    content, lines = path.read_bytes(), read(path)
+    ends = [end + 1 for end, byte in enumerate(content) if byte == ord("\n")]
+    assert len(ends) == 4
+    cut = tmp_path / "cut.jsonl"
+    for size in range(len(content) + 1):
+        cut.write_bytes(content[:size])
+        whole = sum(end <= size for end in ends)
+        contents = scan(cut)
+        assert read(cut) == contents.lines == lines[:whole]
+        assert contents.whole_bytes == ([0, *ends])[whole]
+        assert contents.torn_bytes == size - contents.whole_bytes
+        assert contents.damage is None
+
+
+@pytest.mark.parametrize("tail", [b"\0" * 4096, b'{"n":5,"event"', b"\xff\xfe\0\0", b'{"n":5}', b"7"])
+def test_what_a_power_cut_leaves_at_the_end_is_left_out_and_counted(tmp_path: Path, tail: bytes) -> None:
+    path = three_answers(tmp_path / "journal.jsonl")
+    with path.open("ab") as file:
+        file.write(tail)
+    contents = scan(path)
+    assert len(contents.lines) == 4
+    assert contents.torn_bytes == len(tail)
+    assert contents.damage is None
+
+
+@pytest.mark.parametrize("broken", [(1,), (3,), (2, 3), (1, 2, 3)])
+@pytest.mark.parametrize("tail", [b"", b'{"n":5,"ev'])
+def test_a_broken_line_with_its_newline_is_damage_wherever_it_is(
+    tmp_path: Path, broken: tuple[int, ...], tail: bytes
+) -> None:
+    path = three_answers(tmp_path / "journal.jsonl")
+    lines = path.read_bytes().split(b"\n")
+    for index in broken:
+        lines[index] = b"#" + lines[index][1:]
+    path.write_bytes(b"\n".join(lines) + tail)
+    with pytest.raises(StoreError, match=rf"journal\.jsonl, line {broken[0] + 1}: damaged; restore it from a copy"):
+        read(path)
+    contents = scan(path)
+    assert (len(contents.lines), contents.torn_bytes) == (broken[0], 0)
+
+
+@pytest.mark.parametrize("order", [(0, 1, 3), (0, 1, 1, 2), (1, 2, 3)])
+def test_a_missing_or_doubled_line_is_damage(tmp_path: Path, order: tuple[int, ...]) -> None:
+    path = three_answers(tmp_path / "journal.jsonl")
+    lines = path.read_bytes().splitlines(keepends=True)
+    path.write_bytes(b"".join(lines[index] for index in order))
+    with pytest.raises(StoreError, match="lines are missing or doubled"):
+        read(path)
+
+
+def test_a_journal_that_is_not_there_is_named(tmp_path: Path) -> None:
+    with pytest.raises(StoreError, match=r"journal\.jsonl cannot be read \(No such file or directory\)"):
+        read(tmp_path / "journal.jsonl")
+
+
+def test_an_existing_journal_is_never_written_over(tmp_path: Path) -> None:
+    path = three_answers(tmp_path / "journal.jsonl")
+    before = path.read_bytes()
+    with pytest.raises(StoreError, match="exists already"):
+        Journal.create(path)
+    assert path.read_bytes() == before
+
+
+def test_a_folder_that_is_not_there_is_named(tmp_path: Path) -> None:
+    with pytest.raises(StoreError, match="cannot be written"):
+        Journal.create(tmp_path / "gone" / "journal.jsonl")
+
+
+@pytest.mark.parametrize("mended", [True, False], ids=["taken back at once", "taken back before the next line"])
+def test_after_a_full_disk_it_goes_on_where_it_was(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    files_up_to: Callable[[int], AbstractContextManager[None]],
+    *,
+    mended: bool,
+) -> None:
+    path = tmp_path / "journal.jsonl"
+    journal = Journal.create(path)
+    first = journal.append("counted", value=1)
+    with monkeypatch.context() as patched:
+        if not mended:
+            patched.setattr(journal, "_take_back", _refuse)
+        with files_up_to(500), pytest.raises(StoreError, match=r"journal\.jsonl cannot be written \(File too large\)"):
+            journal.append("said", text=AWKWARD)
+    assert read(path) == [first]
+    assert (scan(path).torn_bytes == 0) == mended
+    second = journal.append("counted", value=2)
+    journal.close()
+    assert second["n"] == 2
+    assert read(path) == [first, second]
+
+
+def _refuse() -> None:
+    raise OSError(28, "No space left on device")
+
+
+class Disk:
+    """What ``os.fsync`` does while it is patched: remembers what is on the disk, and fails, or holds, where told to.
+
+    A flush that fails loses what it was to flush, as a system does that drops the pages it could not write.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.content = b""
+        self.by: list[int] = []
+        self.fails = 0
+        self.failed = threading.Event()
+        self.flushed = threading.Event()
+        self.free = threading.Event()
+        self.free.set()
+
+    def fsync(self, _descriptor: int) -> None:
+        assert self.free.wait(20)
+        self.by.append(threading.get_ident())
+        if self.fails:
+            self.fails -= 1
+            with self.path.open("r+b") as file:
+                size = file.seek(0, 2)
+                file.seek(len(self.content))
+                file.write(bytes(size - len(self.content)))
+            self.failed.set()
+            raise OSError(5, "Input/output error")
+        self.content = self.path.read_bytes()
+        self.flushed.set()
+
+    @property
+    def mine(self) -> int:
+        """How many flushes the thread that asks waited for."""
+        return self.by.count(threading.get_ident())
+
+
+@pytest.fixture
+def disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Disk:
+    made = Disk(tmp_path / "journal.jsonl")
+    monkeypatch.setattr("study_app.store.journals.journal_writer.os.fsync", made.fsync)
+    return made
+
+
+def test_a_line_that_nobody_waits_for_is_flushed_behind_and_in_order(disk: Disk) -> None:
+    journal = Journal.create(disk.path)
+    before = disk.mine  # the folder's entry
+    disk.free.clear()  # no flush ends
+    written = [journal.append("seen", waits=False, count=number) for number in range(9)]
+    assert read(disk.path) == written
+    assert disk.mine == before
+    disk.free.set()
+    answer = journal.append("counted", value=1)
+    assert disk.content.count(b"\n") == 10
+    journal.append("shown", waits=False)
+    journal.close()
+    assert disk.content == disk.path.read_bytes()
+    assert read(disk.path)[9] == answer
+    assert len(disk.by) - before <= 4  # one flush is enough for all lines that wait
+
+
+def test_a_flush_that_fails_behind_is_told_with_the_next_line_and_loses_none(
+    disk: Disk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("study_app.store.journals.journal_writer.RETRY_S", 3600.0)
+    journal = Journal.create(disk.path)
+    first = journal.append("counted", value=1)
+    disk.fails = 2
+    shown = journal.append("seen", waits=False, item="calm")
+    assert disk.failed.wait(20)
+    with pytest.raises(StoreError, match=r"journal\.jsonl cannot be written \(Input/output error\)"):
+        journal.append("seen", waits=False, item="strong")
+    second = journal.append("seen", waits=False, item="strong")  # waits, since one failed
+    assert disk.content == disk.path.read_bytes()
+    journal.close()
+    assert read(disk.path) == [first, shown, second]
+    assert [line["n"] for line in (first, shown, second)] == [1, 2, 3]
+
+
+def test_a_flush_that_fails_in_the_background_is_told_and_repeated(disk: Disk, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("study_app.store.journals.journal_writer.RETRY_S", 0.0)
+    journal = Journal.create(disk.path)
+    journal.append("counted", value=1)
+    journal.check_flushed()
+    disk.fails = -1  # every flush fails
+    disk.flushed.clear()
+    shown = journal.append("seen", waits=False, item="calm")
+    for _ in range(3):
+        assert disk.failed.wait(20)
+        disk.failed.clear()
+    with pytest.raises(StoreError, match=r"journal\.jsonl cannot be written \(Input/output error\)"):
+        journal.check_flushed()
+    with journal._flushing:  # no flush is under way
+        disk.fails = 0
+    assert disk.flushed.wait(20)
+    with journal._flushing:
+        journal.check_flushed()
+    assert disk.content == disk.path.read_bytes()
+    assert read(disk.path)[-1] == shown
+    journal.close()
+
+
+def test_a_close_that_cannot_flush_the_last_lines_says_so(disk: Disk, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("study_app.store.journals.journal_writer.RETRY_S", 3600.0)
+    journal = Journal.create(disk.path)
+    disk.fails = -1
+    journal.append("seen", waits=False, item="calm")
+    with pytest.raises(StoreError, match="Input/output error"):
+        journal.close()
+    assert journal.closed
+    journal.close()
+
+
+@settings(max_examples=60, deadline=None)
+@given(lines=st.lists(st.tuples(st.booleans(), st.booleans()), max_size=12), cut=st.integers(0, 400))
+def test_a_power_cut_takes_no_answer_and_leaves_no_hole(
+    tmp_path_factory: pytest.TempPathFactory, lines: list[tuple[bool, bool]], cut: int
+) -> None:
+    """Of what no flush has reached yet any part may be on the disk; flushes may fail."""
+    disk = Disk(tmp_path_factory.mktemp("cut") / "journal.jsonl")
+    with pytest.MonkeyPatch.context() as patched, contextlib.ExitStack() as over:
+        patched.setattr("study_app.store.journals.journal_writer.os.fsync", disk.fsync)
+        journal = Journal.create(disk.path)
+        over.callback(journal.close)
+        kept: list[Any] = []
+        answers = 0
+        for waits, fails in lines:
+            disk.fails = int(fails)
+            try:
+                kept.append(journal.append("counted" if waits else "seen", waits=waits))
+            except StoreError:
+                continue
+            if waits:
+                answers = len(kept)
+        with journal._flushing:  # no flush is under way
+            content, flushed = disk.path.read_bytes(), disk.content
+            disk.fails = 0
+    if flushed == content[: len(flushed)]:
+        flushed = content[: len(flushed) + cut]
+    disk.path.write_bytes(flushed)
+    left = scan(disk.path)
+    assert left.damage is None
+    assert left.lines == kept[: len(left.lines)]
+    assert len(left.lines) >= answers
+
+
+@pytest.mark.parametrize(
+    ("told", "sentence"),
+    [
+        ({"t_s": -0.001}, "(note) has t_s -0.001"),
+        ({"t_s": 1e10}, "(note) has t_s 1e+10"),
+        ({"kind": 3}, "(note) holds kind 3, expected: text"),
+    ],
+)
+def test_what_a_reader_would_call_damage_is_not_written(tmp_path: Path, told: dict[str, Any], sentence: str) -> None:
+    path = tmp_path / "journal.jsonl"
+    with Journal.create(path) as journal:
+        with pytest.raises(StoreError, match=re.escape(f"line 1 {sentence}")):
+            journal.append("note", **({"kind": "note", "text": "x"} | told))
+        journal.append("note", kind="note", text="kept")
+    assert [line["text"] for line in read(path)] == ["kept"]
+
+
+def test_after_its_end_it_takes_nothing(tmp_path: Path) -> None:
+    journal = Journal.create(tmp_path / "journal.jsonl")
+    journal.close()
+    with pytest.raises(StoreError, match="'said' came after the session's end"):
+        journal.append("said", text="late")
+
+
+def test_a_field_cannot_take_the_place_of_a_lines_number_or_time(tmp_path: Path) -> None:
+    with Journal.create(tmp_path / "journal.jsonl") as journal:
+        for own in ("n", "at", "previous"):
+            with pytest.raises(ValueError, match="are the journal's own"):
+                journal.append("said", **{own: 1})
+    assert read(tmp_path / "journal.jsonl") == []
+
+
+KILLED = """
+import sys
+from pathlib import Path
+from study_app.store.journals.journal_writer import Journal
+journal = Journal.create(Path(sys.argv[1]))
+count = 0
+while True:
+    count += 1
+    journal.append("counted", value=count, text="x" * (count % 977))
+    print(count, flush=True)
+"""
+
+
+def test_what_was_acknowledged_survives_a_kill_at_any_moment(tmp_path: Path) -> None:
+    path = tmp_path / "journal.jsonl"
+    with subprocess.Popen([sys.executable, "-c", KILLED, str(path)], stdout=subprocess.PIPE, text=True) as program:
+        assert program.stdout
+        acknowledged = [int(program.stdout.readline()) for _ in range(200)]
+        program.kill()
+        acknowledged += [int(line) for line in program.stdout if line.endswith("\n")]
+    values = [line["value"] for line in read(path)]
+    assert values[: len(acknowledged)] == acknowledged
+    assert len(values) <= len(acknowledged) + 1
+
+
+def test_setting_the_wall_clock_back_moves_no_time(tmp_path: Path) -> None:
+    """The wall clock is read once; a session's times come from the monotonic clock."""
+    now = [1_000]
+    origin = datetime(2026, 10, 25, 1, 59, 59, tzinfo=timezone(timedelta(hours=2)))
+    clock = SessionClock(lambda: now[0], origin)
+    with Journal.create(tmp_path / "journal.jsonl", clock) as journal:
+        now[0] += 2_500_000_000
+        line = journal.append("shown", page="consent")
+    assert line["t_s"] == 2.5
+    assert line["at"] == "2026-10-25T02:00:01.500+02:00"
+
+
+def test_the_clock_is_the_systems_by_default() -> None:
+    before = time.monotonic_ns()
+    clock = SessionClock()
+    assert before <= clock.origin_ns <= time.monotonic_ns()
+    assert clock.origin_at.utcoffset() is not None
+    assert clock.seconds() >= 0
+
+
+def test_a_clock_that_goes_on_shows_more_than_nothing_and_now() -> None:
+    now = [7_000]
+    clock = SessionClock(lambda: now[0], shown_s=3600.0)
+    now[0] += 2_500_000_000
+    assert clock.seconds() == 3602.5
+    assert abs(datetime.fromisoformat(clock.at(3600.0)) - datetime.now().astimezone()) < timedelta(minutes=1)
+
+
+def test_a_journal_that_changed_while_it_was_opened_is_refused(tmp_path: Path) -> None:
+    path = three_answers(tmp_path / "journal.jsonl")
+    contents = scan(path)
+    with path.open("ab") as file:
+        file.write(b'{"n":5}\n')
+    before = path.read_bytes()
+    with pytest.raises(StoreError, match="has changed while it was opened: is another program writing it"):
+        Journal.reopen(path, contents, SessionClock())
+    assert path.read_bytes() == before
+
+
+def test_a_reopened_journal_goes_on_after_its_last_whole_line(tmp_path: Path) -> None:
+    path = three_answers(tmp_path / "journal.jsonl")
+    whole = path.read_bytes()
+    for torn in (b"", b'{"n":5,"ev', b"\0" * 99):
+        path.write_bytes(whole + torn)
+        with Journal.reopen(path, scan(path), SessionClock()) as journal:
+            line = journal.append("counted", value=4)
+            assert not journal.closed
+        assert journal.closed
+        assert line["n"] == 5
+        assert read(path)[-1] == line
+        assert path.read_bytes().startswith(whole + b'{"n":5')
+    kept = sorted(name.name for name in tmp_path.iterdir())
+    assert kept == ["journal-torn-1.txt", "journal-torn-2.txt", "journal.jsonl"]
+
+
+@pytest.mark.parametrize("other", [None, b"", b"another"])
+def test_a_journal_that_is_no_longer_under_its_name_takes_no_line_until_it_is_back(
+    tmp_path: Path, other: bytes | None
+) -> None:
+    path = tmp_path / "journal.jsonl"
+    with Journal.create(path) as journal:
+        journal.append("counted", value=1)
+        path.rename(tmp_path / "away.jsonl")
+        if other is not None:
+            path.write_bytes(other)
+        for waits in (True, False):
+            with pytest.raises(StoreError, match=r"journal\.jsonl was moved, deleted or replaced .*: put it back"):
+                journal.append("counted", value=2, waits=waits)
+        (tmp_path / "away.jsonl").replace(path)
+        journal.append("counted", value=2)
+    assert [line["value"] for line in read(path)] == [1, 2]
+
+
+def test_numbers_become_plain_and_those_that_are_none_null() -> None:
+    mixed = {"a": np.int64(3), "b": np.float32(0.5), "c": float("nan"), "d": (np.inf, np.array([1.0, np.nan])), 5: True}
+    assert plain(mixed) == {"a": 3, "b": 0.5, "c": None, "d": [None, [1.0, None]], "5": True}
+    assert type(plain(np.bool_(True))) is bool
+
+
+json_values = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(), inner, max_size=3),
+    max_leaves=8,
+)
+
+
+@given(value=json_values)
+def test_any_value_comes_back(tmp_path_factory: pytest.TempPathFactory, value: Any) -> None:
+    path = tmp_path_factory.mktemp("journal") / "journal.jsonl"
+    with Journal.create(path) as journal:
+        journal.append("said", text=AWKWARD, said=value)
+        journal.append("said", text="")
+    assert [(line["text"], line.get("said")) for line in read(path)] == [(AWKWARD, value), ("", None)]
+    assert path.read_bytes().count(b"\n") == 2
+
+
+def test_half_a_surrogate_pair_is_kept_as_an_escape(tmp_path: Path) -> None:
+    path = tmp_path / "journal.jsonl"
+    with Journal.create(path) as journal:
+        journal.append("said", text="half \ud83c here")
+    assert json.loads(path.read_text(encoding="utf-8"))["text"] == "half \ud83c here"

@@ -1,0 +1,593 @@
+from __future__ import annotations
+
+import csv
+import io
+import itertools
+import json
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from datetime import datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from study_app import __version__
+from study_app.errors import StoreError
+from study_app.protocol.load import load, source_bytes
+from study_app.protocol.model import Protocol
+from study_app.protocol.orders.schedule import Trial, build_schedule
+from study_app.store import receipt
+from study_app.store.journals import journal
+from study_app.store.recorder import event_of, recording_files
+from study_app.store.recording_files import read_samples, write_frames
+from study_app.store.sessions.begin import SessionStore
+from study_app.store.sessions.folder_lock import is_open
+from study_app.store.sessions.rebuild import rebuild
+from study_app.store.sessions.reopen import check_can_go_on, reopen
+from study_app.store.verification.verify_study import verify
+from tests.store.conftest import choose
+
+SOURCE = b"[study]\nname = 'brackish'\n"
+FullDisk = Callable[[int], AbstractContextManager[None]]
+Again = Callable[..., SessionStore]
+
+
+@pytest.fixture
+def again(tmp_path: Path, protocol: Protocol) -> Again:
+    """Reopen P007's session; any argument of ``reopen`` can be given."""
+
+    def reopened(**given: Any) -> SessionStore:
+        ticks = itertools.count(900_000_000, 1_000_000)
+        arguments: dict[str, Any] = {
+            "session_folder": tmp_path / "study" / "data" / "sub-P007" / "ses-01",
+            "protocol": protocol,
+            "source": SOURCE,
+            "operator": "CD",
+            "device": {"name": "mouse"},
+            "screens": {},
+            "now_ns": lambda: next(ticks),
+        }
+        return reopen(**(arguments | given))
+
+    return reopened
+
+
+def every_byte(folder: Path) -> dict[str, bytes]:
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def present(store: SessionStore, trial: Trial, summary: dict[str, Any]) -> None:
+    which = {"trial": trial.number, "attempt": 1}
+    told = {name: getattr(trial, name) for name in ("block", "phase", "part", "index", "of", "code")}
+    store.append("trial_started", **which, **told)
+    store.append("trial_ended", **which, outcome="complete", **summary)
+    store.write_tables()
+
+
+def answer(store: SessionStore, trial: Trial) -> None:
+    times = {"onset_s": 1.5, "first_s": 2.25, "last_s": 2.25, "changes": 0}
+    items = [
+        {"item": item, "number": number, "value": 1 + (trial.number + number) % 7, **times}
+        for number, item in enumerate(trial.items, start=1)
+    ]
+    if items:
+        choose(store, trial.number, items)
+        store.append("responses", trial=trial.number, attempt=1, items=items)
+    store.write_tables()
+
+
+def test_it_goes_on_after_the_last_line_and_says_so(start: Callable[..., SessionStore], again: Again) -> None:
+    with start() as store:
+        store.append("page_shown", t_s=40.0, page="consent")
+    last_at = datetime.fromisoformat(store.lines[-1]["at"])
+    resumed = again(now=last_at + timedelta(hours=20, seconds=0.25))
+    line = resumed.lines[-1]
+    resumed.append("page_left", page="consent")
+    resumed.close()
+    assert journal.read(store.folder.journal) == list(resumed.lines)
+    assert [line["n"] for line in resumed.lines] == [1, 2, 3, 4]
+    assert {name: line[name] for name in line if name not in ("t_s", "at", "previous")} == {
+        "n": 3,
+        "event": "session_resumed",
+        "gap_s": 72_000.25,
+        "torn_bytes": 0,
+        "operator": "CD",
+        "device": "mouse",
+        "version": __version__,
+    }
+    assert line["t_s"] == pytest.approx(40 + 72_000.25, abs=0.01)
+    since = datetime.fromisoformat(line["at"]) - last_at
+    assert since == pytest.approx(timedelta(seconds=72_000.25), abs=timedelta(seconds=0.01))
+
+
+def test_times_never_go_back_whatever_the_clocks_do(start: Callable[..., SessionStore], again: Again) -> None:
+    """The wall clock was set back an hour, and the machine was started anew: its own clock begins at nought."""
+    with start() as store:
+        store.append("page_shown", t_s=40.0, page="consent")
+    set_back = datetime.fromisoformat(store.lines[-1]["at"]) - timedelta(hours=1)
+    with again(now=set_back, now_ns=itertools.count(0, 1_000_000).__next__) as resumed:
+        resumed.append("page_left", page="consent")
+    line, after = resumed.lines[-2:]
+    assert line["gap_s"] is None
+    assert 40.0 <= line["t_s"] < after["t_s"] < 40.1
+    assert datetime.fromisoformat(line["at"]) - set_back < timedelta(seconds=1)
+
+
+@pytest.mark.parametrize("at", [None, "0001-01-01T00:00:00.000+01:00", "9999-12-31T23:59:59.000-01:00"])
+def test_a_gap_that_no_session_has_is_unknown_and_locks_nothing(
+    start: Callable[..., SessionStore], again: Again, at: str | None
+) -> None:
+    """The wall clock was at 1970 before, or is decades ahead now; or a moment was changed."""
+    with start() as store:
+        store.append("page_shown", t_s=40.0, page="consent")
+    now = datetime.fromisoformat(store.lines[-1]["at"]) + timedelta(days=40 * 365)
+    if at is not None:
+        path = store.folder.journal
+        path.write_bytes(path.read_bytes().replace(store.lines[-1]["at"].encode(), at.encode()))
+        with pytest.raises(StoreError, match=r"holds at .* expected: time"):
+            again()
+        return
+    for _ in range(2):
+        with again(now=now) as resumed:
+            resumed.append("page_left", page="consent")
+        assert (resumed.lines[-2]["gap_s"], resumed.lines[-2]["t_s"] < 41) == (None, True)
+        now += timedelta(days=40 * 365)
+
+
+def test_the_receipt_tells_what_it_goes_on_with(start: Callable[..., SessionStore], again: Again) -> None:
+    with start() as store:
+        before = receipt.read(store.folder.receipt)
+    for _ in range(2):
+        with again() as resumed:
+            pass
+    after = receipt.read(store.folder.receipt)
+    assert before["resumed"] == []
+    assert {name for name in after if after[name] != before[name]} == {"resumed"}
+    assert [one["at"] for one in after["resumed"]] == [line["at"] for line in resumed.lines[1:]]
+    assert after["resumed"][0]["device"] == {"name": "mouse"}
+    assert after["resumed"][0]["operator"] == "CD"
+    assert after["resumed"][0]["versions"] == before["versions"]
+    assert after["resumed"][1]["clock"] == {"origin_ns": resumed.clock.origin_ns, "origin_at": resumed.clock.at(0)}
+
+
+def test_a_resumed_session_gives_the_tables_of_one_that_was_never_interrupted(
+    tmp_path: Path, protocol: Protocol, start: Callable[..., SessionStore], again: Again, summary: dict[str, Any]
+) -> None:
+    """Ended after each trial's answers, and taken up again; times aside."""
+    trials = build_schedule(protocol, "P007", 11).trials
+    whole = start(results=tmp_path / "whole")
+    for trial in trials:
+        present(whole, trial, summary)
+        answer(whole, trial)
+    whole.finish("completed")
+
+    store = start()
+    for trial in trials:
+        present(store, trial, summary)
+        answer(store, trial)
+        store.close()
+        store = again()
+    store.finish("completed")
+
+    def rows(of: SessionStore, table: str) -> list[dict[str, str]]:
+        text = of.folder.table("brackish", table).read_text(encoding="utf-8")
+        found = list(csv.DictReader(io.StringIO(text, newline="")))
+        timed = ("answered_at", "trial_started_at", "trial_started_s")
+        return [{name: cell for name, cell in row.items() if name not in timed} for row in found]
+
+    for table in ("responses", "trials"):
+        assert rows(store, table) == rows(whole, table)
+    (row,) = csv.DictReader(io.StringIO(store.place.study_folder.participants("brackish").read_text(encoding="utf-8")))
+    assert (row["status"], row["resumed"], row["responses"]) == ("completed", str(len(trials)), "12")
+    findings = verify(tmp_path / "study")
+    assert (findings.errors, findings.warnings) == ((), ())
+
+
+def test_a_trial_under_way_was_interrupted(
+    start: Callable[..., SessionStore], again: Again, protocol: Protocol, summary: dict[str, Any]
+) -> None:
+    trial = build_schedule(protocol, "P007", 11).trials[1]
+    store = start()
+    told = {name: getattr(trial, name) for name in ("block", "phase", "part", "index", "of", "code")}
+    store.append("trial_started", trial=trial.number, attempt=1, **told)
+    store.write_tables()
+    store.close()
+    with again() as resumed:
+        content = resumed.folder.table("brackish", "trials").read_text(encoding="utf-8")
+    assert ",interrupted," in content.splitlines()[1]
+
+
+@pytest.mark.parametrize("tail", [b'{"n":3,"event":"choi', b"\0" * 4096, b'{"n":3}', b"\xff"])
+def test_a_torn_line_is_cut_off_counted_and_kept(start: Callable[..., SessionStore], again: Again, tail: bytes) -> None:
+    with start() as store:
+        store.append("note", kind="note", text="kept")
+    whole = store.folder.journal.read_bytes()
+    store.folder.journal.write_bytes(whole + tail)
+    with again() as resumed:
+        pass
+    assert store.folder.journal.read_bytes().startswith(whole + b'{"n":3,"event":"session_resumed"')
+    assert resumed.lines[-1]["torn_bytes"] == len(tail)
+    assert journal.read(store.folder.journal) == list(resumed.lines)
+    assert (store.folder.path / "journal-torn-1.txt").read_bytes() == tail
+
+
+def test_what_was_cut_off_is_never_written_over(start: Callable[..., SessionStore], again: Again) -> None:
+    store = start()
+    store.close()
+    for tail in (b"first", b"second"):
+        with store.folder.journal.open("ab") as file:
+            file.write(tail)
+        again().close()
+    kept = sorted(store.folder.path.glob("journal-torn-*"))
+    assert [path.read_bytes() for path in kept] == [b"first", b"second"]
+
+
+def test_damaged_lines_at_the_end_are_no_torn_tail(
+    tmp_path: Path, start: Callable[..., SessionStore], again: Again
+) -> None:
+    with start() as store:
+        for text in ("one", "two"):
+            store.append("note", kind="note", text=text)
+    lines = store.folder.journal.read_bytes().split(b"\n")
+    store.folder.journal.write_bytes(b"\n".join([lines[0], *(b"#" + line[1:] for line in lines[1:3]), b""]))
+    before = every_byte(tmp_path)
+    with pytest.raises(StoreError, match="line 2: damaged"):
+        again()
+    assert every_byte(tmp_path) == before
+
+
+def test_a_finished_session_is_refused_untouched(
+    tmp_path: Path, start: Callable[..., SessionStore], again: Again
+) -> None:
+    start().finish("withdrawn")
+    before = every_byte(tmp_path)
+    with pytest.raises(StoreError, match=r"is finished \(withdrawn\): it cannot go on; use a new session number"):
+        again()
+    assert every_byte(tmp_path) == before
+
+
+def test_a_session_open_elsewhere_is_refused_untouched(
+    tmp_path: Path, start: Callable[..., SessionStore], again: Again
+) -> None:
+    with start():
+        before = every_byte(tmp_path)
+        with pytest.raises(StoreError, match="is open in another program"):
+            again()
+        assert every_byte(tmp_path) == before
+
+
+def changed(tables: dict[str, Any], path: str, value: Any) -> Protocol:
+    *above, last = path.split(".")
+    place = tables
+    for name in above:
+        place = place[name]
+    place[last] = value
+    return Protocol.model_validate(tables)
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "told"),
+    [
+        (
+            "pages.consent.body",
+            "You must stay.",
+            'pages.consent.body: "You may stop at any time." before, "You must stay." now',
+        ),
+        ("tasks.feel.max_s", 10, "tasks.feel.max_s: 9 before, 10 now"),
+        ("sequence", ["consent", "liquids", "delays"], "sequence: "),
+    ],
+)
+def test_another_protocol_is_refused_and_the_difference_shown(
+    tmp_path: Path,
+    start: Callable[..., SessionStore],
+    again: Again,
+    tables_of_study: Callable[..., dict[str, Any]],
+    path: str,
+    value: Any,
+    told: str,
+) -> None:
+    start().close()
+    before = every_byte(tmp_path)
+    with pytest.raises(StoreError) as refusal:
+        again(protocol=changed(tables_of_study(), path, value), source=SOURCE + b"# changed")
+    assert told in str(refusal.value)
+    assert "conditions differ" not in str(refusal.value)
+    assert "\n" not in str(refusal.value)
+    assert every_byte(tmp_path) == before
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        ("liquids.quagmire.density_kg_m3", 2929.2),
+        ("conditions.see_tardy.delay_ms", 292.9),
+        ("blocks.liquids.conditions", ["feel_mildew", "feel_quagmire"]),
+    ],
+)
+def test_of_other_conditions_nothing_but_that_is_told(
+    start: Callable[..., SessionStore],
+    again: Again,
+    tables_of_study: Callable[..., dict[str, Any]],
+    path: str,
+    value: Any,
+) -> None:
+    start().close()
+    with pytest.raises(StoreError) as refusal:
+        again(protocol=changed(tables_of_study(), path, value), source=SOURCE + b"# changed")
+    assert str(refusal.value).endswith("What differs: conditions differ")
+
+
+def test_a_file_that_differs_in_its_comments_alone_is_refused_and_said_to(
+    start: Callable[..., SessionStore], again: Again
+) -> None:
+    start().close()
+    with pytest.raises(StoreError, match="What differs: comments, order or notation, nothing that is run"):
+        again(source=SOURCE + b"# changed")
+
+
+@pytest.mark.parametrize("lost", ["receipt.json", "../../../blinding/key.sealed", "journal.jsonl"])
+def test_what_is_missing_is_named_and_nothing_is_written(
+    tmp_path: Path, start: Callable[..., SessionStore], again: Again, lost: str
+) -> None:
+    with start() as store:
+        pass
+    (store.folder.path / lost).unlink()
+    before = every_byte(tmp_path)
+    with pytest.raises(StoreError, match=Path(lost).name.replace(".", r"\.")):
+        again()
+    assert every_byte(tmp_path) == before
+    assert not is_open(store.folder.path)
+
+
+def finish(store: SessionStore) -> None:
+    store.finish("withdrawn")
+
+
+def lose_the_receipt(store: SessionStore) -> None:
+    store.close()
+    store.folder.receipt.unlink()
+
+
+def lose_the_key(store: SessionStore) -> None:
+    store.close()
+    store.place.study_folder.key.unlink()
+
+
+@pytest.mark.parametrize("done", [finish, lose_the_receipt, lose_the_key, SessionStore.close, None])
+def test_looking_alone_refuses_what_could_not_be_opened_again(
+    tmp_path: Path,
+    start: Callable[..., SessionStore],
+    again: Again,
+    protocol: Protocol,
+    done: Callable[[SessionStore], None] | None,
+) -> None:
+    """Of another protocol where the session was only closed; open where nothing was done."""
+    with start() as store:
+        if done is not None:
+            done(store)
+        source = SOURCE + b"# changed" if done is SessionStore.close else SOURCE
+        before = every_byte(tmp_path)
+        with pytest.raises(StoreError) as told:
+            check_can_go_on(store.folder.path, protocol, source)
+        assert every_byte(tmp_path) == before
+        with pytest.raises(StoreError, match=re.escape(str(told.value))):
+            again(source=source)
+
+
+def test_looking_at_a_session_that_can_go_on_changes_nothing(
+    tmp_path: Path, start: Callable[..., SessionStore], protocol: Protocol
+) -> None:
+    start().close()
+    before = every_byte(tmp_path)
+    check_can_go_on(tmp_path / "study" / "data" / "sub-P007" / "ses-01", protocol, SOURCE)
+    assert every_byte(tmp_path) == before
+
+
+def test_a_study_killed_before_it_was_described_is_described(
+    tmp_path: Path, start: Callable[..., SessionStore], again: Again
+) -> None:
+    start().close()
+    (description,) = tmp_path.rglob("dataset_description.json")
+    told = description.read_bytes()
+    description.unlink()
+    again().close()
+    assert description.read_bytes() == told
+
+
+def test_a_session_that_had_not_begun_cannot_go_on(
+    tmp_path: Path, start: Callable[..., SessionStore], again: Again
+) -> None:
+    """The program was killed while it wrote the first line."""
+    with start() as store:
+        pass
+    store.folder.journal.write_bytes(store.folder.journal.read_bytes()[:40])
+    before = every_byte(tmp_path)
+    with pytest.raises(StoreError, match=r"journal\.jsonl holds no line: .* use a new session number"):
+        again()
+    assert every_byte(tmp_path) == before
+
+
+def test_a_damaged_journal_is_refused_untouched(
+    tmp_path: Path, start: Callable[..., SessionStore], again: Again
+) -> None:
+    with start() as store:
+        for text in ("one", "two"):
+            store.append("note", kind="note", text=text)
+    lines = store.folder.journal.read_bytes().split(b"\n")
+    store.folder.journal.write_bytes(b"\n".join([lines[0], lines[1][:20], *lines[2:]]))
+    before = every_byte(tmp_path)
+    with pytest.raises(StoreError, match="line 2: damaged; restore it from a copy"):
+        again()
+    assert every_byte(tmp_path) == before
+
+
+def test_a_disk_without_space_for_the_line_changes_nothing_and_it_can_be_tried_again(
+    start: Callable[..., SessionStore], again: Again, files_up_to: FullDisk
+) -> None:
+    with start() as store:
+        store.append("note", kind="note", text="x" * 3000)
+    before = store.folder.journal.read_bytes()
+    with files_up_to(len(before) + 10), pytest.raises(StoreError, match=r"journal\.jsonl cannot be written"):
+        again()
+    assert store.folder.journal.read_bytes() == before
+    assert not is_open(store.folder.path)
+    with again() as resumed:
+        assert resumed.lines[-1]["event"] == "session_resumed"
+
+
+def test_recordings_without_a_line_are_taken_up_if_whole_and_lost_if_not(
+    start: Callable[..., SessionStore], again: Again, samples_of: Callable[..., Any], protocol: Protocol
+) -> None:
+    """The program was killed before the journal heard of the second, and between frames and samples of the third."""
+    store = start(recordings=True)
+    trials = build_schedule(protocol, "P007", 11).trials[:3]
+    assert store.recorder is not None
+    for trial in trials:
+        told = {name: getattr(trial, name) for name in ("block", "phase", "part", "index", "of", "code")}
+        store.append("trial_started", trial=trial.number, attempt=1, **told)
+    for trial in trials[:2]:
+        store.recorder.start(trial.number, 1, 1000.0)
+        store.recorder.append(samples_of(100 * trial.number))
+        store.recorder.stop()
+    store.recorder.close()
+    store.append("recorded", **event_fields(store))
+    store._journal.close()
+    store._opening.release()
+    torn = store.folder.recordings / ".trial-003.parquet.0123abcd.tmp"
+    torn.write_bytes(b"PAR1")
+    frames = recording_files(store.folder.recordings, 3, 1)[1]
+    write_frames(frames, np.zeros((2, 2), np.int64), {"trial": 3, "attempt": 1})
+    table = store.folder.path / ".receipt.json.89abcdef.tmp"
+    table.write_bytes(b"{")
+
+    with again() as resumed:
+        assert not torn.exists()
+        assert not frames.exists()
+        assert not table.exists()
+        told_of = [line for line in resumed.lines if line["event"] in ("recorded", "recording_lost")]
+        assert [(line["event"], line["trial"]) for line in told_of] == [
+            ("recorded", 1),
+            ("recorded", 2),
+            ("recording_lost", 3),
+        ]
+        assert told_of[1]["samples_recorded"] == 200
+        assert len(read_samples(resumed.folder.path / told_of[1]["recording"])) == 200
+        assert told_of[2]["reason"] == "the program ended before it was whole"
+        recorder = resumed.recorder
+        assert recorder is not None
+        recorder.start(3, 2, 1000.0)
+        recorder.append(samples_of(50))
+    assert (resumed.lines[-1]["event"], resumed.lines[-1]["attempt"]) == ("recorded", 2)
+
+
+def event_fields(store: SessionStore) -> dict[str, Any]:
+    """What the journal would be told of the first recording; the others are not told of."""
+    assert store.recorder is not None
+    return event_of(store.recorder.kept()[0])[1]
+
+
+RACER = """
+import json, sys
+from pathlib import Path
+from study_app.errors import StoreError
+from study_app.protocol.model import Protocol
+from study_app.store.sessions.reopen import reopen
+protocol = Protocol.model_validate(json.loads(sys.argv[1]))
+print("ready", flush=True)
+held = None
+for line in sys.stdin:
+    if held:
+        held.close()
+        held = None
+    try:
+        held = reopen(Path(line.strip()), protocol, sys.argv[2].encode(), operator="", device={}, screens={})
+    except StoreError as error:
+        print("refused", error, flush=True)
+    else:
+        print("open", flush=True)
+"""
+
+
+def test_of_two_programs_that_resume_at_once_never_both_do(
+    tmp_path: Path, start: Callable[..., SessionStore], tables_of_study: Callable[..., dict[str, Any]]
+) -> None:
+    folders = []
+    for number in range(20):
+        with start(f"P{number:03d}") as store:
+            folders.append(store.folder)
+    command = [sys.executable, "-c", RACER, json.dumps(tables_of_study()), SOURCE.decode()]
+    racers = [subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) for _ in range(2)]
+    try:
+        assert [racer.stdout.readline() for racer in racers if racer.stdout] == ["ready\n"] * 2
+        for folder in folders:
+            for racer in racers:
+                assert racer.stdin
+                racer.stdin.write(f"{folder.path}\n")
+                racer.stdin.flush()
+            answers = sorted(racer.stdout.readline() for racer in racers if racer.stdout)
+            resumed = [line for line in journal.read(folder.journal) if line["event"] == "session_resumed"]
+            assert len(resumed) == answers.count("open\n") <= 1
+            assert all("is open in another program" in told for told in answers if told.startswith("refused"))
+    finally:
+        for racer in racers:
+            racer.communicate()
+
+
+KILLED = """
+import sys
+from pathlib import Path
+import numpy as np
+from study_app.haptics.model.layout import SAMPLE
+from study_app.protocol.load import load, source_bytes
+from study_app.store.sessions.begin import begin
+store = begin(
+    Path(sys.argv[1]), load("demo"), source_bytes("demo"), "P001", seed=1, operator="", language="en",
+    device={"name": "mouse"}, screens={}, simulated=True, recordings=True,
+)
+samples = np.zeros(35_000, SAMPLE)
+samples["position_m"] = np.random.default_rng(1).random((35_000, 3))
+for trial in range(1, 1000):
+    told = {"block": "b", "phase": "main", "part": 1, "index": trial, "of": 1000, "code": "L1"}
+    store.append("trial_started", trial=trial, attempt=1, **told)
+    store.recorder.start(trial, 1, 1000.0)
+    for _ in range(3):
+        store.recorder.append(samples)
+    store.recorder.stop()
+    store.append("trial_ended", trial=trial, attempt=1, outcome="complete")
+    item = {"item": "wet", "number": 1, "value": 4, "onset_s": 1.0, "first_s": 2.0, "last_s": 2.0, "changes": 0}
+    store.append("item_shown", t_s=1.0, trial=trial, item="wet")
+    store.append("choice", t_s=2.0, trial=trial, item="wet", value=4)
+    store.append("responses", trial=trial, attempt=1, items=[item])
+    print(trial, flush=True)
+    store.write_tables()
+"""
+
+
+@pytest.mark.parametrize("moment", range(6))
+def test_a_killed_program_leaves_all_acknowledged_answers_and_a_session_that_goes_on(
+    tmp_path: Path, moment: int
+) -> None:
+    """Killed at some moment after so many answers: in the middle of journal, tables and recordings."""
+    study = tmp_path / "study"
+    with subprocess.Popen([sys.executable, "-c", KILLED, str(study)], stdout=subprocess.PIPE, text=True) as program:
+        assert program.stdout
+        acknowledged = [int(program.stdout.readline()) for _ in range(1 + 2 * moment)]
+        program.kill()
+        acknowledged += [int(line) for line in program.stdout if line.endswith("\n")]
+    folder = study / "data" / "sub-P001" / "ses-01"
+    rebuild(folder)
+    with reopen(folder, load("demo"), source_bytes("demo"), operator="", device={}, screens={}) as store:
+        answered = [line["trial"] for line in store.lines if line["event"] == "responses"]
+        store.finish("aborted")
+    assert answered[: len(acknowledged)] == acknowledged
+    assert not list(study.rglob("*.tmp"))
+    findings = verify(study)
+    assert [str(error) for error in findings.errors] == []
+    assert [str(warning) for warning in findings.warnings if "ended before it was whole" not in str(warning)] == []
+    for path in (folder / "recordings").glob("trial-???.parquet"):
+        assert len(read_samples(path)) == 105_000

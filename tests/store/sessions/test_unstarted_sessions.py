@@ -1,0 +1,173 @@
+"""Programs that are killed between claiming a session and its first line: the session can be begun all the same."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from study_app import app
+from study_app.errors import StoreError
+from study_app.store.folders import StudyFolder, check_unused, suggest_id
+from study_app.store.journals import journal_writer
+from study_app.store.sessions import begin, open_session
+from study_app.store.sessions.folder_lock import markers, open_alone
+from study_app.store.sessions.open_session import SessionStore
+from study_app.store.sessions.reopen import reopen
+from study_app.store.sessions.unstarted_sessions import abandoned, never_begun
+from study_app.store.verification.verify_study import verify
+from tests.store.conftest import SOURCE
+
+Start = Callable[..., SessionStore]
+
+KILLED_BEFORE = {
+    "the receipt": (begin.receipt, "write"),
+    "the journal": (begin.Journal, "create"),
+    "the first line": (open_session.SessionStore, "append"),
+}
+
+
+def die(*_given: Any, **_named: Any) -> None:
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def half_a_line(file: Any, content: bytes) -> None:
+    file.write(content[: len(content) // 2])
+    die()
+
+
+def killed(start: Start, participant: str, place: Any, name: str, instead: Callable[..., None] = die) -> None:
+    """Begin a session in a program that dies where it calls ``place.name``."""
+    child = os.fork()
+    if child == 0:
+        setattr(place, name, instead)
+        try:
+            start(participant)
+        finally:
+            os._exit(1)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == -signal.SIGKILL
+
+
+@pytest.fixture
+def study(tmp_path: Path, start: Start) -> StudyFolder:
+    """A study in which P003 was."""
+    with start("P003") as store:
+        store.finish("completed")
+    return StudyFolder(tmp_path / "study")
+
+
+@pytest.fixture(params=[*KILLED_BEFORE, "the end of the first line", "anything was in the folder"])
+def left(request: pytest.FixtureRequest, study: StudyFolder, start: Start) -> StudyFolder:
+    """The study after a program that claimed P004 was killed before the named step."""
+    if not hasattr(os, "fork"):
+        pytest.skip("needs processes that fork")
+    if request.param in KILLED_BEFORE:
+        killed(start, "P004", *KILLED_BEFORE[request.param])
+    elif request.param == "the end of the first line":
+        killed(start, "P004", journal_writer, "write_whole", half_a_line)
+    else:
+        study.session("P004", 1).path.mkdir(parents=True)
+    assert study.session("P004", 1).path.is_dir()
+    return study
+
+
+def test_its_id_is_suggested_again_and_can_be_begun(left: StudyFolder, start: Start, attend: Any) -> None:
+    assert suggest_id(left) == "P004"
+    check_unused(left, "P004", 1)
+    with start("P004") as store:
+        store.append("page_shown", page="consent")
+        assert suggest_id(left) == "P005"
+        store.finish("completed")
+    with pytest.raises(StoreError, match="P004 already has session 1"):
+        start("P004")
+    found = verify(left.path)
+    assert (found.errors, found.warnings) == ((), ())
+    assert (left.session("P004", 1).path / "journal.jsonl").read_text().startswith('{"n":1,"event":"session_started"')
+
+
+def test_going_on_with_it_says_that_it_is_to_be_begun(left: StudyFolder, protocol: Any) -> None:
+    place = left.session("P004", 1)
+    for go_on in (
+        lambda: reopen(place.path, protocol, SOURCE, operator="", device={}, screens={}),
+        lambda: app.resume(place.path),
+    ):
+        with pytest.raises(StoreError, match=r"nothing can go on: begin it as a new session of participant P004"):
+            go_on()
+
+
+def test_while_another_program_takes_it_over_it_is_used(left: StudyFolder, start: Start) -> None:
+    place = left.session("P004", 1)
+    other = open_alone(place.path)
+    before = sorted(place.path.iterdir())
+    with pytest.raises(StoreError, match="P004 already has session 1"):
+        start("P004")
+    assert sorted(place.path.iterdir()) == before
+    other.release()
+    start("P004").close()
+
+
+def test_who_fails_after_taking_it_over_leaves_no_folder(
+    left: StudyFolder, start: Start, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_given: Any, **_named: Any) -> None:
+        raise StoreError("no space")
+
+    monkeypatch.setattr(begin.receipt, "write", full)
+    with pytest.raises(StoreError, match="no space"):
+        start("P004")
+    assert not left.session("P004", 1).path.parent.exists()
+
+
+def test_what_a_program_killed_while_claiming_left_is_swept_with_the_next_claim(
+    study: StudyFolder, start: Start
+) -> None:
+    if not hasattr(os, "fork"):
+        pytest.skip("needs processes that fork")
+    place = study.session("P004", 1).path.parent
+    killed(start, "P004", Path, "rename")  # what makes the folder the session's
+    (half,) = place.iterdir()
+    assert half.name.startswith(".ses-01.")
+    assert markers(half)
+    start("P003", session=2).close()
+    assert half.is_dir(), "another participant's"
+    assert suggest_id(study) == "P004"
+    start("P004").finish("completed")
+    assert [path.name for path in place.iterdir()] == ["ses-01"]
+    assert verify(study.path).errors == ()
+
+
+def test_a_claim_whose_program_lives_or_is_not_known_stays(study: StudyFolder, start: Start) -> None:
+    place = study.session("P004", 1).path.parent
+    claimed, unmarked, old = (place / f".ses-02.{number:08x}.tmp" for number in range(3))
+    for half in (claimed, unmarked, old):
+        half.mkdir(parents=True)
+    open_alone(claimed)
+    os.utime(old, (0, 0))
+    os.utime(claimed, (0, 0))
+    start("P004").close()
+    assert {path.name for path in place.iterdir()} == {claimed.name, unmarked.name, "ses-01"}
+
+
+def test_a_session_that_began_is_never_taken_over(study: StudyFolder, start: Start) -> None:
+    start("P005").close()
+    folder = study.session("P005", 1)
+    assert not never_begun(folder.path)
+    for missing in (folder.receipt, folder.journal):
+        missing.unlink()
+        assert not abandoned(folder.path), "its tables are there"
+        with pytest.raises(StoreError, match="P005 already has session 1"):
+            start("P005")
+
+
+def test_a_damaged_journal_is_no_missing_one(study: StudyFolder, start: Start) -> None:
+    start("P005").close()
+    folder = study.session("P005", 1)
+    for path in folder.path.iterdir():
+        if path.suffix == ".csv":
+            path.unlink()
+    folder.journal.write_bytes(b"#" + folder.journal.read_bytes() + folder.journal.read_bytes())
+    assert not never_begun(folder.path)

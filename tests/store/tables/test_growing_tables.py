@@ -1,0 +1,182 @@
+"""Tables of a running session: each page writes the rows that changed, and a kill leaves the beginning of a table."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from typing import Any, BinaryIO
+
+import numpy as np
+import pytest
+
+from study_app.store import atomic
+from study_app.store.blinded.blinding import reveal
+from study_app.store.journals.cut_journal import refuse_if_cut
+from study_app.store.sessions.begin import SessionStore
+from study_app.store.sessions.open_session import table_files
+from study_app.store.sessions.rebuild import rebuild
+from study_app.store.verification.verify_study import verify
+
+Start = Callable[..., SessionStore]
+PAGES = 5_000
+NOTES = ("first, of two lines\nand a comma", "=1+2", '"quoted"')
+
+
+class Killed(BaseException):
+    """What stops a program between two bytes."""
+
+
+def start_trial(store: SessionStore, number: int, attempt: int = 1) -> None:
+    told = {"block": "b", "phase": "main", "part": 1, "index": number, "of": PAGES, "code": "L1"}
+    store.append("trial_started", trial=number, attempt=attempt, waits=False, **told)
+
+
+def end_trial(store: SessionStore, number: int, summary: dict[str, Any], attempt: int = 1) -> None:
+    store.append("trial_ended", trial=number, attempt=attempt, outcome="complete", waits=False, **summary)
+
+
+def answer(store: SessionStore, number: int, attempt: int = 1) -> None:
+    told = {"number": 1, "value": 4, "onset_s": 1.5, "first_s": 2.25, "last_s": 2.25, "changes": 0}
+    store.append("item_shown", t_s=1.5, trial=number, item="wet", waits=False)
+    store.append("choice", t_s=2.25, trial=number, item="wet", value=4, waits=False)
+    store.append("responses", trial=number, attempt=attempt, items=[{"item": "wet", **told}], waits=False)
+
+
+def recorded(store: SessionStore, number: int, attempt: int = 1) -> None:
+    names = {
+        "recording": f"recordings/trial-{number:03d}.parquet",
+        "recording_frames": f"recordings/trial-{number:03d}_frames.parquet",
+    }
+    counts = {"samples_recorded": 10, "samples_unrecorded": 0, "frames_recorded": 2}
+    hashes = {"sha256": "0" * 64, "frames_sha256": "0" * 64}
+    store.append("recorded", trial=number, attempt=attempt, waits=False, **names, **counts, **hashes)
+
+
+def pages(store: SessionStore, summary: dict[str, Any]) -> list[Callable[[], None]]:
+    """Return what happens between the writings of tables: everything that changes a row, late and early ones too."""
+    return [
+        lambda: start_trial(store, 1),
+        lambda: end_trial(store, 1, summary),
+        lambda: answer(store, 1),
+        lambda: start_trial(store, 2),
+        lambda: recorded(store, 1),
+        lambda: store.append("note", kind="mark", text=NOTES[0]),
+        lambda: None,
+        lambda: store.append("note", kind="note", text=NOTES[1]),
+        lambda: store.append("repeat", trial=2, reason=NOTES[2]),
+        lambda: start_trial(store, 2, 2),
+        lambda: end_trial(store, 2, summary, 2),
+        lambda: answer(store, 2, 2),
+        lambda: start_trial(store, 3),
+        lambda: recorded(store, 2, 2),
+    ]
+
+
+def test_after_every_page_the_tables_are_what_the_journal_gives(start: Start, summary: dict[str, Any]) -> None:
+    with start() as store:
+        for page in pages(store, summary):
+            page()
+            store.write_tables()
+            assert store.behind is None
+            for path, content in table_files(store.place, store.lines, None):
+                assert path.read_bytes() == content
+
+
+def test_sealed_columns_come_in_when_the_key_is_opened_meanwhile(start: Start, summary: dict[str, Any]) -> None:
+    with start() as store:
+        start_trial(store, 1)
+        end_trial(store, 1, summary)
+        store.write_tables()
+        before = store.folder.table("brackish", "trials").read_bytes()
+        reveal(store.place.study_folder.path, "me", "a test")
+        start_trial(store, 2)
+        store.write_tables()
+        for path, content in table_files(store.place, store.lines, store.key):
+            assert path.read_bytes() == content
+        assert b"force_mean_n" not in before
+        assert b"force_mean_n" in store.folder.table("brackish", "trials").read_bytes()
+
+
+def test_a_table_that_somebody_changed_is_written_whole(start: Start, summary: dict[str, Any]) -> None:
+    with start() as store:
+        for number, page in enumerate(pages(store, summary)):
+            page()
+            for path, _ in table_files(store.place, store.lines, None):
+                if number % 2:
+                    path.unlink()
+                else:
+                    path.write_bytes(b"saved by a spreadsheet")
+            start_trial(store, 100 + number)
+            answer(store, 100 + number)
+            store.write_tables()
+            for path, content in table_files(store.place, store.lines, None):
+                assert path.read_bytes() == content
+
+
+def test_killed_between_any_two_bytes_a_table_is_accepted_and_completed(
+    start: Start, summary: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A note of two lines is torn inside its quotes, too."""
+    with start() as store:
+        start_trial(store, 1)
+        store.write_tables()
+        path = store.folder.table("brackish", "trials")
+        before = path.read_bytes()
+        kept = before.index(b"\n") + 1
+        end_trial(store, 1, summary)
+        store.append("note", kind="mark", text=NOTES[0])
+        store.write_tables()
+        whole = path.read_bytes()
+    for size in range(0, len(whole) - kept, 7):
+
+        def torn(file: BinaryIO, content: bytes, size: int = size) -> None:
+            file.write(content[:size])
+            raise Killed
+
+        path.write_bytes(before)
+        with monkeypatch.context() as killed:
+            killed.setattr(atomic, "write_whole", torn)
+            with pytest.raises(Killed):
+                atomic.replace_end(path, kept, whole[kept:])
+        assert path.read_bytes() == whole[: kept + size]
+        found = verify(store.place.study_folder.path)
+        assert found.errors == ()
+        assert any("is not what the journal gives" in one.message for one in found.warnings)
+        refuse_if_cut(store.place, store.lines)
+        assert path in rebuild(store.folder.path).rewritten
+        assert path.read_bytes() == whole
+
+
+def test_on_a_disk_that_fills_a_table_keeps_its_rows(
+    start: Start, summary: dict[str, Any], files_up_to: Callable[[int], AbstractContextManager[None]]
+) -> None:
+    with start() as store:
+        start_trial(store, 1)
+        store.write_tables()
+        path = store.folder.table("brackish", "trials")
+        before = path.read_bytes()
+        end_trial(store, 1, summary)
+        with files_up_to(len(before) + 3):
+            store.write_tables()
+        assert "cannot be written (File too large)" in str(store.behind)
+        assert path.read_bytes() == before
+        store.write_tables()
+        assert store.behind is None
+        assert path.read_bytes() == dict(table_files(store.place, store.lines, None))[path]
+
+
+def test_a_page_takes_as_long_after_5000_pages_as_at_the_beginning(start: Start, summary: dict[str, Any]) -> None:
+    took_s = np.empty(PAGES)
+    with start() as store:
+        for number in range(1, PAGES + 1):
+            start_trial(store, number)
+            end_trial(store, number, summary)
+            answer(store, number)
+            began = time.perf_counter()
+            store.write_tables()
+            took_s[number - 1] = time.perf_counter() - began
+        assert store.behind is None
+        for path, content in table_files(store.place, store.lines, None):
+            assert path.read_bytes() == content
+    assert np.median(took_s[-500:]) < 2 * np.median(took_s[:500])

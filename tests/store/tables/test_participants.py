@@ -1,0 +1,209 @@
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from study_app.errors import StoreError
+from study_app.gui.sessions.facts import sessions
+from study_app.store.folders import StudyFolder
+from study_app.store.journals import journal
+from study_app.store.sessions.begin import SessionStore
+from study_app.store.sessions.rebuild import rebuild
+from study_app.store.tables import participants
+from study_app.store.verification.verify_study import verify
+
+
+def table(folder: Path) -> list[dict[str, str]]:
+    path = StudyFolder(folder).participants("brackish")
+    return list(csv.DictReader(io.StringIO(path.read_text(encoding="utf-8"), newline="")))
+
+
+def test_every_session_has_its_row_and_its_status(
+    tmp_path: Path, start: Callable[..., SessionStore], attend: Callable[[SessionStore], None]
+) -> None:
+    store = start("P002")
+    attend(store)
+    store.finish("completed")
+    start("P001").finish("withdrawn", "tired")
+    start("P001", session=2).close()
+    rows = table(tmp_path / "study")
+    assert [(row["participant"], row["session"], row["status"]) for row in rows] == [
+        ("P001", "1", "withdrawn"),
+        ("P001", "2", "unfinished"),
+        ("P002", "1", "completed"),
+    ]
+    assert (rows[2]["trials"], rows[2]["responses"], rows[2]["validity"]) == ("4", "12", "valid")
+    assert (rows[2]["device"], rows[2]["language"]) == ("scripted", "en")
+    assert rows[1]["session_ended_at"] == "n/a"
+
+
+def test_no_name_or_initials_are_in_it(tmp_path: Path, start: Callable[..., SessionStore]) -> None:
+    start("P001", operator="ZQX").finish("completed")
+    assert "ZQX" not in StudyFolder(tmp_path / "study").participants("brackish").read_text(encoding="utf-8")
+
+
+def test_a_damaged_journal_stops_nobody_and_is_marked(
+    tmp_path: Path, start: Callable[..., SessionStore], attend: Callable[[SessionStore], None]
+) -> None:
+    store = start("P001")
+    attend(store)
+    store.finish("completed")
+    lines = store.folder.journal.read_bytes().split(b"\n")
+    lines[5] = b"\0" * 30
+    store.folder.journal.write_bytes(b"\n".join(lines))
+    start("P002").finish("completed")
+    assert [row["status"] for row in table(tmp_path / "study")] == ["damaged", "completed"]
+
+
+def without_field(name: str) -> Callable[[list[dict[str, Any]]], None]:
+    return lambda lines: lines[0].pop(name)
+
+
+def beginning_late(lines: list[dict[str, Any]]) -> None:
+    lines[0]["event"] = "session_resumed"
+
+
+def about_a_trial_that_never_started(lines: list[dict[str, Any]]) -> None:
+    next(line for line in lines if line["event"] == "trial_ended")["trial"] = 99
+
+
+@pytest.mark.parametrize(
+    "damage", [without_field("pilot"), without_field("participant"), beginning_late, about_a_trial_that_never_started]
+)
+def test_a_journal_that_gives_no_row_stops_no_other_session_and_is_marked(
+    tmp_path: Path,
+    start: Callable[..., SessionStore],
+    attend: Callable[[SessionStore], None],
+    damage: Callable[[list[dict[str, Any]]], None],
+) -> None:
+    store = start("P001")
+    attend(store)
+    store.finish("completed")
+    lines = journal.read(store.folder.journal)
+    damage(lines)
+    store.folder.journal.write_text("".join(json.dumps(line) + "\n" for line in lines), encoding="utf-8")
+    start("P002").finish("completed")
+    first, second = table(tmp_path / "study")
+    assert (first["participant"], first["session"], first["status"]) == ("P001", "1", "damaged")
+    assert (second["participant"], second["status"]) == ("P002", "completed")
+    assert not verify(tmp_path / "study").sound
+    with pytest.raises(StoreError):
+        rebuild(store.folder.path)
+
+
+def test_a_claimed_folder_without_a_journal_has_no_row(tmp_path: Path, start: Callable[..., SessionStore]) -> None:
+    (tmp_path / "study" / "data" / "sub-P001" / "ses-01").mkdir(parents=True)
+    begun = tmp_path / "study" / "data" / "sub-P003" / "ses-01"
+    begun.mkdir(parents=True)
+    (begun / "journal.jsonl").touch()
+    start("P002").finish("completed")
+    assert [row["participant"] for row in table(tmp_path / "study")] == ["P002"]
+
+
+def test_of_two_programs_the_last_to_write_has_seen_both(
+    tmp_path: Path, start: Callable[..., SessionStore], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """While P001's program is between reading the journals and writing the table, P002's session ends and writes."""
+    write, other = participants.write_file, start("P002")
+    store = start("P001")
+
+    def late(path: Path, content: bytes) -> None:
+        monkeypatch.setattr(participants, "write_file", write)
+        other.finish("withdrawn")
+        write(path, content)
+
+    monkeypatch.setattr(participants, "write_file", late)
+    store.finish("completed")
+    assert [row["status"] for row in table(tmp_path / "study")] == ["completed", "withdrawn"]
+
+
+def into_a_folder(path: Path) -> None:
+    path.unlink()
+    path.mkdir()
+
+
+def into_a_link_to_itself(path: Path) -> None:
+    path.unlink()
+    path.symlink_to(path)
+
+
+def into_a_link_out_of_the_study(path: Path) -> None:
+    path.symlink_to(path.rename(path.parents[4] / "elsewhere"))
+
+
+@pytest.mark.parametrize("name", ["journal.jsonl", "checksums.sha256", "receipt.json"])
+@pytest.mark.parametrize("turn", [into_a_folder, into_a_link_to_itself, into_a_link_out_of_the_study])
+def test_a_file_that_cannot_be_read_hides_no_session_and_stops_none(
+    tmp_path: Path,
+    start: Callable[..., SessionStore],
+    attend: Callable[[SessionStore], None],
+    turn: Callable[[Path], None],
+    name: str,
+) -> None:
+    store = start("P001")
+    attend(store)
+    store.finish("completed")
+    turn(store.folder.path / name)
+    start("P002").finish("completed")
+    there = "damaged" if name == "journal.jsonl" else "completed"
+    assert [row["status"] for row in table(tmp_path / "study")] == [there, "completed"]
+    assert [one.participant for one in sessions(tmp_path, {})] == ["P001", "P002"]
+    findings = verify(tmp_path / "study")
+    assert findings.sessions == 2
+    assert any("P001/ses-01" in str(error) and name in str(error) for error in findings.errors)
+    assert not any("P002" in str(error) for error in findings.errors)
+
+
+def age(study: Path, by_s: float) -> None:
+    """Let the study's files be from long ago, the table of participants a minute later than the others."""
+    for path in study.rglob("*"):
+        later = 60.0 if path.name.endswith("participants_data.csv") else 0.0
+        moment = path.stat().st_mtime - by_s + later
+        os.utime(path, (moment, moment))
+
+
+def test_a_list_reads_no_journal_that_is_older_than_the_table(
+    tmp_path: Path,
+    start: Callable[..., SessionStore],
+    attend: Callable[[SessionStore], None],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    for name in ("P001", "P002", "P003", "P004"):
+        store = start(name)
+        attend(store)
+        store.finish("completed")
+    study = StudyFolder(tmp_path / "study")
+    age(study.path, 3600.0)
+    rows = participants.participants(study)
+    with monkeypatch.context() as unread:
+        unread.setattr(journal, "scan", None)
+        assert participants.participants_at_once(study) == rows
+    damaged, gone, _, running = study.sessions()
+    damaged.journal.write_bytes(damaged.journal.read_bytes().replace(b"complete", b"commplete", 1))
+    gone.journal.unlink()
+    with running.journal.open("ab") as file:
+        file.write(b"torn")
+    start("P005").close()
+    age(study.path, 0.0)
+    known = participants.participants(study)
+    assert participants.participants_at_once(study) == known
+    assert [row["status"] for row in known] == ["damaged", "damaged", "completed", "completed", "unfinished"]
+
+
+@pytest.mark.parametrize("content", [b"", b"study\nx\n", b"\xff\xfe", b'"', None])
+def test_a_table_that_is_none_hides_no_session(
+    tmp_path: Path, start: Callable[..., SessionStore], content: bytes | None
+) -> None:
+    start("P001").finish("completed")
+    study = StudyFolder(tmp_path / "study")
+    path = study.participants("brackish")
+    path.write_bytes(path.read_bytes().replace(b",1,", b",one,") if content is None else content)
+    age(study.path, 3600.0)
+    assert participants.participants_at_once(study) == participants.participants(study)

@@ -1,0 +1,344 @@
+from __future__ import annotations
+
+import csv
+import io
+import math
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from study_app.errors import StoreError
+from study_app.store.journals.journal import read
+from study_app.store.progress import progress_of
+from study_app.store.sessions.begin import SessionStore
+from study_app.store.tables.columns import MISSING, RESPONSES, TABLES, TRIALS, Column, header, unsealed, variable
+from study_app.store.tables.formulas import guarded
+from study_app.store.tables.session_tables import (
+    csv_bytes,
+    in_columns_of,
+    latest,
+    participant,
+    read_table,
+    responses,
+    trials,
+)
+
+NASTY = [
+    "plain",
+    "comma, inside",
+    'a "quoted" word',
+    '"',
+    "two\nlines",
+    "windows\r\nlines",
+    "old\rmac",
+    "tab\tinside",
+    "emoji 🌊👩‍🔬",
+    "=SUM(A1:A9)",
+    "-1+1",
+    " spaces around ",
+    "x" * 10_000,
+    "N,A\"\n'; é",
+]
+
+TEXT = (Column("first", "text", "One."), Column("second", "text", "Two."))
+
+
+class Script:
+    """Journal lines in the making."""
+
+    def __init__(self, **session: Any) -> None:
+        self.lines: list[dict[str, Any]] = []
+        told = {"study": "brackish", "participant": "P007", "session": 1, "simulated": False, "pilot": False}
+        self.add("session_started", **told, language="en", device="mouse", **session)
+
+    def add(self, event: str, **fields: Any) -> None:
+        n = len(self.lines) + 1
+        at = f"2026-03-01T10:00:{n:02d}.000+01:00"
+        self.lines.append({"n": n, "event": event, "t_s": float(n), "at": at, **fields})
+
+    def trial(self, trial: int, attempt: int = 1, phase: str = "main") -> None:
+        told = {"block": "liquids", "phase": phase, "part": 1, "index": trial, "of": 3, "code": f"L{trial}"}
+        self.add("trial_started", trial=trial, attempt=attempt, **told)
+
+    def end(self, trial: int, attempt: int = 1, outcome: str = "complete", **summary: Any) -> None:
+        self.add("trial_ended", trial=trial, attempt=attempt, outcome=outcome, **summary)
+
+    def answer(self, trial: int, *values: int | None, attempt: int = 1) -> None:
+        items = [
+            {"item": f"i{n}", "number": n, "value": v, "onset_s": 1.0, "first_s": 2.0, "last_s": 3.0, "changes": 1}
+            for n, v in enumerate(values, start=1)
+        ]
+        self.add("responses", trial=trial, attempt=attempt, items=items)
+
+
+@pytest.mark.parametrize("text", NASTY)
+def test_text_comes_back_through_the_csv_module_and_pandas(text: str) -> None:
+    content = csv_bytes(TEXT, [{"first": text, "second": "end"}, {"first": "next", "second": text}])
+    read_back = list(csv.reader(io.StringIO(content.decode("utf-8"), newline="")))
+    cell = guarded(text)
+    assert read_back == [["first", "second"], [cell, "end"], ["next", cell]]
+    frame = pd.read_csv(io.BytesIO(content), dtype=str, keep_default_na=False)
+    assert frame["first"].to_list() == [cell, "next"]
+    assert frame["second"].to_list() == ["end", cell]
+
+
+@given(texts=st.lists(st.tuples(st.text(st.characters(codec="utf-8")), st.text(st.characters(codec="utf-8")))))
+def test_any_text_comes_back_through_the_csv_module(texts: list[tuple[str, str]]) -> None:
+    content = csv_bytes(TEXT, [{"first": first, "second": second} for first, second in texts])
+    read_back = list(csv.reader(io.StringIO(content.decode("utf-8"), newline="")))
+    assert read_back == [["first", "second"], *([guarded(first), guarded(second)] for first, second in texts)]
+    kept = [
+        {name: None if text == MISSING else text for name, text in zip(header(TEXT), row, strict=True)} for row in texts
+    ]
+    assert read_table(content, TEXT) == kept
+
+
+@given(number=st.floats(allow_nan=False, allow_infinity=False))
+def test_numbers_are_written_in_full_with_a_point(number: float) -> None:
+    cell = csv_bytes(TEXT[:1], [{"first": number}]).decode().splitlines()[1]
+    assert float(cell) == number
+    assert "," not in cell
+
+
+@pytest.mark.parametrize(
+    ("value", "cell"),
+    [(None, "n/a"), (math.nan, "n/a"), (-math.inf, "n/a"), (True, "true"), (False, "false"), (7, "7")],
+)
+def test_what_is_not_known_or_not_a_text_has_one_spelling(value: Any, cell: str) -> None:
+    assert csv_bytes(TEXT[:1], [{"first": value}]) == f"first\n{cell}\n".encode()
+
+
+def test_every_column_of_trials_reads_back_as_what_was_written(summary: dict[str, Any]) -> None:
+    script = Script()
+    script.trial(1)
+    script.end(1, **summary)
+    script.add("note", kind="mark", text="-1 and more")
+    rows = trials(script.lines)
+    content = csv_bytes(TRIALS, rows)
+    assert b",'-1 and more\n" in content
+    assert read_table(content, TRIALS) == rows
+
+
+def test_a_table_that_was_written_before_texts_were_guarded_is_what_the_journal_gives() -> None:
+    now = csv_bytes(TEXT, [{"first": "=1+2", "second": 'a, "b"'}, {"first": "'", "second": "+"}])
+    early = now.replace(b"'=", b"=").replace(b"'+", b"+")
+    assert early != now
+    assert in_columns_of(early, now, TEXT) == (early, TEXT)
+    changed = early.replace(b"=1+2", b"=1+3")
+    assert in_columns_of(changed, now, TEXT) == (now, TEXT)
+
+
+def test_half_a_surrogate_pair_does_not_stop_a_table() -> None:
+    assert csv_bytes(TEXT[:1], [{"first": "half \ud83c"}]) == b"first\nhalf ?\n"
+
+
+def test_a_response_is_a_row_with_its_trial() -> None:
+    script = Script()
+    script.trial(1)
+    script.end(1)
+    script.answer(1, 6, None)
+    rows = responses(script.lines)
+    assert [tuple(row) for row in rows] == [header(RESPONSES)] * 2
+    assert rows[0] == {
+        "study": "brackish",
+        "participant": "P007",
+        "session": 1,
+        "simulated": False,
+        "pilot": False,
+        "trial": 1,
+        "attempt": 1,
+        "block": "liquids",
+        "phase": "main",
+        "part": 1,
+        "index": 1,
+        "code": "L1",
+        "item": "i1",
+        "number": 1,
+        "response": 6,
+        "cannot_judge": False,
+        "onset_s": 1.0,
+        "first_choice_s": 2.0,
+        "last_change_s": 3.0,
+        "changes": 1,
+        "answered_at": "2026-03-01T10:00:04.000+01:00",
+    }
+    assert (rows[1]["response"], rows[1]["cannot_judge"]) == (None, True)
+
+
+def test_a_trial_is_a_row_with_what_was_measured(summary: dict[str, Any]) -> None:
+    script = Script()
+    script.trial(1)
+    script.end(1, **summary)
+    (row,) = trials(script.lines)
+    assert tuple(row) == header(TRIALS)
+    assert summary.items() < row.items()
+    assert (row["trial"], row["of"], row["outcome"], row["marked"], row["notes"]) == (1, 3, "complete", False, None)
+    assert (row["trial_started_at"], row["trial_started_s"]) == ("2026-03-01T10:00:02.000+01:00", 2.0)
+
+
+def test_a_running_trial_has_no_outcome_and_a_left_one_is_interrupted() -> None:
+    script = Script()
+    script.trial(1)
+    assert [row["outcome"] for row in trials(script.lines)] == [None]
+    script.trial(1, attempt=2)
+    script.end(1, attempt=2, outcome="timeout")
+    script.trial(2)
+    assert [row["outcome"] for row in trials(script.lines)] == ["interrupted", "timeout", None]
+    script.add("session_ended", status="withdrawn", reason="")
+    assert [row["outcome"] for row in trials(script.lines)] == ["interrupted", "timeout", "interrupted"]
+
+
+def test_notes_and_marks_stay_with_the_trial_they_were_made_in() -> None:
+    script = Script()
+    script.add("note", kind="note", text="before any trial")
+    script.trial(1)
+    script.add("note", kind="note", text="sneezed, twice")
+    script.end(1)
+    script.add("note", kind="mark", text="")
+    script.add("repeat", trial=1, reason="door")
+    script.trial(1, attempt=2)
+    assert [(row["marked"], row["notes"]) for row in trials(script.lines)] == [
+        (True, "sneezed, twice\nrepeated: door"),
+        (False, None),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("measured", "valid"),
+    [
+        ({"lateness_p99_ms": 2.0, "worst_gap_ms": 20.0, "delay_error_p95_ms": 25.0}, True),
+        ({"lateness_p99_ms": 2.1, "worst_gap_ms": 1.0, "delay_error_p95_ms": 1.0}, False),
+        ({"lateness_p99_ms": 0.1, "worst_gap_ms": 20.5, "delay_error_p95_ms": 1.0}, False),
+        ({"lateness_p99_ms": 0.1, "worst_gap_ms": 1.0, "delay_error_p95_ms": -30.0}, False),
+        ({"lateness_p99_ms": 0.1, "worst_gap_ms": 1.0, "delay_error_p95_ms": None}, True),
+        ({"lateness_p99_ms": 0.1, "withheld_share": 0.05}, True),
+        ({"lateness_p99_ms": 0.1, "withheld_share": 0.0501}, False),
+        ({"lateness_p99_ms": 0.1, "withheld_share": None}, True),
+        ({"lateness_p99_ms": 0.1, "targets_reached": 3, "targets": 6}, True),
+        ({"lateness_p99_ms": 0.1, "targets_reached": 2, "targets": 6}, False),
+        ({"targets_reached": 0, "targets": 6}, False),
+        ({"lateness_p99_ms": 0.1, "targets_reached": 9, "targets": None}, True),
+        ({}, None),
+    ],
+)
+def test_a_trial_is_valid_within_the_protocols_limits(measured: dict[str, float], *, valid: bool | None) -> None:
+    limits = {"lateness_ms": 2, "worst_gap_ms": 20, "delay_error_ms": 25, "withheld_percent": 5, "targets_percent": 50}
+    script = Script(limits=limits)
+    script.trial(1)
+    script.end(1, **measured)
+    assert trials(script.lines)[0]["valid"] is valid
+    assert participant(script.lines)["validity"] == (None if valid is None else "valid" if valid else "invalid")
+
+
+def test_a_participants_row_counts_main_trials_and_their_last_attempt() -> None:
+    script = Script()
+    script.trial(1, phase="practice")
+    script.end(1)
+    script.answer(1, 1)
+    script.trial(2)
+    script.end(2, outcome="interrupted")
+    script.trial(2, attempt=2)
+    script.end(2, attempt=2)
+    script.answer(2, 7, None, 3, attempt=2)
+    script.trial(3)
+    unfinished = participant(script.lines)
+    assert (unfinished["status"], unfinished["session_ended_at"]) == ("unfinished", None)
+    assert (unfinished["trials"], unfinished["responses"]) == (1, 3)
+    script.add("session_ended", status="withdrawn", reason="tired")
+    ended = participant(script.lines)
+    assert tuple(ended) == header(TABLES["participants"])
+    assert (ended["status"], ended["session_ended_at"]) == ("withdrawn", script.lines[-1]["at"])
+
+
+def test_the_latest_attempt_of_each_trial_is_kept_in_order() -> None:
+    rows = [{"trial": trial, "attempt": attempt} for trial, attempt in [(1, 1), (2, 1), (1, 2), (3, 1)]]
+    assert latest(rows) == [rows[1], rows[2], rows[3]]
+
+
+@pytest.mark.parametrize("lines", [[], [{"n": 1, "event": "page_shown"}]])
+def test_lines_that_are_no_session_are_refused(lines: list[dict[str, Any]]) -> None:
+    with pytest.raises(StoreError, match="does not begin with session_started"):
+        trials(lines)
+
+
+def test_the_end_of_a_trial_that_never_started_is_refused() -> None:
+    script = Script()
+    script.end(4)
+    with pytest.raises(StoreError, match="line 2 is about trial 4, which never started"):
+        trials(script.lines)
+
+
+def test_cannot_judge_is_an_answer_and_a_statement_left_out_is_none() -> None:
+    script = Script()
+    script.trial(1)
+    script.end(1)
+    script.answer(1, 7, None, None)
+    script.lines[-1]["items"][2] |= {"first_s": None, "last_s": None, "changes": 0}
+    assert [row["cannot_judge"] for row in responses(script.lines)] == [False, True, False]
+    assert participant(script.lines)["responses"] == 2
+
+
+def test_headers_are_the_same_bytes_for_every_participant(
+    start: Callable[..., SessionStore], attend: Callable[[SessionStore], None]
+) -> None:
+    """Whether one answered everything, another nothing and a third stopped at once."""
+    heads: dict[str, set[bytes]] = {"responses": set(), "trials": set()}
+    for name in ("P001", "P002", "P003"):
+        store = start(name)
+        if name == "P001":
+            attend(store)
+        if name == "P002":
+            store.append(
+                "trial_started", trial=1, attempt=1, block="b", phase="main", part=None, index=1, of=1, code="L1"
+            )
+        store.finish("completed")
+        for table, seen in heads.items():
+            seen.add(store.folder.table("brackish", table).read_bytes().split(b"\n")[0])
+    assert heads == {table: {",".join(header(unsealed(TABLES[table]))).encode()} for table in heads}
+
+
+def test_every_cell_of_a_session_matches_its_columns_pattern(
+    start: Callable[..., SessionStore], attend: Callable[[SessionStore], None]
+) -> None:
+    store = start()
+    attend(store)
+    store.append("note", kind="note", text="a\nb")
+    store.finish("completed")
+    for name, path in {
+        "participants": store.place.study_folder.participants("brackish"),
+        "responses": store.folder.table("brackish", "responses"),
+        "trials": store.folder.table("brackish", "trials"),
+    }.items():
+        rows = list(csv.DictReader(io.StringIO(path.read_text(encoding="utf-8"), newline="")))
+        assert rows
+        for column in unsealed(TABLES[name]):
+            for row in rows:
+                assert re.fullmatch(variable(column)["valuePattern"], row[column.name]), (column.name, row)
+
+
+def test_tables_come_from_the_journal_alone(
+    tmp_path: Path, start: Callable[..., SessionStore], attend: Callable[[SessionStore], None]
+) -> None:
+    store = start()
+    attend(store)
+    store.finish("completed")
+    lines = read(store.folder.journal)
+    for name, rows in (("responses", responses(lines)), ("trials", trials(lines))):
+        path = store.folder.table("brackish", name)
+        assert path.read_bytes() == csv_bytes(unsealed(TABLES[name]), rows)
+    assert len(responses(lines)) == 12
+
+
+def test_the_language_is_the_one_that_was_read_in_last() -> None:
+    script = Script()
+    assert participant(script.lines)["language"] == "en"
+    script.add("language_chosen", language="nl")
+    assert participant(script.lines)["language"] == "nl"
+    script.add("language_chosen", language="de")
+    assert (participant(script.lines)["language"], progress_of(script.lines).language) == ("de", "de")

@@ -1,0 +1,244 @@
+from __future__ import annotations
+
+import json
+import struct
+import subprocess
+import sys
+import zlib
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pyarrow import parquet
+
+from study_app.errors import StoreError
+from study_app.haptics.model.layout import SAMPLE
+from study_app.store import recording_files
+from study_app.store.recording_files import SamplesFile, Written, read_checks, read_facts, read_frames, read_samples
+from study_app.store.tables.recorded_columns import FRAMES, SAMPLES
+
+Make = Callable[..., np.ndarray[Any, Any]]
+FullDisk = Callable[[int], AbstractContextManager[None]]
+
+EXACT = ("tick", "time_ns", "lateness_ns", "fresh", "buttons", "limiters", "scene", "status", "position_m")
+FACTS = {"participant": "P007", "trial": 3}
+
+
+def write(path: Path, samples: Any, rate_hz: float = 1000.0) -> Written:
+    file = SamplesFile(path, FACTS, rate_hz)
+    for first in range(0, len(samples), file.group_rows):
+        file.write(samples[first : first + file.group_rows])
+    return file.finish(dropped=0)
+
+
+def names_in(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir())
+
+
+def test_times_and_places_come_back_to_the_last_bit_and_the_rest_to_its_step(tmp_path: Path, samples_of: Make) -> None:
+    samples = samples_of(61_234)
+    written = write(tmp_path / "trial-003.parquet", samples)
+    read = read_samples(written.path)
+    assert read.dtype.fields == SAMPLE.fields
+    assert (written.rows, len(read)) == (61_234, 61_234)
+    for name in EXACT:
+        assert np.array_equal(read[name], samples[name]), name
+    assert not read["busy_ns"].any()
+    for name in ("velocity_mps", "wake_mps"):
+        assert np.abs(read[name] - samples[name]).max() <= 2.0**-13
+    for name in ("force_n", "device_force_n"):
+        assert np.abs(read[name] - samples[name]).max() <= 2.0**-15
+    assert read["device_force_n"][0].tolist() == samples["device_force_n"][0].tolist()
+    untouched = (samples["device_force_n"] == samples["force_n"]).all(axis=1)
+    untouched[0] = False
+    assert (read["device_force_n"][untouched] == read["force_n"][untouched]).all()
+
+
+def test_numbers_of_a_fault_come_back_as_they_are(tmp_path: Path, samples_of: Make) -> None:
+    samples = samples_of(4)
+    samples["position_m"][1] = np.nan
+    samples["velocity_mps"][1] = [np.inf, -np.inf, np.nan]
+    samples["force_n"][1] = [np.nan, np.inf, 1e300]
+    samples["device_force_n"][1] = [0.5, 0.25, 0.0]
+    read = read_samples(write(tmp_path / "trial-003.parquet", samples).path)
+    assert np.isnan(read["position_m"][1]).all()
+    assert np.array_equal(read["velocity_mps"][1], [np.inf, -np.inf, np.nan], equal_nan=True)
+    assert np.array_equal(read["force_n"][1], [np.nan, np.inf, np.inf], equal_nan=True)
+    assert read["device_force_n"][1].tolist() == [0.5, 0.25, 0.0]
+
+
+def test_a_first_force_that_is_no_number_is_none(tmp_path: Path, samples_of: Make) -> None:
+    samples = samples_of(2)
+    samples["device_force_n"][0] = [np.nan, 0.0, 0.0]
+    read = read_samples(write(tmp_path / "trial-003.parquet", samples).path)
+    assert np.array_equal(read["device_force_n"][0], [np.nan, 0.0, 0.0], equal_nan=True)
+
+
+@given(
+    position=st.lists(st.floats(width=64), min_size=3, max_size=3),
+    time_ns=st.integers(-(2**62), 2**62),
+    force=st.lists(st.floats(-200, 200), min_size=3, max_size=3),
+)
+def test_any_place_and_time_is_kept(
+    tmp_path_factory: pytest.TempPathFactory, position: list[float], time_ns: int, force: list[float]
+) -> None:
+    samples = np.zeros(3, SAMPLE)
+    samples["position_m"][1], samples["time_ns"][1], samples["force_n"][1] = position, time_ns, force
+    read = read_samples(write(tmp_path_factory.mktemp("recording") / "trial-001.parquet", samples).path)
+    assert read["position_m"].tobytes() == samples["position_m"].tobytes()
+    assert read["time_ns"].tolist() == [0, time_ns, 0]
+    assert np.abs(read["force_n"][1] - force).max() <= 2.0**-15
+
+
+def test_the_checks_are_those_of_the_exact_forces_second_by_second(tmp_path: Path, samples_of: Make) -> None:
+    samples = samples_of(32_500)
+    checks = read_checks(write(tmp_path / "trial-003.parquet", samples).path)
+    assert checks.rows == 1000
+    assert len(checks.device_force) == len(checks.effect_force) == 33
+    for found, name in ((checks.device_force, "device_force_n"), (checks.effect_force, "force_n")):
+        for second, check in enumerate(found):
+            rows = samples[name][1000 * second : 1000 * (second + 1)]
+            exact = b"".join(struct.pack("<3d", *row) for row in rows.tolist())
+            assert check == zlib.crc32(exact)
+    samples["force_n"][7_500, 1] = np.nextafter(samples["force_n"][7_500, 1], 99)
+    changed = read_checks(write(tmp_path / "again.parquet", samples).path)
+    assert [second for second in range(33) if changed.effect_force[second] != checks.effect_force[second]] == [7]
+    assert changed.device_force == checks.device_force
+
+
+def test_half_an_hour_takes_at_most_sixty_megabytes(tmp_path: Path, samples_of: Make) -> None:
+    """Of places with every digit at random, as an analogue device has them; encoders take half of it."""
+    size = write(tmp_path / "trial-003.parquet", samples_of(90_000)).path.stat().st_size
+    assert size / 90_000 * 1_800_000 <= 60e6
+
+
+def test_a_recording_says_what_it_is_without_being_read(tmp_path: Path, samples_of: Make) -> None:
+    facts = read_facts(write(tmp_path / "trial-003.parquet", samples_of(2_500), rate_hz=500).path)
+    assert facts.pop("crc32")["rows"] == 500
+    assert facts.pop("first_device_force_n") == facts.pop("first_command_n")
+    assert facts == {"format": 2, "kind": "samples", **FACTS, "rate_hz": 500, "dropped": 0, "rows": 2_500}
+
+
+def test_any_reader_of_parquet_finds_columns_with_unit_and_meaning(tmp_path: Path, samples_of: Make) -> None:
+    written = write(tmp_path / "trial-003.parquet", samples_of(100))
+    frames = recording_files.write_frames(tmp_path / "frames.parquet", np.array([[5, 3]]), FACTS)
+    for path, columns in ((written.path, SAMPLES), (frames.path, FRAMES)):
+        schema = parquet.read_schema(path)
+        assert schema.names == [column.name for column in columns]
+        for column in columns:
+            told = schema.field(column.name).metadata
+            assert told[b"description"].decode() == column.description
+            assert told.get(b"unit", b"").decode() == column.unit
+
+
+def test_frames_come_back_with_their_age(tmp_path: Path) -> None:
+    shown = np.array([[10**15 + 16_666_667 * i, 10**15 + 16_666_667 * i - 4_000_000 - i] for i in range(1000)])
+    written = recording_files.write_frames(tmp_path / "trial-003_frames.parquet", shown, FACTS)
+    read = read_frames(written.path)
+    assert np.array_equal(read["painted_ns"], shown[:, 0])
+    assert np.array_equal(read["sample_ns"], shown[:, 1])
+    assert np.array_equal(read["age_ns"], shown[:, 0] - shown[:, 1])
+
+
+def test_nothing_recorded_is_a_file_of_no_rows(tmp_path: Path) -> None:
+    samples = write(tmp_path / "trial-003.parquet", np.zeros(0, SAMPLE))
+    frames = recording_files.write_frames(tmp_path / "frames.parquet", np.zeros((0, 2), np.int64), FACTS)
+    assert (len(read_samples(samples.path)), len(read_frames(frames.path))) == (0, 0)
+    assert read_checks(samples.path).device_force == ()
+
+
+def test_it_is_not_there_before_it_is_whole(tmp_path: Path, samples_of: Make) -> None:
+    file = SamplesFile(tmp_path / "trial-003.parquet", FACTS, 1000.0)
+    file.write(samples_of(30_000))
+    assert [name.endswith(".tmp") for name in names_in(tmp_path)] == [True]
+    file.finish()
+    assert names_in(tmp_path) == ["trial-003.parquet"]
+
+
+def test_what_is_abandoned_leaves_nothing(tmp_path: Path, samples_of: Make) -> None:
+    file = SamplesFile(tmp_path / "trial-003.parquet", FACTS, 1000.0)
+    file.write(samples_of(30_000))
+    file.abandon()
+    assert names_in(tmp_path) == []
+
+
+@pytest.mark.parametrize("room", [10_000, 1_200_000])
+def test_a_full_disk_is_told_and_leaves_nothing(
+    tmp_path: Path, samples_of: Make, files_up_to: FullDisk, room: int
+) -> None:
+    file = SamplesFile(tmp_path / "trial-003.parquet", FACTS, 1000.0)
+
+    def fill() -> None:
+        for _ in range(9):
+            file.write(samples_of(30_000))
+
+    with files_up_to(room):
+        with pytest.raises(OSError, match="File too large"):
+            fill()
+        file.abandon()
+    assert names_in(tmp_path) == []
+
+
+def test_frames_that_do_not_fit_leave_nothing(tmp_path: Path, files_up_to: FullDisk) -> None:
+    shown = np.random.default_rng(1).integers(0, 2**60, (50_000, 2))
+    with files_up_to(10_000), pytest.raises(OSError, match="File too large"):
+        recording_files.write_frames(tmp_path / "frames.parquet", shown, FACTS)
+    assert names_in(tmp_path) == []
+
+
+def test_what_is_no_recording_is_named(tmp_path: Path, samples_of: Make) -> None:
+    samples = write(tmp_path / "trial-003.parquet", samples_of(100)).path
+    frames = recording_files.write_frames(tmp_path / "frames.parquet", np.array([[5, 3]]), FACTS).path
+    other = tmp_path / "other.parquet"
+    parquet.write_table(pa.table({"x": pa.array([1])}), other)
+    torn = tmp_path / "torn.parquet"
+    torn.write_bytes(samples.read_bytes()[:-20])
+    for act, path, told in (
+        (read_frames, samples, "holds samples, not frames"),
+        (read_samples, frames, "holds frames, not samples"),
+        (read_checks, frames, "holds frames, not samples"),
+        (read_samples, other, "is no recording of ours"),
+        (read_samples, torn, "is damaged"),
+        (read_facts, torn, "is damaged"),
+        (read_samples, tmp_path / "none.parquet", "cannot be read"),
+        (read_facts, tmp_path / "none.parquet", "cannot be read"),
+    ):
+        with pytest.raises(StoreError, match=told) as refusal:
+            act(path)
+        assert path.name in str(refusal.value)
+        assert "\n" not in str(refusal.value)
+
+
+def test_a_newer_format_is_told(tmp_path: Path, samples_of: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+    with monkeypatch.context() as newer:
+        newer.setattr(recording_files, "FORMAT", 3)
+        path = write(tmp_path / "trial-003.parquet", samples_of(10)).path
+    with pytest.raises(StoreError, match="has format 3, this version reads 1 to 2: use a newer version"):
+        read_samples(path)
+
+
+RECORDING = """
+import sys
+from pathlib import Path
+import numpy as np
+from study_app.haptics.model.layout import SAMPLE
+from study_app.store import recording
+path = Path(sys.argv[1])
+file = recording.SamplesFile(path, {}, 1000.0)
+file.write(np.zeros(2000, SAMPLE))
+file.finish()
+recording.read_samples(path)
+recording.read_frames(recording.write_frames(path.with_name("frames.parquet"), np.zeros((3, 2), np.int64), {}).path)
+print([name for name in ("pandas", "numba", "scipy", "PySide6") if name in sys.modules])
+"""
+
+
+def test_neither_the_compiler_nor_the_analysts_libraries_are_loaded(tmp_path: Path) -> None:
+    command = [sys.executable, "-c", RECORDING, str(tmp_path / "trial-001.parquet")]
+    assert json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout) == []

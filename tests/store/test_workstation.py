@@ -1,0 +1,167 @@
+"""What this machine is like: kept whole, refused with one line where it makes no sense, and what follows from it."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import ValidationError
+
+from study_app.errors import StoreError
+from study_app.store.workstation import (
+    ASIDE,
+    DEFAULTS,
+    LEAST_X_HEIGHT_DEG,
+    STATEMENT_X_HEIGHT_PX,
+    DisplayOffset,
+    MachineSettings,
+    load,
+    load_or_default,
+    save,
+)
+from study_app.user_folder import settings_file
+
+OFFSET = DisplayOffset(mean_ms=23.5, spread_ms=1.2, how="photodiode", measured="2026-11-20", screen="DP-1")
+ALL = MachineSettings(
+    screen="DP-1",
+    screen_number=2,
+    viewing_distance_mm=620,
+    screen_width_mm=527.5,
+    display_offset=OFFSET,
+    device="falcon",
+    firmware="/somewhere/firmware.bin",
+    workspace="/somewhere",
+    recent=("/somewhere/else.toml",),
+    theme="dark",
+    sound=True,
+)
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    """No settings of this machine's user meet a test."""
+    monkeypatch.setenv("LIQUID_STUDY_CONFIG", str(tmp_path / "settings"))
+    return tmp_path / "settings"
+
+
+def test_nothing_kept_is_the_defaults_and_nothing_is_created(folder):
+    assert load() == DEFAULTS
+    assert not DEFAULTS.sound
+    assert not folder.exists()
+
+
+def test_what_was_kept_comes_back_and_nothing_lies_beside_it(folder):
+    save(ALL)
+    assert load() == ALL
+    assert [path.name for path in folder.iterdir()] == ["machine.json"]
+    save(DEFAULTS)
+    assert load() == DEFAULTS
+
+
+def test_a_write_that_fails_leaves_the_old_settings(folder, monkeypatch):
+    save(ALL)
+    monkeypatch.setattr("study_app.store.atomic.os.fsync", _full)
+    with pytest.raises(StoreError, match="machine"):
+        save(DEFAULTS)
+    monkeypatch.undo()
+    assert json.loads((folder / "machine.json").read_text())["screen"] == "DP-1"
+    assert [path.name for path in folder.iterdir()] == ["machine.json"]
+
+
+def _full(_descriptor):
+    raise OSError(28, "No space left on device")
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("{", "no JSON"),
+        ("", "no JSON"),
+        ("\udc00".encode("utf-8", "surrogatepass"), "no JSON"),
+        ("[1]", "no table"),
+        ('{"viewing_distnce_mm": 600}', 'did you mean "viewing_distance_mm"?'),
+        ('{"display_offset": {"mean": 20}}', 'did you mean "mean_ms"?'),
+        ('{"viewing_distance_mm": "600"}', "must be a number"),
+        ('{"viewing_distance_mm": 6}', "must be at least 200"),
+        ('{"display_offset": {"mean_ms": NaN}}', "finite"),
+        ('{"theme": "drak"}', 'did you mean "dark"?'),
+        ('{"device": "Fal con"}', '"Fal con" is not permitted'),
+        ('{"sound": 1}', "must be true or false"),
+        ('{"workspace": ""}', '"" is not permitted'),
+        (r'{"firmware": "a\u0000b"}', "is not permitted"),
+    ],
+)
+def test_a_file_that_makes_no_sense_is_told_in_one_line_and_the_defaults_count(folder, text, said):
+    folder.mkdir()
+    content = text if isinstance(text, bytes) else text.encode()
+    settings_file().write_bytes(content)
+    found, trouble = load_or_default()
+    assert found == DEFAULTS
+    assert said in trouble
+    assert str(settings_file()) in trouble
+    assert "\n" not in trouble
+    save(ALL)
+    assert load() == ALL
+    assert (folder / ASIDE).read_bytes() == content
+
+
+def test_values_out_of_range_cannot_be_made():
+    for wrong in ({"viewing_distance_mm": 10}, {"screen_number": 0}, {"device": ""}, {"colour": "red"}):
+        with pytest.raises(ValidationError):
+            MachineSettings.model_validate(wrong)
+
+
+@pytest.mark.parametrize(
+    ("settings", "names", "number"),
+    [
+        (DEFAULTS, ["A"], 1),
+        (DEFAULTS, ["A", "B"], 2),
+        (MachineSettings(screen="A", screen_number=1), ["A", "B"], 1),
+        (MachineSettings(screen="A", screen_number=1), ["B", "A"], 2),
+        (MachineSettings(screen="A", screen_number=2), ["A", "A"], 2),
+        (MachineSettings(screen="A", screen_number=3), ["A", "A"], 1),
+        (MachineSettings(screen="gone", screen_number=1), ["A", "B"], 2),
+    ],
+)
+def test_the_participants_screen_is_found_by_its_name_and_else_the_last(settings, names, number):
+    assert settings.screen_among(names) == number
+
+
+@given(
+    distance=st.floats(200, 3000),
+    width=st.floats(80, 5000),
+    pixels=st.integers(1024, 7680),
+)
+def test_an_x_is_seen_under_four_tenths_of_a_degree_or_more(distance, width, pixels):
+    settings = MachineSettings(viewing_distance_mm=distance, screen_width_mm=width)
+    scale = settings.text_scale(pixels, 0.0)
+    height_mm = scale * STATEMENT_X_HEIGHT_PX * width / pixels
+    seen = math.degrees(2 * math.atan(height_mm / (2 * distance)))
+    assert scale >= 1.0
+    assert seen >= LEAST_X_HEIGHT_DEG * 0.9999  # a tangent of so small an angle is all but the angle
+    if scale > 1:
+        assert seen == pytest.approx(LEAST_X_HEIGHT_DEG, rel=1e-4)
+
+
+def test_words_are_as_designed_until_the_distance_is_known():
+    assert DEFAULTS.text_scale(1920, 527.0) == 1.0
+    known = MachineSettings(viewing_distance_mm=600)
+    assert known.text_scale(1920, 527.0) == pytest.approx(1.747, abs=0.001)  # by hand: 4.189 mm for 2.398 mm
+    assert known.text_scale(1920, 0.0) == 1.0
+    assert known.model_copy(update={"screen_width_mm": 1054.0}).text_scale(1920, 527.0) == 1.0
+
+
+def test_the_receipt_gets_the_offset_of_the_screen_it_was_measured_on_alone():
+    there, elsewhere = ALL.describe("DP-1", 1920, 500.0), ALL.describe("HDMI-1", 1920, 500.0)
+    assert there["display_offset"] == {
+        "mean_ms": 23.5,
+        "spread_ms": 1.2,
+        "how": "photodiode",
+        "measured": "2026-11-20",
+    }
+    assert elsewhere["display_offset"] is None
+    assert (there["viewing_distance_mm"], there["width_mm"], there["width_measured"]) == (620, 527.5, True)
+    assert json.loads(json.dumps(there)) == there

@@ -1,0 +1,157 @@
+"""Damaged files of a study: single bits and values of another type, with fixed seeds, in files of every kind."""
+
+from __future__ import annotations
+
+import base64
+import contextlib
+import json
+import os
+import random
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from study_app.errors import StudyError
+from study_app.gui.sessions.facts import sessions
+from study_app.protocol.model import Protocol
+from study_app.store.blinded import blinding
+from study_app.store.exclusions import exclude
+from study_app.store.journals.journal import scan
+from study_app.store.sessions.begin import SessionStore
+from study_app.store.sessions.rebuild import rebuild
+from study_app.store.sessions.reopen import check_can_go_on
+from study_app.store.verification.reproduction import reproduced
+from study_app.store.verification.verify_study import verify
+from tests.store.conftest import SOURCE
+
+FINISHED = "data/sub-P007/ses-01"
+UNFINISHED = "data/sub-P008/ses-01"
+SEED = int(os.environ.get("LIQUID_STUDY_DAMAGE_SEED", "5"))
+CASES = int(os.environ.get("LIQUID_STUDY_DAMAGE_CASES", "12"))  # of a file, for each kind of damage
+ODD: tuple[Any, ...] = (None, True, -1, 10**40, 1e308, "", "\ud83c", "../../x", [], [None], {}, {"a": []}, "x" * 5000)
+FILES = (
+    f"{FINISHED}/journal.jsonl",
+    f"{UNFINISHED}/journal.jsonl",
+    f"{FINISHED}/receipt.json",
+    f"{FINISHED}/checksums.sha256",
+    "dataset_description.json",
+    "blinding/key.sealed",
+    "blinding/reveals.jsonl",
+    "exclusions.csv",
+    f"{FINISHED}/*responses_data.csv",
+    f"{UNFINISHED}/*responses_data.csv",
+    f"{UNFINISHED}/*trials_data.csv",
+    "data/*participants_data.csv",
+)
+
+
+def mutated(value: Any, chance: random.Random) -> Any:
+    """Return a JSON value with one of its members, at any depth, replaced, left out or renamed."""
+    if isinstance(value, dict) and value and chance.random() < 0.9:
+        name = chance.choice(list(value))
+        match chance.randrange(6):
+            case 0:
+                return {key: item for key, item in value.items() if key != name}
+            case 1:
+                return {("id" if key == name else key): item for key, item in value.items()}
+            case _:
+                return value | {name: mutated(value[name], chance)}
+    if isinstance(value, list) and value and chance.random() < 0.9:
+        index = chance.randrange(len(value))
+        return [*value[:index], mutated(value[index], chance), *value[index + 1 :]]
+    return chance.choice(ODD)
+
+
+def with_an_odd_value(content: bytes, chance: random.Random) -> bytes:
+    """Change one JSON value of a file: of one of its lines, where it has several."""
+    lines = content.splitlines(keepends=True)
+    if not content.startswith(b"{"):
+        return base64.encodebytes(json.dumps(mutated(json.loads(base64.b64decode(content)), chance)).encode())
+    if lines[0].startswith(b'{"'):
+        index = chance.randrange(len(lines))
+        lines[index] = json.dumps(mutated(json.loads(lines[index]), chance)).encode() + b"\n"
+        return b"".join(lines)
+    return json.dumps(mutated(json.loads(content), chance)).encode()
+
+
+def with_deep_nesting(content: bytes, chance: random.Random) -> bytes:
+    """Put a list into a file that is nested as deep as no reader can follow, or a number of as many digits."""
+    depth = chance.choice((100, 900, 3000, 100_000))
+    deep = b"[" * depth + b"]" * depth if chance.random() < 0.7 else b"9" * (depth * 2)
+    lines = content.splitlines(keepends=True)
+    if not content.startswith(b"{"):
+        return base64.encodebytes(deep)
+    if chance.random() < 0.5:
+        return deep + b"\n"
+    index = chance.randrange(len(lines)) if lines[0].startswith(b'{"') else 0
+    lines[index] = lines[index].replace(b"{", b'{"deep":' + deep + b",", 1)
+    return b"".join(lines)
+
+
+def with_a_bit_flipped(content: bytes, chance: random.Random) -> bytes:
+    index = chance.randrange(len(content))
+    return content[:index] + bytes([content[index] ^ 1 << chance.randrange(8)]) + content[index + 1 :]
+
+
+@pytest.fixture
+def study(tmp_path: Path, start: Callable[..., SessionStore], attend: Callable[[SessionStore], None]) -> Path:
+    """P007's session is finished, P008's is not; the key was opened and a trial excluded."""
+    finished = start()
+    attend(finished)
+    finished.finish("completed")
+    with start("P008") as left:
+        attend(left)
+    exclude(tmp_path / "study", "P007", 1, trial=2, by="AB", reason="the phone rang")
+    blinding.reveal(tmp_path / "study", "AB", "analysis")
+    return tmp_path / "study"
+
+
+@pytest.mark.parametrize("name", FILES)
+@pytest.mark.parametrize("damage", [with_a_bit_flipped, with_an_odd_value, with_deep_nesting])
+def test_no_damage_ends_in_a_traceback_or_hides_a_session(
+    tmp_path: Path, study: Path, protocol: Protocol, name: str, damage: Callable[[bytes, random.Random], bytes]
+) -> None:
+    if damage is not with_a_bit_flipped and name.endswith((".csv", ".sha256")):
+        pytest.skip("holds no JSON")
+    chance = random.Random(f"{SEED} {name} {damage.__name__}")  # noqa: S311 - a fixed choice of damage
+    (path,) = study.glob(name)
+    content = path.read_bytes()
+    for _ in range(CASES):
+        path.write_bytes(damage(content, chance))
+        look_at(tmp_path, study, protocol)
+        copy = shutil.copytree(study, tmp_path / "elsewhere" / "study", dirs_exist_ok=True)
+        with contextlib.suppress(StudyError):
+            rebuild(copy / Path(name).parent)
+
+
+def look_at(results: Path, study: Path, protocol: Protocol) -> None:
+    """Read everything as the commands and the home window do: nothing but an error for people may come of it."""
+    assert {facts.participant for facts in sessions(results, {})} == {"P007", "P008"}
+    actions: tuple[Callable[[], object], ...] = (
+        lambda: verify(study),
+        lambda: reproduced(study / FINISHED),
+        lambda: reproduced(study / UNFINISHED),
+        lambda: check_can_go_on(study / UNFINISHED, protocol, SOURCE),
+        lambda: blinding.revealed_key(study),
+    )
+    for action in actions:
+        with contextlib.suppress(StudyError):
+            action()
+
+
+@pytest.mark.parametrize("damage", [with_a_bit_flipped, with_an_odd_value, with_deep_nesting])
+def test_a_damaged_journal_is_listed_as_damaged_and_never_sound(
+    tmp_path: Path, study: Path, damage: Callable[[bytes, random.Random], bytes]
+) -> None:
+    path = study / FINISHED / "journal.jsonl"
+    content, chance = path.read_bytes(), random.Random(SEED)  # noqa: S311 - a fixed choice of damage
+    for _ in range(CASES):
+        path.write_bytes(damage(content, chance))
+        assert not verify(study).sound
+        listed = {facts.participant: facts.status for facts in sessions(tmp_path, {})}
+        assert listed["P008"] == "unfinished"
+        if scan(path).damage is not None:
+            assert listed["P007"] == "damaged"

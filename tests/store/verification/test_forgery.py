@@ -1,0 +1,321 @@
+"""Results changed by hand: what `verify` finds by itself, and what with fingerprints that were kept elsewhere."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner
+
+from study_app.cli import commands
+from study_app.errors import StoreError
+from study_app.protocol.model import Protocol
+from study_app.store import receipt
+from study_app.store.blinded import blinding
+from study_app.store.blinded.sealing import opened, sealed
+from study_app.store.folders import StudyFolder
+from study_app.store.sessions.begin import SessionStore
+from study_app.store.sessions.rebuild import rebuild
+from study_app.store.sessions.reopen import check_can_go_on
+from study_app.store.verification.fingerprints import listed
+from study_app.store.verification.verify_study import verify
+from tests.store.conftest import SOURCE
+from tests.store.verification.forging import Lines, cover_up, forge
+
+P007 = "data/sub-P007/ses-01"
+
+
+@pytest.fixture
+def study(tmp_path: Path, start: Callable[..., SessionStore], attend: Callable[[SessionStore], None]) -> Path:
+    """Two rehearsed sessions that ended; their fingerprints are kept in tmp_path/kept.txt."""
+    for person in ("P007", "P008"):
+        store = start(person, simulated=True)
+        attend(store)
+        store.finish("completed")
+    shutil.copy(tmp_path / "study" / "fingerprints.txt", tmp_path / "kept.txt")
+    return tmp_path / "study"
+
+
+def told(study: Path, kept: Path | None = None) -> str:
+    return "\n".join(map(str, verify(study, kept).errors))
+
+
+def journal_of(study: Path) -> Path:
+    return study / P007 / "journal.jsonl"
+
+
+def of_receipt(study: Path, **changes: Any) -> None:
+    path = study / P007 / "receipt.json"
+    receipt.write(path, receipt.read(path) | changes)
+
+
+def other_responses(lines: Lines) -> None:
+    for line in lines:
+        if line["event"] == "responses":
+            for item in line["items"]:
+                item["value"] = 8 - item["value"]
+
+
+def other_answers(lines: Lines) -> None:
+    """Change the choices, too."""
+    other_responses(lines)
+    for line in lines:
+        if line["event"] == "choice":
+            line["value"] = 8 - line["value"]
+
+
+def half(lines: Lines) -> None:
+    del lines[len(lines) // 2 :]
+
+
+def edit_a_response(study: Path) -> None:
+    path = journal_of(study)
+    path.write_bytes(path.read_bytes().replace(b'"value":7', b'"value":1'))
+
+
+def edit_the_responses(study: Path) -> None:
+    forge(journal_of(study), other_responses)
+    cover_up(study)
+
+
+def take_a_choice_away(study: Path) -> None:
+    def change(lines: Lines) -> None:
+        del lines[next(n for n, line in enumerate(lines) if line["event"] == "choice")]
+
+    forge(journal_of(study), change)
+    cover_up(study)
+
+
+def cut_the_journal(study: Path) -> None:
+    forge(journal_of(study), half)
+    of_receipt(study, status="unfinished", reason="", ended_at=None)
+
+
+def cut_the_journal_and_delete_the_checksums(study: Path) -> None:
+    cut_the_journal(study)
+    (study / P007 / "checksums.sha256").unlink()
+
+
+def delete_a_participant(study: Path) -> None:
+    shutil.rmtree(study / "data" / "sub-P007")
+    kept = StudyFolder(study).fingerprints.read_bytes()
+    cover_up(study)
+    StudyFolder(study).fingerprints.write_bytes(kept)
+
+
+def call_the_simulated_real(study: Path) -> None:
+    """In the journal's first line alone."""
+    forge(journal_of(study), lambda lines: lines[0].update(simulated=False))
+
+
+def leave_out_the_chain(study: Path) -> None:
+    forge(journal_of(study), lambda lines: lines[0].pop("format"), chained=False)
+    cover_up(study)
+
+
+def begin_the_chain_late(study: Path) -> None:
+    path = journal_of(study)
+    first, second, *rest = path.read_bytes().splitlines(keepends=True)
+    line = json.loads(first)
+    del line["format"], line["previous"]
+    first = json.dumps(line, separators=(",", ":")).encode() + b"\n"
+    before = hashlib.sha256(first)
+    told_after = json.loads(second)["previous"].encode()
+    path.write_bytes(first + second.replace(told_after, before.hexdigest().encode()) + b"".join(rest))
+
+
+def change_and_rebuild(study: Path) -> None:
+    forge(journal_of(study), other_answers)
+    (study / P007 / "checksums.sha256").unlink()
+    rebuild(study / P007)
+
+
+@pytest.mark.parametrize(
+    ("act", "sentence"),
+    [
+        (edit_a_response, "was written after another line than the one before it, which was changed"),
+        (edit_the_responses, "another answer than was chosen before: it was changed"),
+        (take_a_choice_away, "another answer than was chosen before: it was changed"),
+        (cut_the_journal, "was made when the session had ended, though the journal has no end"),
+        (cut_the_journal_and_delete_the_checksums, f"{P007}: is not the session that fingerprints.txt lists as"),
+        (delete_a_participant, f"{P007}: is missing, though fingerprints.txt lists it"),
+        (call_the_simulated_real, "simulated: not as in the journal"),
+        (leave_out_the_chain, "has another format than receipt.json says"),
+        (begin_the_chain_late, "has previous, and the lines before it lack it"),
+        (change_and_rebuild, f"{P007}: is not the session that fingerprints.txt lists as"),
+    ],
+)
+def test_a_forgery_that_computes_no_fingerprint_is_found(
+    study: Path, tmp_path: Path, act: Callable[[Path], None], sentence: str
+) -> None:
+    assert verify(study, tmp_path / "kept.txt").sound
+    act(study)
+    assert sentence in told(study)
+    assert not verify(study).sound
+
+
+def change_every_answer(study: Path) -> None:
+    forge(journal_of(study), other_answers)
+
+
+def call_everything_real(study: Path) -> None:
+    call_the_simulated_real(study)
+    of_receipt(study, simulated=False)
+
+
+def forget_a_participant(study: Path) -> None:
+    shutil.rmtree(study / "data" / "sub-P007")
+
+
+def write_it_in_format_1(study: Path) -> None:
+    leave_out_the_chain(study)
+    of_receipt(study, format=1)
+
+
+def end_it_with_another_status(study: Path) -> None:
+    forge(journal_of(study), lambda lines: lines[-1].update(status="withdrawn"))
+    of_receipt(study, status="withdrawn")
+
+
+def change_the_seed(study: Path) -> None:
+    forge(journal_of(study), lambda lines: lines[0].update(seed=12))
+    of_receipt(study, seed=12)
+
+
+def add_a_session(study: Path) -> None:
+    path = study / "data" / "sub-P009" / "ses-01"
+    shutil.copytree(study / P007, path)
+    key = blinding.read_key(study)
+
+    def of_another(lines: Lines) -> None:
+        clear = opened(lines, key)
+        clear[0]["participant"] = "P009"
+        lines[:] = [sealed(clear[0], line["event"], line, key) for line in clear]
+
+    forge(path / "journal.jsonl", of_another)
+    receipt.write(path / "receipt.json", receipt.read(path / "receipt.json") | {"participant": "P009"})
+    for table in path.glob("*_data.csv"):
+        table.unlink()
+
+
+@pytest.mark.parametrize(
+    ("act", "sentence"),
+    [
+        (change_every_answer, f"{P007}: is not the session that"),
+        (cut_the_journal, "it has no end any more"),
+        (forget_a_participant, f"{P007}: is missing, though"),
+        (call_everything_real, f"{P007}: is not the session that"),
+        (write_it_in_format_1, f"{P007}: is not the session that"),
+        (end_it_with_another_status, f"{P007}: is not the session that"),
+        (change_the_seed, f"{P007}: is not the session that"),
+        (add_a_session, "it was added, or ended, after that copy was made"),
+    ],
+)
+def test_a_forgery_that_computes_everything_anew_is_found_with_the_fingerprints_kept_elsewhere(
+    study: Path, tmp_path: Path, act: Callable[[Path], None], sentence: str
+) -> None:
+    """Without them nothing can be found: so it is with files that anyone may write."""
+    act(study)
+    cover_up(study)
+    assert verify(study).sound
+    assert sentence in told(study, tmp_path / "kept.txt")
+
+
+def test_changed_tables_do_not_survive_a_rebuild(study: Path, tmp_path: Path) -> None:
+    tables = sorted((study / P007).glob("*_data.csv"))
+    before = [table.read_bytes() for table in tables]
+    for table in tables:
+        table.write_bytes(table.read_bytes().replace(b",7,", b",1,").replace(b"complete", b"timeout"))
+    assert "is not what the journal gives" in told(study)
+    (study / P007 / "checksums.sha256").unlink()
+    rebuild(study / P007)
+    assert [table.read_bytes() for table in tables] == before
+    assert "the list of checksums was missing" in "\n".join(map(str, verify(study).warnings))
+    assert verify(study, tmp_path / "kept.txt").sound
+
+
+def test_a_marker_of_another_machine_hides_no_forgery_from_the_fingerprints_kept_elsewhere(
+    study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A session that seems to run in a program is not judged, but one that had ended cannot run."""
+    monkeypatch.setattr("study_app.store.verification.verify_study.LOOKS", 2)
+    cut_the_journal(study)
+    (study / P007 / ".open-0123abcd.json").write_text(json.dumps({"host": "elsewhere", "pid": 1, "began": "x"}))
+    findings = verify(study)
+    assert findings.running == 1
+    assert f"{P007}: is not the session that" in told(study, tmp_path / "kept.txt")
+
+
+@pytest.mark.parametrize("record", [{}, {"by": "AB"}, {"at": "now", "by": "AB", "reason": "done", "key_hash": "0"}])
+def test_a_line_that_records_no_reveal_opens_no_key(study: Path, record: dict[str, str]) -> None:
+    StudyFolder(study).reveals.write_text(json.dumps(record) + "\n")
+    assert blinding.revealed_key(study) is None
+    assert "reveals.jsonl: line 1 records no reveal: it was changed" in told(study)
+
+
+def test_a_torn_reveal_is_a_warning_and_opens_no_key(study: Path) -> None:
+    blinding.reveal(study, "AB", "done")
+    path = StudyFolder(study).reveals
+    path.write_bytes(path.read_bytes()[:-9])
+    assert blinding.revealed_key(study) is None
+    assert told(study) == ""
+    assert "line 1 records no reveal: it was torn" in "\n".join(map(str, verify(study).warnings))
+
+
+def test_an_unfinished_session_with_a_changed_line_does_not_go_on(
+    tmp_path: Path, start: Callable[..., SessionStore], attend: Callable[[SessionStore], None], protocol: Protocol
+) -> None:
+    with start() as store:
+        attend(store)
+    check_can_go_on(store.folder.path, protocol, SOURCE)
+    before = store.folder.journal.read_bytes()
+    store.folder.journal.write_bytes(before.replace(b'"value":7', b'"value":1', 1))
+    with pytest.raises(StoreError, match="was written after another line than the one before it"):
+        check_can_go_on(store.folder.path, protocol, SOURCE)
+    store.folder.journal.write_bytes(before)
+    forge(store.folder.journal, lambda lines: lines[0].pop("format"), chained=False)
+    with pytest.raises(StoreError, match="has another format than its receipt says"):
+        check_can_go_on(store.folder.path, protocol, SOURCE)
+
+
+def test_a_fingerprint_is_what_the_documentation_says(study: Path) -> None:
+    """It can be computed without this program: SHA-256 of some lines of the list, in base32."""
+    for proof, place in listed(StudyFolder(study).fingerprints):
+        lines = (study / place / "checksums.sha256").read_text().splitlines(keepends=True)
+        proved = "".join(line for line in lines if "_data.csv" not in line and "rebuilt.txt" not in line)
+        letters = base64.b32encode(hashlib.sha256(proved.encode()).digest()).decode().lower()
+        assert proof.replace("-", "") == letters[:12]
+
+
+def test_the_command_compares_with_the_copy(study: Path, tmp_path: Path) -> None:
+    words = ["verify", str(study), "--fingerprints", str(tmp_path / "kept.txt")]
+    done = CliRunner().invoke(commands, words)
+    assert (done.exit_code, done.output.splitlines()[-1]) == (0, "2 sessions: sound")
+    forget_a_participant(study)
+    cover_up(study)
+    done = CliRunner().invoke(commands, words)
+    assert (done.exit_code, done.output.splitlines()[-1]) == (3, "1 session: not sound")
+    assert f"error: {P007}: is missing, though" in done.output
+
+
+@pytest.mark.parametrize(
+    ("content", "sentence"),
+    [
+        (None, "is no file: name a copy"),
+        (b"", "holds no fingerprint"),
+        (b"\xff\n", "line 1 is no fingerprint: a line must be such as"),
+        (b"k3vq-7m2p-xw4d data/sub-P007/ses-01\nx\n", "line 2 is no fingerprint"),
+    ],
+)
+def test_a_copy_that_is_none_is_named(study: Path, tmp_path: Path, content: bytes | None, sentence: str) -> None:
+    path = tmp_path / "copy.txt"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(StoreError, match=sentence):
+        verify(study, path)

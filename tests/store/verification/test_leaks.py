@@ -1,0 +1,151 @@
+"""What the conditions are is written nowhere but in the sealed key: no id, no parameter, no delay."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from study_app.protocol.load import load
+from study_app.protocol.model import Protocol
+from study_app.store import receipt
+from study_app.store.blinded import blinding
+from study_app.store.sessions.begin import SessionStore
+from study_app.store.verification.leaks import Telltales, certain_telltales, leaks, telltales
+
+
+def found(folder: Path, protocol: Protocol) -> list[tuple[str, str]]:
+    return [(leak.place, leak.word) for leak in leaks(folder, protocol)]
+
+
+def test_the_words_to_look_for_are_the_conditions(protocol: Protocol) -> None:
+    words = telltales(protocol).words
+    assert {"quagmire", "mildew", "see_tardy", "learn", "1013.7", "1391.3", "1717", "137", "0.137"} < words
+    assert {"137.0", "137000000", "137000", "0.99917"} < words
+    assert not {"drag", "wake", "0", "liquid", "delay_ms"} & words
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("Liquid setting 1 of 2", []),
+        ("it is mildew, surely", ["mildew"]),
+        ("mildewed", []),
+        ("like_mildew", []),
+        ("137 ms", ["137"]),
+        ("137.0 ms", ["137.0"]),
+        ("after 137. Then", ["137"]),
+        ("1370 of 5137", []),
+        ("137.25 and 3.137", []),
+        ("0.137s", []),
+        ("0.137 s", ["0.137"]),
+        ("-1013.7", ["1013.7"]),
+        ("liquids.quagmire.density", ["quagmire"]),
+        ("quagmire.csv", ["quagmire"]),
+    ],
+)
+def test_a_word_tells_where_it_stands_by_itself(protocol: Protocol, text: str, told: list[str]) -> None:
+    """In a window's title, a line of a log, an accessible name."""
+    assert telltales(protocol).in_text(text) == told
+
+
+def test_a_leak_is_found_wherever_it_is(tmp_path: Path, protocol: Protocol, start: Callable[..., SessionStore]) -> None:
+    store = start(device={"name": "scripted", "rate_hz": 1013.7})
+    store.append("note", kind="note", text="this must be mildew, 137 ms")
+    store.append("trial_started", trial=1, attempt=1, block="b", phase="main", part=1, index=1, of=1, code="see_tardy")
+    store.write_tables()
+    store.finish("completed")
+    (store.folder.path / "quagmire.txt").write_text("first\nfeel_quagmire is it")
+    session = "data/sub-P007/ses-01"
+    assert found(tmp_path / "study", protocol) == [
+        (f"{session}/journal.jsonl, line 2, text", "mildew"),
+        (f"{session}/journal.jsonl, line 2, text", "137"),
+        (f"{session}/journal.jsonl, line 3, code", "see_tardy"),
+        (f"the name {session}/quagmire.txt", "quagmire"),
+        (f"{session}/quagmire.txt, line 2", "feel_quagmire"),
+        (f"{session}/receipt.json, device, rate_hz", "1013.7"),
+        (f"{session}/subject-P007_session-01_task-brackish_description-trials_data.csv, row 2, code", "see_tardy"),
+    ]
+
+
+def test_the_moment_of_an_event_may_be_any_number(
+    tmp_path: Path, protocol: Protocol, start: Callable[..., SessionStore]
+) -> None:
+    store = start()
+    store.append("note", t_s=0.137, kind="mark", text="")
+    store.close()
+    assert found(tmp_path, protocol) == []
+
+
+def test_a_leak_does_not_show_its_word_by_itself(tmp_path: Path, protocol: Protocol) -> None:
+    (tmp_path / "notes.txt").write_text("mildew")
+    assert "mildew" not in repr(leaks(tmp_path, protocol))
+
+
+def test_statements_may_name_what_they_ask(
+    tmp_path: Path, tables_of_study: Callable[..., dict[str, Any]], start: Callable[..., SessionStore]
+) -> None:
+    """A statement asks whether it feels like mildew, and has that name; elsewhere the word tells."""
+    tables = tables_of_study()
+    item = {"id": "mildew", "text": "I think it is mildew.", "short": "mildew"}
+    tables["questionnaires"]["form"]["items"] = [item]
+    protocol = Protocol.model_validate(tables)
+    store = start(protocol=protocol)
+    told = {"block": "liquids", "phase": "main", "part": 1, "index": 1, "of": 1, "code": "L1"}
+    store.append("trial_started", trial=1, attempt=1, **told)
+    store.append("item_shown", trial=1, item="mildew")
+    store.append("choice", trial=1, item="mildew", value=4)
+    answer = {"item": "mildew", "number": 1, "value": 4, "onset_s": 1.5, "first_s": 2.0, "last_s": 2.0, "changes": 0}
+    store.append("responses", trial=1, attempt=1, items=[answer])
+    store.finish("completed")
+    assert b"mildew" in store.folder.table("brackish", "responses").read_bytes()
+    assert b"mildew" in store.folder.receipt.read_bytes()
+    assert found(tmp_path / "study", protocol) == []
+
+
+@pytest.mark.parametrize("simulated", [False, True], ids=["real", "rehearsed"])
+def test_a_finished_session_tells_nothing(
+    tmp_path: Path,
+    protocol: Protocol,
+    start: Callable[..., SessionStore],
+    attend: Callable[[SessionStore], None],
+    samples_of: Callable[..., Any],
+    *,
+    simulated: bool,
+) -> None:
+    store = start(simulated=simulated, recordings=True)
+    assert store.recorder is not None
+    attend(store)
+    store.recorder.start(1, 1, 1000.0)
+    store.recorder.append(samples_of(100))
+    store.append("note", kind="mark", text="")
+    store.finish("completed")
+    assert len(list((tmp_path / "study").rglob("*.*"))) >= 11
+    assert found(tmp_path / "study", protocol) == []
+    assert not telltales(protocol).words & set(re.findall(r"[\w.]+", repr(store.key)))
+
+
+def test_what_stands_somewhere_by_chance_or_is_published_tells_nothing_for_certain() -> None:
+    """Of the thesis' study: its liquids' names are in statements, its numbers are short; what is left is certain."""
+    protocol = load("rek2024")
+    tables = protocol.model_dump(mode="json", include={"liquids", "conditions"})
+    words = certain_telltales(tables, receipt.without_conditions(protocol)).words
+    assert {"light_oil", "delay_50", "delay_200"} < words
+    assert not {"honey", "practice", "1", "50", "0.068", "1000"} & words
+
+
+def test_the_sealed_key_gives_the_words_too(
+    tmp_path: Path, protocol: Protocol, start: Callable[..., SessionStore]
+) -> None:
+    start().finish("completed")
+    key = blinding.read_key(tmp_path / "study")
+    words = certain_telltales(key.tables, receipt.without_conditions(protocol)).words
+    assert {"quagmire", "feel_mildew", "1013.7", "0.99917"} < words
+    assert "137" not in words
+
+
+def test_without_words_nothing_is_found() -> None:
+    assert Telltales([]).in_text("anything 137") == []

@@ -1,0 +1,147 @@
+"""Files of a results folder that lead elsewhere, and names in them that are paths."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from study_app.analysis.output import write_files
+from study_app.cli import commands
+from study_app.errors import AnalysisError, StoreError
+from study_app.store import receipt
+from study_app.store.blinded import blinding
+from study_app.store.journals import journal
+from study_app.store.sessions.begin import SessionStore
+from study_app.store.verification.verify_study import verify
+
+OWN = ("journal.jsonl", "receipt.json", "key.sealed")
+
+
+@pytest.fixture
+def finished(start: Callable[..., SessionStore], attend: Callable[[SessionStore], None]) -> SessionStore:
+    store = start()
+    attend(store)
+    store.finish("completed")
+    return store
+
+
+def read(path: Path) -> object:
+    if path.name == "key.sealed":
+        return blinding.read_key(path.parents[1])
+    return journal.read(path) if path.suffix == ".jsonl" else receipt.read(path)
+
+
+def own(store: SessionStore, name: str) -> Path:
+    return store.place.study_folder.key if name == "key.sealed" else store.folder.path / name
+
+
+@pytest.mark.parametrize("name", OWN)
+def test_a_link_out_of_the_studys_folder_is_not_followed(tmp_path: Path, finished: SessionStore, name: str) -> None:
+    path = own(finished, name)
+    path.rename(tmp_path / "elsewhere")
+    path.symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(StoreError, match=r"leads out of .*study.*: put the file itself there"):
+        read(path)
+    assert not verify(tmp_path / "study").sound
+
+
+@pytest.mark.parametrize("name", OWN)
+def test_a_link_within_the_studys_folder_is_followed(tmp_path: Path, finished: SessionStore, name: str) -> None:
+    """As in a data set whose files lie in an annex."""
+    path = own(finished, name)
+    annex = tmp_path / "study" / ".git" / "annex"
+    annex.mkdir(parents=True)
+    path.rename(annex / name)
+    path.symlink_to(annex / name)
+    assert read(path)
+
+
+@pytest.mark.parametrize("name", OWN)
+@pytest.mark.parametrize("target", ["/dev/zero", "itself"])
+def test_a_device_without_an_end_and_a_loop_of_links_are_refused(
+    finished: SessionStore, name: str, target: str
+) -> None:
+    path = own(finished, name)
+    path.unlink()
+    path.symlink_to(path.name if target == "itself" else target)
+    with pytest.raises(StoreError, match=f"{name} (leads out of|cannot be read)"):
+        read(path)
+
+
+def test_a_study_that_is_called_by_a_path_is_not_exported(tmp_path: Path, finished: SessionStore) -> None:
+    for path in (finished.folder.receipt, finished.place.study_folder.description):
+        held = json.loads(path.read_bytes())
+        (held["protocol"]["study"] if "protocol" in held else held)["name"] = "../../../../ESCAPED"
+        path.write_text(json.dumps(held), encoding="utf-8")
+    before = {path for path in tmp_path.rglob("*") if "out" not in path.parts}
+    done = CliRunner().invoke(commands, ["export", str(tmp_path / "study"), "--to", str(tmp_path / "a" / "b" / "out")])
+    assert isinstance(done.exception, AnalysisError | StoreError)
+    assert {path for path in tmp_path.rglob("*") if "out" not in path.parts} == before
+
+
+@pytest.mark.parametrize("name", ["../escaped.csv", "within/../../escaped.csv", "/escaped.csv", "linked/escaped.csv"])
+def test_nothing_is_written_outside_of_the_folder_asked_for(tmp_path: Path, name: str) -> None:
+    to = tmp_path / "out"
+    to.mkdir()
+    (to / "linked").symlink_to(tmp_path)
+    with pytest.raises(AnalysisError, match=r"would be written outside of .*out: nothing was written"):
+        write_files(to, {"fine.csv": b"", name: b"x"})
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["out"]
+    assert [path.name for path in to.iterdir()] == ["linked"]
+
+
+@pytest.mark.parametrize("command", ["export", "plot", "report"])
+def test_an_empty_name_to_write_to_is_refused(command: str) -> None:
+    done = CliRunner().invoke(commands, [command, "results", "--to", ""])
+    assert done.exit_code == 2
+    assert "is empty: name a file or folder" in done.output
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="has no such device")
+@pytest.mark.parametrize(
+    "name",
+    [
+        "dataset_description.json",
+        "blinding/reveals.jsonl",
+        "blinding/key.sealed",
+        "fingerprints.txt",
+        "exclusions.csv",
+        "data/study-brackish_description-participants_data.csv",
+        "data/sub-P007/ses-01/checksums.sha256",
+        "data/sub-P007/ses-01/rebuilt.txt",
+        "data/sub-P007/ses-01/subject-P007_session-01_task-brackish_description-trials_data.csv",
+    ],
+)
+def test_an_endless_device_is_never_read(tmp_path: Path, finished: SessionStore, name: str) -> None:
+    """Neither by `verify` nor by what looks for doubts, each of which says what is wrong."""
+    path = tmp_path / "study" / name
+    path.unlink(missing_ok=True)
+    path.symlink_to("/dev/zero")
+    program = (
+        "import resource, sys\n"
+        "from pathlib import Path\n"
+        "from study_app.errors import StudyError\n"
+        "from study_app.store.verification.integrity import doubts\n"
+        "from study_app.store.folders import StudyFolder\n"
+        "from study_app.store.sessions.open_session import Place\n"
+        "from study_app.store.verification.verify_study import verify\n"
+        "resource.setrlimit(resource.RLIMIT_CPU, (20, 20))\n"
+        "resource.setrlimit(resource.RLIMIT_DATA, (2**30, 2**30))\n"
+        "study = StudyFolder(Path(sys.argv[1]))\n"
+        "try:\n"
+        "    print([str(doubt) for one in study.sessions() for doubt in doubts(Place(study, one, 'brackish'))])\n"
+        "    print(*verify(study.path).errors)\n"
+        "except StudyError as error:\n"
+        "    print(error)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program, tmp_path / "study"], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert path.name in done.stdout

@@ -1,0 +1,186 @@
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from study_app.store.verification.psychds import Issue, validate
+
+DESCRIPTION: dict[str, Any] = {
+    "@context": "https://schema.org/",
+    "@type": "Dataset",
+    "name": "brackish",
+    "description": "Water.",
+    "variableMeasured": [{"@type": "PropertyValue", "name": "trial"}, "response"],
+}
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """The smallest folder that keeps every rule."""
+    describe(tmp_path)
+    (tmp_path / "data" / "sub-1").mkdir(parents=True)
+    (tmp_path / "data" / "sub-1" / "subject-1_data.csv").write_text("trial,response\n1,7\n2,4\n")
+    return tmp_path
+
+
+def describe(folder: Path, **changes: Any) -> None:
+    told = {name: value for name, value in (DESCRIPTION | changes).items() if value is not ...}
+    (folder / "dataset_description.json").write_text(json.dumps(told))
+
+
+def codes(issues: tuple[Issue, ...]) -> list[str]:
+    return [issue.code for issue in issues]
+
+
+def table(content: bytes, name: str = "data/subject-2_data.csv") -> Callable[[Path], None]:
+    def act(folder: Path) -> None:
+        (folder / name).write_bytes(content)
+
+    return act
+
+
+def described(**changes: Any) -> Callable[[Path], None]:
+    return lambda folder: describe(folder, **changes)
+
+
+def test_the_smallest_folder_keeps_the_rules(folder: Path) -> None:
+    assert validate(folder).errors == ()
+
+
+@pytest.mark.parametrize(
+    ("act", "expected"),
+    [
+        (lambda folder: (folder / "dataset_description.json").unlink(), ["MISSING_DATASET_DESCRIPTION"]),
+        (table(b"{", "dataset_description.json"), ["INVALID_JSON_FORMATTING"]),
+        (table(b"[]", "dataset_description.json"), ["INVALID_JSON_FORMATTING"]),
+        (table(b'{"name":"\xff"}', "dataset_description.json"), ["INVALID_JSON_FORMATTING"]),
+        (described(**{"@context": ...}), ["INVALID_JSONLD_FORMATTING"]),
+        (described(**{"@context": "https://example.org/"}), ["INVALID_JSONLD_FORMATTING"]),
+        (described(**{"@type": ...}), ["MISSING_DATASET_TYPE"]),
+        (described(**{"@type": "Book"}), ["INCORRECT_DATASET_TYPE"]),
+        (described(**{"@type": "https://schema.org/Dataset"}), []),
+        (described(**{"@context": "http://schema.org"}), []),
+        (described(name=...), ["JSON_KEY_REQUIRED"]),
+        (described(description=""), ["JSON_KEY_REQUIRED"]),
+        (described(variableMeasured=["trial"]), ["CSV_COLUMN_MISSING_FROM_METADATA"]),
+        (described(variableMeasured=["trial", "response", "mood"]), ["VARIABLE_MISSING_FROM_CSV_COLUMNS"]),
+        (table(b"trial,response\n1,2\n"), []),
+        (table(b"trial,response\n"), []),
+        (table(b""), ["CSV_HEADER_MISSING"]),
+        (table(b"\xef\xbb\xbftrial,response\n1,2\n"), ["CSV_COLUMN_MISSING_FROM_METADATA"]),
+        (table(b"trial,response\n1,\xff\n"), ["CSV_FORMATTING_ERROR"]),
+        (table(b'trial,response\n1,"2\n'), ["CSV_FORMATTING_ERROR"]),
+        (table(b"trial,trial\n1,2\n"), ["CSV_HEADER_REPEATED"]),
+        (table(b"trial,response\n1\n"), ["CSV_HEADER_LENGTH_MISMATCH"]),
+        (table(b"trial,response\n1,2\n\n3,4\n"), ["CSV_HEADER_LENGTH_MISMATCH"]),
+        (table(b'trial,response\n1,"a, b\nc"\n'), []),
+        (table(b"trial,mood\n1,2\n"), ["CSV_COLUMN_MISSING_FROM_METADATA"]),
+        (table(b"trial\n1\n", "data/subject_2_data.csv"), ["FILENAME_KEYWORD_FORMATTING_ERROR"]),
+        (table(b"trial\n1\n", "data/subject-2-x_data.csv"), ["FILENAME_KEYWORD_FORMATTING_ERROR"]),
+        (table(b"trial\n1\n", "data/Subject-2_data.csv"), ["FILENAME_KEYWORD_FORMATTING_ERROR"]),
+        (table(b"trial\n1\n", "data/visual_delay-2_data.csv"), ["FILENAME_KEYWORD_FORMATTING_ERROR"]),
+        (table(b"{", "data/subject-1_data.json"), ["JSON_INVALID"]),
+        (table(b"{", "data/notes.json"), ["JSON_INVALID"]),
+    ],
+)
+def test_every_rule_is_an_error_where_it_is_broken(
+    folder: Path, act: Callable[[Path], None], expected: list[str]
+) -> None:
+    act(folder)
+    assert [code for code in codes(validate(folder).errors) if code in expected] == expected
+    broken_description = {"MISSING_DATASET_DESCRIPTION", "INVALID_JSON_FORMATTING"} & set(expected)
+    assert set(codes(validate(folder).errors)) - set(expected) <= (
+        {"CSV_COLUMN_MISSING_FROM_METADATA"} if broken_description else set()
+    )
+
+
+def test_row_ids_come_once(folder: Path) -> None:
+    describe(folder, variableMeasured=["trial", "response", "row_id"])
+    table(b"row_id\n1\n2\n1\n")(folder)
+    assert codes(validate(folder).errors) == ["ROWID_VALUES_NOT_UNIQUE"]
+
+
+def test_without_data_there_is_nothing_to_describe(tmp_path: Path) -> None:
+    describe(tmp_path)
+    assert codes(validate(tmp_path).errors) == ["MISSING_DATA_DIRECTORY"]
+    (tmp_path / "data").mkdir()
+    assert codes(validate(tmp_path).errors) == ["MISSING_DATAFILE"]
+
+
+def test_a_file_of_its_own_metadata_overrides_the_nearest_and_the_datasets(folder: Path) -> None:
+    table(b"mood\nfine\n", "data/sub-1/subject-1_session-2_data.csv")(folder)
+    assert codes(validate(folder).errors) == ["CSV_COLUMN_MISSING_FROM_METADATA"]
+    for name in (
+        "data/sub-1/subject-1_session-2_data.json",
+        "data/sub-1/file_metadata.json",
+        "data/file_metadata.json",
+    ):
+        (folder / name).write_text(json.dumps({"variableMeasured": ["mood", "trial", "response"]}))
+        assert validate(folder).errors == ()
+        (folder / name).unlink()
+
+
+def test_what_is_recommended_is_a_warning(folder: Path) -> None:
+    recommended = codes(validate(folder).warnings)
+    assert recommended == [
+        "MISSING_README_DOC",
+        "MISSING_CHANGES_DOC",
+        "MISSING_ANALYSIS_DIRECTORY",
+        "MISSING_RESULTS_DIRECTORY",
+        "MISSING_MATERIALS_DIRECTORY",
+        "MISSING_DOCUMENTATION_DIRECTORY",
+        "MISSING_PSYCHDSIGNORE",
+        "JSON_KEY_RECOMMENDED",
+    ]
+    for name in ("README.md", "CHANGES.txt", ".psychds-ignore"):
+        (folder / name).write_text("# nothing\n")
+    for name in ("analysis", "results", "materials", "documentation"):
+        (folder / name).mkdir()
+    told = dict.fromkeys(
+        ("author", "citation", "license", "funder", "url", "identifier", "privacyPolicy", "keywords"), "x"
+    )
+    describe(folder, **told)
+    assert validate(folder).warnings == ()
+
+
+@pytest.mark.parametrize(
+    ("act", "code", "place"),
+    [
+        (table(b"trial\n1\n", "data/mood-2_data.csv"), "FILENAME_UNOFFICIAL_KEYWORD_WARNING", "data/mood-2_data.csv"),
+        (table(b"trial\n1\n", "data/notes.csv"), "FILE_NOT_CHECKED", "data/notes.csv"),
+        (table(b"x", "exclusions.txt"), "FILE_NOT_CHECKED", "exclusions.txt"),
+        (table(b"", "data/sub-1/empty.txt"), "FILE_EMPTY", "data/sub-1/empty.txt"),
+        (
+            table(b"{}", "data/dataset_description.json"),
+            "WRONG_METADATA_LOCATION",
+            "data/dataset_description.json",
+        ),
+        (
+            described(variableMeasured=[{"name": "trial"}, {"name": "response"}]),
+            "OBJECT_TYPE_MISSING",
+            "dataset_description.json",
+        ),
+    ],
+)
+def test_what_is_unusual_is_a_warning_with_its_place(
+    folder: Path, act: Callable[[Path], None], code: str, place: str
+) -> None:
+    act(folder)
+    findings = validate(folder)
+    assert findings.errors == ()
+    assert [issue.place for issue in findings.warnings if issue.code == code] == [place]
+
+
+def test_what_is_to_be_ignored_is_not_looked_at(folder: Path) -> None:
+    (folder / "data" / "raw").mkdir()
+    (folder / "analysis").mkdir()
+    for name in ("data/raw/broken.json", "data/broken.jsonl", "analysis/broken.json", ".git"):
+        (folder / name).write_text("{")
+    assert "JSON_INVALID" in codes(validate(folder).errors)
+    (folder / ".psychds-ignore").write_text("# ours\nraw/\n*.jsonl\n\n")
+    assert validate(folder).errors == ()
+    assert "FILE_NOT_CHECKED" not in codes(validate(folder).warnings)
