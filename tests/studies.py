@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from study_app.protocol.load import load
-from study_app.session.answers_only import rehearse_answers
-from study_app.session.feelings import Feelings, Felt
+from study_app.session.simulated.answers_only import rehearse_answers
+from study_app.session.simulated.trial_features import Feelings, Felt
 
 
 def made_up(name: str) -> Feelings:

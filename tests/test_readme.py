@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from study_app.session.rehearsal import rehearse
+from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.blinded.blinding import reveal
 from study_app.store.exclusions import exclude
 from study_app.store.tables.column_dictionary import dictionary_markdown

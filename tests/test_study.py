@@ -21,7 +21,7 @@ from study_app.errors import StoreError
 from study_app.evaluation.replay import replay
 from study_app.protocol.load import load, shipped
 from study_app.protocol.orders.schedule import build_schedule, stream
-from study_app.session.rehearsal import rehearse
+from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.blinded.blinding import open_or_draw_key, read_key
 from study_app.store.blinded.sealing import opened
 from study_app.store.folders import SessionFolder, StudyFolder
@@ -228,7 +228,7 @@ def test_a_finished_folder_names_no_condition_liquid_parameter_or_delay(tmp_path
 
 KILLED = """
 import sys
-from study_app.session.rehearsal import rehearse
+from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.sessions.begin import SessionStore
 
 kept = SessionStore.append

@@ -29,11 +29,11 @@ from study_app.protocol.load import parse
 from study_app.protocol.model import Explore, Protocol
 from study_app.protocol.orders.schedule import build_schedule, draw_key, stream
 from study_app.protocol.source.files import source_bytes
-from study_app.session.commands import ShowPage
-from study_app.session.events import Begin, Chosen, Continue, ItemShown, LanguageChosen, Submitted, TaskDone
-from study_app.session.machine import advance, open_session
 from study_app.session.pages import Page, QuestionnairePage, TaskPage, TextPage
-from study_app.session.state import FINAL
+from study_app.session.transitions.commands import ShowPage
+from study_app.session.transitions.events import Begin, Chosen, Continue, ItemShown, LanguageChosen, Submitted, TaskDone
+from study_app.session.transitions.state import FINAL
+from study_app.session.transitions.table import advance, open_session
 from tests.real_windows import Program, wait_for
 
 SHORTER = {

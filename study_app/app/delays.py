@@ -22,9 +22,7 @@ from study_app.evaluation.accuracy.race import machine as machine_here
 from study_app.evaluation.timing.delays import BESIDE, DELAYS_S, VIRTUAL_HZ, Delayed, Shown
 from study_app.evaluation.timing.load import LoadName, busy_cores
 from study_app.gui.application import application_here
-from study_app.gui.beginning import open_store
 from study_app.gui.bridge import SessionBridge
-from study_app.gui.choices import NewSession
 from study_app.gui.collector import collecting_here
 from study_app.gui.ending import ended_from_outside
 from study_app.gui.graphics import WITHOUT_OPENGL
@@ -33,6 +31,8 @@ from study_app.gui.session_windows import open_windows
 from study_app.gui.theme import LIGHT
 from study_app.protocol.load import parse
 from study_app.protocol.orders.schedule import Schedule, Trial, build_schedule
+from study_app.session.request import NewSession
+from study_app.session.start import open_store
 from study_app.store.recording_files import read_frames
 from study_app.store.sessions.open_session import SessionStore
 

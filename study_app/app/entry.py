@@ -8,10 +8,10 @@ from pathlib import Path
 
 from study_app.app.live_session import hold
 from study_app.errors import StoreError
-from study_app.gui.beginning import check
-from study_app.gui.choices import NewSession, draw_seed, resumed, study_results
 from study_app.protocol.load import load
+from study_app.session.request import NewSession, draw_seed, resumed, study_results
 from study_app.session.resume import is_rehearsal
+from study_app.session.start import check
 from study_app.store import receipt
 from study_app.store.folders import locate, refuse_never_begun
 from study_app.store.workstation import remember_protocol
@@ -112,7 +112,7 @@ def resume(
     session = locate(folder)[1]
     refuse_never_begun(session)
     if is_rehearsal(receipt.read(session.receipt)):
-        from study_app.session import rehearsal  # noqa: PLC0415 - the compiler: only once it is needed
+        from study_app.session.simulated import rehearsal  # noqa: PLC0415 - the compiler: only once it is needed
 
         rehearsal.resume(folder, protocol=protocol)
         return 0

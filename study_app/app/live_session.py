@@ -25,8 +25,6 @@ from study_app.devices import is_falcon, kind_of
 from study_app.devices.rig import Machine, open_machine
 from study_app.errors import SessionError, StudyError
 from study_app.gui.application import application_here
-from study_app.gui.beginning import Ready, measured, open_store
-from study_app.gui.choices import NewSession
 from study_app.gui.collector import collecting_here
 from study_app.gui.dialogs import Notice
 from study_app.gui.ending import ended_from_outside
@@ -36,7 +34,9 @@ from study_app.gui.theme import LIGHT, Theme
 from study_app.protocol.load import parse
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.session.preflight import Check, checks, refused
+from study_app.session.request import NewSession
 from study_app.session.resume import FIRST, resume_at
+from study_app.session.start import Ready, measured, open_store
 
 if TYPE_CHECKING:
     from study_app.app.preflight import Preflight

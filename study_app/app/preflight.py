@@ -14,8 +14,6 @@ from PySide6.QtGui import QScreen
 from study_app.errors import StudyError
 from study_app.evaluation.appraised import Costs, Errors
 from study_app.evaluation.appraiser import Appraiser
-from study_app.gui.beginning import Ready, measured
-from study_app.gui.choices import NewSession
 from study_app.gui.preflight.view import preflight_view, resumed_rows
 from study_app.gui.preflight.window import PreflightWindow
 from study_app.gui.screens import place
@@ -26,6 +24,8 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.protocol.trials.task import Stroke, fastest_stroke
 from study_app.session.preflight import Facts, checks
+from study_app.session.request import NewSession
+from study_app.session.start import Ready, measured
 from study_app.store.folders import locate
 from study_app.store.journals import journal
 

@@ -13,13 +13,13 @@ from study_app.app.machine import MachineDesk, theme_named
 from study_app.errors import StoreError
 from study_app.gui.application import application_here
 from study_app.gui.background import Background
-from study_app.gui.choices import NewSession
 from study_app.gui.collector import collecting_here
 from study_app.gui.ending import ended_from_outside
 from study_app.gui.home.place import HomePlace
 from study_app.gui.home.workspace import WorkspaceDialog
 from study_app.gui.main_window import MainWindow
 from study_app.gui.screens import place
+from study_app.session.request import NewSession
 from study_app.store.workstation import MachineSettings, create_workspace
 from study_app.workspace import Workspace, chosen_workspace, offered_workspace, workspace
 

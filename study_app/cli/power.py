@@ -61,7 +61,7 @@ def power(
     from study_app.analysis.power.planned import plan
     from study_app.analysis.power.writing import write
     from study_app.protocol.load import load
-    from study_app.session.feelings import feelings
+    from study_app.session.simulated.trial_features import feelings
 
     study = load(protocol)
     line = _Line()

@@ -152,11 +152,11 @@ def rehearse(
     if answers_only:
         if context.get_parameter_source("device") is not ParameterSource.DEFAULT:
             raise click.UsageError("--answers-only needs no device: leave out --device")
-        from study_app.session.answers_only import rehearse_answers
+        from study_app.session.simulated.answers_only import rehearse_answers
 
         folder = rehearse_answers(protocol, participants=participants, seed=seed, results=results, progress=click.echo)
     else:
-        from study_app.session.rehearsal import rehearse as rehearse_study
+        from study_app.session.simulated.rehearsal import rehearse as rehearse_study
 
         folder = rehearse_study(
             protocol,

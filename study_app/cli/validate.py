@@ -39,7 +39,7 @@ def validate_report(studies: int, jobs: int, seed: int, to: Path | None) -> None
     from study_app.analysis.validation.running import validate
     from study_app.analysis.validation.studies import simulated
     from study_app.protocol.load import load
-    from study_app.session.feelings import feelings
+    from study_app.session.simulated.trial_features import feelings
 
     protocol = load("rek2024")
     studied = simulated(protocol, plan(protocol, feelings(protocol, seed=seed)))

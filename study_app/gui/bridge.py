@@ -32,7 +32,10 @@ from study_app.gui.reconnection import Reconnection
 from study_app.gui.session_parts import Hand, Parts
 from study_app.gui.slack import Slack
 from study_app.gui.urgency import Urgency
-from study_app.session.events import (
+from study_app.session.pages import Page, TaskPage
+from study_app.session.ports import Ports
+from study_app.session.runner import Runner
+from study_app.session.transitions.events import (
     Begin,
     Continue,
     EndAsked,
@@ -45,9 +48,6 @@ from study_app.session.events import (
     ResumeAsked,
     broken,
 )
-from study_app.session.pages import Page, TaskPage
-from study_app.session.ports import Ports
-from study_app.session.runner import Runner
 from study_app.store.program_log import DEVICE_FAILED
 
 TRACES_S = 0.030  # every second frame of 60 a second, every fifth of 144

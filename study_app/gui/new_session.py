@@ -24,7 +24,6 @@ from study_app.devices import kind_of, list_devices
 from study_app.errors import DeviceError, StoreError
 from study_app.gui.background import Background
 from study_app.gui.cards import Icon, Rule
-from study_app.gui.choices import NewSession, draw_seed, study_results
 from study_app.gui.controls import ActionButton, Check, Choice, Number
 from study_app.gui.devices.view import TITLES
 from study_app.gui.home.facts import LANGUAGES, StudyFacts
@@ -32,6 +31,7 @@ from study_app.gui.labels import label, set_ink
 from study_app.gui.screens import screens_shown
 from study_app.gui.theme import LIGHT, Theme, font
 from study_app.gui.themed import wear
+from study_app.session.request import NewSession, draw_seed, study_results
 from study_app.store.folders import MAX_SESSION, StudyFolder, UsedIds, check_participant, used_ids
 from study_app.store.tables.study_description import check_study
 from study_app.store.workstation import DEFAULTS, MachineSettings

@@ -34,7 +34,6 @@ from study_app.gui.scene_view import TankWidget, paint_ahead
 from study_app.gui.screens import place
 from study_app.gui.theme import PARTICIPANT, font, load_fonts, stylesheet
 from study_app.protocol.wording.languages import Words, words
-from study_app.session.events import Continue, ForceStopped, PauseAsked
 from study_app.session.pages import (
     EndPage,
     Page,
@@ -44,6 +43,7 @@ from study_app.session.pages import (
     TextPage,
     TroublePage,
 )
+from study_app.session.transitions.events import Continue, ForceStopped, PauseAsked
 
 if TYPE_CHECKING:
     from study_app.session.trial import TankView

@@ -25,16 +25,16 @@ from study_app.protocol.orders.schedule import Schedule, stream
 from study_app.protocol.wording.languages import words
 from study_app.session.pages import Page, TaskPage
 from study_app.session.resume import FIRST, Start
-from study_app.session.simulated import Explorer, Reacher
+from study_app.session.simulated.observers import Explorer, Reacher
 from study_app.store.blinded.sealing import opened
 from study_app.store.exclusions import exclude
 
 if TYPE_CHECKING:
     from study_app.devices.base import Device
     from study_app.devices.rig import Machine
-    from study_app.gui.choices import NewSession
     from study_app.gui.theme import Theme
     from study_app.haptics.runtime.servo import Servo
+    from study_app.session.request import NewSession
     from study_app.store.sessions.open_session import SessionStore
 
 

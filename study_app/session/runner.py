@@ -26,8 +26,11 @@ from study_app.errors import SessionError, StoreError, StudyError
 from study_app.haptics.model.layout import BUTTON_STOP
 from study_app.protocol.model import Protocol as Study
 from study_app.protocol.orders.schedule import Schedule
-from study_app.session import compose
-from study_app.session.commands import (
+from study_app.session.ports import Ports
+from study_app.session.resume import FIRST, Start
+from study_app.session.tasks import TaskView
+from study_app.session.transitions import page_builder
+from study_app.session.transitions.commands import (
     CheckFlushed,
     Command,
     FadeIn,
@@ -40,7 +43,7 @@ from study_app.session.commands import (
     Write,
     WriteTables,
 )
-from study_app.session.events import (
+from study_app.session.transitions.events import (
     Broke,
     Continue,
     EndAsked,
@@ -51,13 +54,10 @@ from study_app.session.events import (
     TaskDone,
     broken,
 )
-from study_app.session.machine import advance, open_session
-from study_app.session.ports import Ports
-from study_app.session.recording import Recording
-from study_app.session.resume import FIRST, Start
-from study_app.session.state import FINAL, Phase, SessionState
-from study_app.session.tasks import TaskView
+from study_app.session.transitions.state import FINAL, Phase, SessionState
+from study_app.session.transitions.table import advance, open_session
 from study_app.session.trial import RunningTrial, TankView
+from study_app.session.trial_recording import Recording
 
 BUTTON_CONTINUE = 1 << 0
 RETRY_S = 1.0  # a disk that took nothing is tried again so often
@@ -282,7 +282,7 @@ class Runner:
         servo.rest()
         self._stall = _Stall(str(error), tuple(commands), at_s, self._ports.clock() + RETRY_S)
         over = self._state.phase in FINAL
-        self._ports.present(compose.page(self._state if over else replace(self._state, phase=Phase.TROUBLE)))
+        self._ports.present(page_builder.page(self._state if over else replace(self._state, phase=Phase.TROUBLE)))
         self._tell()
 
     def _try_again(self, stall: _Stall) -> bool:
@@ -313,7 +313,7 @@ class Runner:
             raise SessionError(f"{stall.reason}; until then the session waits")
         if not self._try_again(stall):
             self._state, _ = advance(self._state, event)
-            self._ports.present(compose.page(self._state))
+            self._ports.present(page_builder.page(self._state))
             self._tell()
             raise StoreError(
                 f"{stall.reason}; the session's end is not written either: resume it later, or end it then"

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from study_app.haptics.model.layout import LIMITER_GLITCH
 from study_app.haptics.model.scene import Scene
-from study_app.session.commands import StartTrial
 from study_app.session.ports import ServoPort
-from study_app.session.recording import Recording
-from study_app.session.statistics import TrialStatistics
 from study_app.session.tasks import Outcome, TargetReached, TaskView, track
+from study_app.session.transitions.commands import StartTrial
+from study_app.session.trial_recording import Recording
+from study_app.session.trial_statistics import TrialStatistics
 
 # Everything is drawn this much later than the trial asks. Then the moment to draw lies between two samples at every
 # delay, none included, and is met exactly; else the newest sample, up to a tick old, would stand in where there is no

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from study_app.analysis.performance import performance
 from study_app.analysis.reaches import Targets, path_length_m, reaches, submovements
 from study_app.analysis.tables import load_study
-from study_app.session.rehearsal import rehearse
+from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.blinded.unblinding import unblind
 from study_app.store.folders import StudyFolder
 from tests.compiled import needs_servo

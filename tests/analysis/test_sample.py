@@ -12,7 +12,7 @@ import pytest
 from study_app.analysis.export import export
 from study_app.analysis.figures import plot
 from study_app.analysis.tables import load_study
-from study_app.session.rehearsal import rehearse
+from study_app.session.simulated.rehearsal import rehearse
 from study_app.store import receipt
 from study_app.store.blinded.blinding import read_key
 from study_app.store.blinded.sealing import opened

@@ -157,7 +157,7 @@ def test_the_command_tells_rates_that_are_undecided_from_rates_that_hold(
 ) -> None:
     rates = tuple(Rate("cell", 5, f"what {at}", "at most 5 %", hit, 1000) for at, hit in enumerate(hits))
     rates += (Rate("cell", 5, "size", "counted", 7, 1000),) if rates else ()
-    monkeypatch.setattr("study_app.session.feelings.feelings", lambda *_args, **_named: None)
+    monkeypatch.setattr("study_app.session.simulated.trial_features.feelings", lambda *_args, **_named: None)
     monkeypatch.setattr("study_app.analysis.power.planned.plan", lambda *_args: None)
     monkeypatch.setattr("study_app.analysis.validation.studies.simulated", lambda *_args: None)
     monkeypatch.setattr("study_app.analysis.validation.running.validate", lambda *_args, **_named: [(1000, rates)])

@@ -18,9 +18,9 @@ from study_app.app.live_session import LiveSession
 from study_app.app.machine import MachineDesk, described, settings_here, text_scale_on
 from study_app.app.visit import Visit
 from study_app.devices.backends import NONE, READY, Backend
-from study_app.gui.choices import NewSession
 from study_app.gui.dialogs import Notice
 from study_app.gui.theme import DARK, LIGHT
+from study_app.session.request import NewSession
 from study_app.store import workstation
 from study_app.store.workstation import DEFAULTS, DisplayOffset, MachineSettings, load, save
 from study_app.user_folder import settings_file

@@ -16,14 +16,14 @@ from study_app.app import preflight
 from study_app.app.preflight import Appraisal, Preflight
 from study_app.errors import DeviceLost
 from study_app.evaluation.appraised import Costs, Errors
-from study_app.gui.beginning import Ready
-from study_app.gui.choices import NewSession
 from study_app.gui.theme import LIGHT
 from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
 from study_app.haptics.runtime.telemetry import Timing
 from study_app.protocol.load import load
 from study_app.protocol.trials.task import Stroke
 from study_app.session.preflight import Facts, Screen
+from study_app.session.request import NewSession
+from study_app.session.start import Ready
 
 CHOSEN = NewSession("demo", "P001", 1, 7, "AK", "en", "mouse", True, None, Path("nowhere"))
 FACTS = Facts(

@@ -18,7 +18,7 @@ from tests.compiled import needs_servo
 @needs_servo
 def test_a_session_is_held_and_its_cockpit_taken_in_both_themes(qapp, tmp_path, monkeypatch):
     monkeypatch.setattr(session, "TRACED_MS", 500)
-    monkeypatch.setattr("study_app.gui.beginning.MEASURED_S", 0.1)
+    monkeypatch.setattr("study_app.session.start.MEASURED_S", 0.1)
     here, told = Path.cwd(), []
     taken = screenshots(tmp_path, only="single-blind", tell=told.append)
     assert [path.name for path in taken][-3:] == [
@@ -46,7 +46,7 @@ def test_a_session_that_cannot_be_taken_is_let_go_of(qapp, tmp_path, monkeypatch
 
     monkeypatch.setattr(session, "TRACED_MS", 0)
     monkeypatch.setattr(session._Session, "take_cockpit", fails)
-    monkeypatch.setattr("study_app.gui.beginning.MEASURED_S", 0.1)
+    monkeypatch.setattr("study_app.session.start.MEASURED_S", 0.1)
     with pytest.raises(StudyError, match="no picture"):
         screenshots(tmp_path, only="single-blind", tell=lambda _line: None)
     assert not [window for window in QApplication.topLevelWidgets() if window.isVisible()]

@@ -30,7 +30,7 @@ from pathlib import Path
 from PySide6.QtWidgets import QApplication
 from study_app.app.live_session import LiveSession
 from study_app.gui.application import application_here
-from study_app.gui.choices import NewSession
+from study_app.session.request import NewSession
 from study_app.gui.theme import LIGHT
 
 class Idle:

@@ -26,11 +26,11 @@ from study_app.gui.participant import ParticipantWindow
 from study_app.protocol.load import load, parse, source_bytes
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.protocol.wording.languages import words
-from study_app.session.events import Begin, Chosen, Continue, Event, ItemShown, Submitted
 from study_app.session.pages import Page, TaskPage
 from study_app.session.ports import Ports
 from study_app.session.runner import Runner
-from study_app.session.state import Phase
+from study_app.session.transitions.events import Begin, Chosen, Continue, Event, ItemShown, Submitted
+from study_app.session.transitions.state import Phase
 from study_app.store.clock import SessionClock
 from study_app.store.sessions.begin import begin
 from tests.session.fakes import FakeServo

@@ -17,7 +17,7 @@ import time
 from pathlib import Path
 
 from study_app.gui.sessions.facts import sessions
-from study_app.session.answers_only import rehearse_answers
+from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.checksums import write_checksums
 from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal

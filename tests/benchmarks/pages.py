@@ -15,8 +15,8 @@ import numpy as np
 
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule
-from study_app.session.rehearsal import Machine, Rehearsal
 from study_app.session.resume import REHEARSED_SCREENS
+from study_app.session.simulated.rehearsal import Machine, Rehearsal
 from study_app.store.clock import SessionClock
 from study_app.store.sessions.begin import begin
 

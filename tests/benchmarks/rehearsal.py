@@ -12,7 +12,7 @@ import time
 from pathlib import Path
 
 from study_app.protocol.load import load
-from study_app.session.rehearsal import rehearse
+from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 

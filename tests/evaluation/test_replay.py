@@ -19,12 +19,20 @@ from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.orders.schedule import build_schedule
-from study_app.session.events import Begin, Continue, EndAsked, ForceStopped, PauseAsked, RepeatAsked, ResumeAsked
 from study_app.session.pages import Page, TaskPage
 from study_app.session.ports import Ports
-from study_app.session.rehearsal import rehearse
 from study_app.session.resume import resume_at
 from study_app.session.runner import Runner
+from study_app.session.simulated.rehearsal import rehearse
+from study_app.session.transitions.events import (
+    Begin,
+    Continue,
+    EndAsked,
+    ForceStopped,
+    PauseAsked,
+    RepeatAsked,
+    ResumeAsked,
+)
 from study_app.store import recording_files
 from study_app.store.clock import SessionClock
 from study_app.store.folders import StudyFolder

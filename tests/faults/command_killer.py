@@ -17,7 +17,7 @@ from pathlib import Path
 
 from study_app.analysis.export import export
 from study_app.analysis.report.writing import report
-from study_app.session import rehearsal
+from study_app.session.simulated import rehearsal
 from study_app.store.blinded.unblinding import unblind
 from study_app.store.sessions.rebuild import rebuild
 from tests.faults.killer import SEED, forked

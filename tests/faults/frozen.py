@@ -18,10 +18,10 @@ from pathlib import Path
 from study_app import app
 from study_app.app import live_session
 from study_app.devices.rig import Machine
-from study_app.gui import beginning
 from study_app.gui.application import application_here
 from study_app.gui.operator import OperatorWindow
 from study_app.gui.participant import ParticipantWindow
+from study_app.session import start
 from study_app.session.pages import PausePage, QuestionnairePage, TaskPage, TextPage
 from study_app.session.trial import RunningTrial
 from tests.faults import short
@@ -52,7 +52,7 @@ def main(folder: str, how: str) -> int:
     machines: list[Machine] = []
     open_machine = live_session.open_machine
     live_session.open_machine = lambda *a, **k: machines.append(open_machine(*a, **k)) or machines[-1]
-    beginning.MEASURED_S = 0.1
+    start.MEASURED_S = 0.1
     stopped: list[int] = []
     if how != "felt":
         stand_still_after_the_first_frame(how, stopped)

@@ -18,7 +18,7 @@ import traceback
 from collections.abc import Callable
 from pathlib import Path
 
-from study_app.session import rehearsal
+from study_app.session.simulated import rehearsal
 from study_app.store.sessions.rebuild import rebuild
 
 SEED = 7

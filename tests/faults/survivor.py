@@ -20,13 +20,13 @@ from PySide6.QtWidgets import QLabel
 from study_app import app
 from study_app.app import live_session
 from study_app.devices.rig import Machine
-from study_app.gui import beginning
 from study_app.gui.application import application_here
 from study_app.gui.dialogs import Notice
 from study_app.gui.operator import OperatorWindow
 from study_app.gui.operator.rail import StepLine
 from study_app.gui.participant import ParticipantWindow
 from study_app.gui.plots import TracePlot
+from study_app.session import start
 from study_app.session.pages import PausePage, TaskPage, TroublePage
 from study_app.store.recorder import Recorder
 from tests.faults import short
@@ -203,7 +203,7 @@ def _ends(*_arguments: object) -> None:
 
 
 def main(folder: str, pictures: str = "") -> None:
-    beginning.MEASURED_S = 0.7  # the force has faded in by the first trial, as in a real session
+    start.MEASURED_S = 0.7  # the force has faded in by the first trial, as in a real session
     machines: list[Machine] = []
     open_machine = live_session.open_machine
     live_session.open_machine = lambda *a, **k: machines.append(open_machine(*a, **k)) or machines[-1]

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from study_app.session.state import Phase
+from study_app.session.transitions.state import Phase
 from study_app.store import clock
 from study_app.store.clock import SessionClock
 from study_app.store.sessions import reopen as resume

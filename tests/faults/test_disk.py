@@ -12,10 +12,10 @@ from pathlib import Path
 import pytest
 
 from study_app.errors import StoreError
-from study_app.session.events import Note
 from study_app.session.pages import EndPage, PausePage, TroublePage
 from study_app.session.runner import RETRY_S
-from study_app.session.state import Phase
+from study_app.session.transitions.events import Note
+from study_app.session.transitions.state import Phase
 from study_app.store.journals import journal
 from study_app.store.verification.verify_study import verify
 from tests.faults.worlds import StoredWorld

@@ -11,12 +11,12 @@ import pytest
 from PySide6.QtWidgets import QApplication, QLabel, QWidget
 
 from study_app import app
-from study_app.gui import beginning
 from study_app.gui.operator import OperatorWindow
 from study_app.gui.operator.force_plots import ForceCard
 from study_app.gui.operator.plots import HiddenForceCard
 from study_app.gui.participant import ParticipantWindow
 from study_app.protocol.load import load, source_bytes
+from study_app.session import start
 from study_app.session.pages import TaskPage
 from study_app.store import receipt
 from study_app.store.folders import StudyFolder
@@ -91,7 +91,7 @@ def traces_of(operator: OperatorWindow) -> set[str]:
 def test_nothing_seen_written_or_logged_tells_a_condition(
     concealed: Path, blinding: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(beginning, "MEASURED_S", 0.1)
+    monkeypatch.setattr(start, "MEASURED_S", 0.1)
     caplog.set_level(logging.DEBUG)
     said: set[str] = set()
     tasks: set[int] = set()

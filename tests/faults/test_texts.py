@@ -9,8 +9,8 @@ import pandas as pd
 import pytest
 
 from study_app.analysis.tables import load_study
-from study_app.session.events import EndAsked, Note, RepeatAsked
-from study_app.session.state import Phase
+from study_app.session.transitions.events import EndAsked, Note, RepeatAsked
+from study_app.session.transitions.state import Phase
 from study_app.store.exclusions import exclude, exclusions
 from study_app.store.journals import journal
 from study_app.store.tables.formulas import unguarded

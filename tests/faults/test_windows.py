@@ -15,9 +15,9 @@ from study_app import app
 from study_app.app import live_session
 from study_app.devices.rig import Machine
 from study_app.errors import StudyError
-from study_app.gui import beginning
 from study_app.gui.operator import OperatorWindow
 from study_app.gui.participant import ParticipantWindow
+from study_app.session import start
 from study_app.session.pages import PausePage, TaskPage
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
@@ -33,7 +33,7 @@ pytestmark = [needs_servo, pytest.mark.usefixtures("qapp")]
 @pytest.fixture(autouse=True)
 def machines(monkeypatch: pytest.MonkeyPatch) -> list[Machine]:
     """Return the machines that are opened; the pre-flight takes a tenth of a second."""
-    monkeypatch.setattr(beginning, "MEASURED_S", 0.1)
+    monkeypatch.setattr(start, "MEASURED_S", 0.1)
     opened: list[Machine] = []
     open_machine = live_session.open_machine
     monkeypatch.setattr(

@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Any
 
 from study_app.protocol.orders.schedule import build_schedule
-from study_app.session.events import Begin, Chosen, Continue, ItemShown, ResumeAsked, Submitted
 from study_app.session.ports import Ports
 from study_app.session.runner import Runner
-from study_app.session.state import Phase
+from study_app.session.transitions.events import Begin, Chosen, Continue, ItemShown, ResumeAsked, Submitted
+from study_app.session.transitions.state import Phase
 from study_app.store.clock import SessionClock
 from study_app.store.sessions.begin import begin
 from study_app.store.sessions.open_session import SessionStore

@@ -20,7 +20,7 @@ from PySide6.QtWidgets import QApplication
 from study_app import app
 from study_app.app import live_session
 from study_app.errors import DeviceNotFound, DisplayError, SessionError, StoreError, StudyError
-from study_app.gui import beginning, ending
+from study_app.gui import ending
 from study_app.gui.main_window import MainWindow
 from study_app.gui.opening import OpeningWindow
 from study_app.gui.operator import OperatorWindow
@@ -28,6 +28,7 @@ from study_app.gui.participant import ParticipantWindow
 from study_app.gui.preflight import PreflightWindow
 from study_app.gui.theme import PARTICIPANT
 from study_app.protocol.load import parse, source_bytes
+from study_app.session import start
 from study_app.session.pages import EndPage, PausePage, QuestionnairePage, TaskPage, TextPage, TroublePage
 from study_app.store import workstation
 from study_app.store.sessions.open_session import SessionStore
@@ -49,7 +50,7 @@ def nobody_stays():
 @pytest.fixture(autouse=True)
 def quick_preflight(monkeypatch):
     """Measure a tenth of a second: what is judged of it is tested by itself."""
-    monkeypatch.setattr(beginning, "MEASURED_S", 0.1)
+    monkeypatch.setattr(start, "MEASURED_S", 0.1)
 
 
 @pytest.fixture
@@ -506,7 +507,7 @@ def test_the_preflight_is_told_before_anything_is_created(short_demo, results):
 
 
 def test_a_failing_preflight_refuses_the_session(short_demo, results, monkeypatch):
-    monkeypatch.setattr("study_app.session.measuring.probe", lambda _folder: 1_000)
+    monkeypatch.setattr("study_app.session.preflight_measurements.probe", lambda _folder: 1_000)
     with pytest.raises(SessionError, match="free space: 0 MB free"):
         app.run(short_demo, participant="P001", windowed=True, results=results)
     assert not results.exists()

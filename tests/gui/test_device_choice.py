@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 
 from study_app.errors import DeviceError, DeviceNotFound
-from study_app.gui.beginning import check
-from study_app.gui.choices import NewSession, study_results
 from study_app.gui.opening import FIRST_TIME, OpeningWindow
 from study_app.protocol.load import load
+from study_app.session.request import NewSession, study_results
+from study_app.session.start import check
 
 CHOSEN = NewSession("demo", "P001", 1, 7, "", "en", "mouse", True, None, Path("nowhere"))
 

@@ -16,10 +16,10 @@ from study_app.protocol.load import load
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule, draw_key, stream
 from study_app.protocol.wording.languages import words
-from study_app.session.events import Begin, Chosen, Continue, Submitted, TaskDone
 from study_app.session.pages import Page, QuestionnairePage, TaskPage, TextPage
 from study_app.session.ports import Ports
 from study_app.session.runner import Runner
+from study_app.session.transitions.events import Begin, Chosen, Continue, Submitted, TaskDone
 from study_app.session.trial import SETTLED_S
 from tests.gui.small import ManualClock
 from tests.session.fakes import FakeJournal, FakeServo

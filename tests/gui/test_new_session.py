@@ -10,10 +10,10 @@ from PySide6.QtCore import QSize, Qt
 from PySide6.QtWidgets import QApplication
 
 from study_app.gui import new_session
-from study_app.gui.choices import MAX_SEED, draw_seed
 from study_app.gui.home.facts import study_facts
 from study_app.gui.new_session import NewSessionDialog
 from study_app.gui.screens import ScreenShown
+from study_app.session.request import MAX_SEED, draw_seed
 from study_app.store.workstation import MachineSettings
 
 # The platform without a screen cannot limit or raise windows, and says so.

@@ -18,8 +18,8 @@ from study_app.gui.pages.text import TextWidget
 from study_app.gui.participant import ParticipantWindow
 from study_app.gui.tank import backdrop
 from study_app.protocol.wording.languages import words
-from study_app.session.events import LanguageChosen
 from study_app.session.pages import EndPage, Page, PausePage, TroublePage
+from study_app.session.transitions.events import LanguageChosen
 from tests.gui.small import ManualClock, explore, questionnaire, task_page, text_page, view
 
 SIZE = QSize(1024, 640)

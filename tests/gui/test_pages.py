@@ -16,8 +16,8 @@ from study_app.gui.pages.reading import ReadingPage
 from study_app.gui.pages.text import TextWidget
 from study_app.gui.progress import ProgressLine, progress_words
 from study_app.protocol.wording.languages import LANGUAGES, words
-from study_app.session.events import Continue, ResumeAsked
 from study_app.session.pages import PausePage, Progress, TroublePage
+from study_app.session.transitions.events import Continue, ResumeAsked
 from tests.gui.small import ManualClock, text_page
 
 ENGLISH = words("en")

@@ -18,8 +18,16 @@ from study_app.gui.participant import LEAST_SIZE, ParticipantWindow
 from study_app.gui.pointer import NOTCHES, SHARE_OF_SCREEN, PointerCapture
 from study_app.gui.scene_view import TankWidget
 from study_app.protocol.wording.languages import words
-from study_app.session.events import Chosen, Continue, ForceStopped, ItemShown, PauseAsked, ResumeAsked, Submitted
 from study_app.session.pages import EndPage, Page, PausePage, TroublePage
+from study_app.session.transitions.events import (
+    Chosen,
+    Continue,
+    ForceStopped,
+    ItemShown,
+    PauseAsked,
+    ResumeAsked,
+    Submitted,
+)
 from tests.gui.small import ManualClock, explore, questionnaire, task_page, text_page, view
 
 PAGES: list[tuple[Page, type[QWidget]]] = [

@@ -16,8 +16,8 @@ from study_app.gui.pages.questionnaire import QuestionnaireWidget
 from study_app.gui.pages.rows import WRAP_LEFT, Row
 from study_app.gui.theme import font
 from study_app.protocol.wording.languages import words
-from study_app.session.events import Chosen, ItemShown, Submitted
 from study_app.session.pages import ItemView, QuestionnairePage
+from study_app.session.transitions.events import Chosen, ItemShown, Submitted
 from tests.gui.small import LABELS, ManualClock, questionnaire
 
 KEY = Qt.Key

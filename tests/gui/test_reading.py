@@ -11,8 +11,8 @@ from PySide6.QtWidgets import QApplication, QScroller
 
 from study_app.gui.pages.text import TextWidget
 from study_app.protocol.wording.languages import words
-from study_app.session.events import Continue, LanguageChosen
 from study_app.session.pages import TextPage
+from study_app.session.transitions.events import Continue, LanguageChosen
 from tests.gui.small import text_page
 
 ENGLISH = words("en")

@@ -15,7 +15,7 @@ from study_app.gui.sessions.page import SessionPage
 from study_app.gui.sessions.record import MOTION_HIDDEN, read_record
 from study_app.gui.theme import LIGHT
 from study_app.protocol.load import load, source_bytes
-from study_app.session.rehearsal import rehearse
+from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.blinded.unblinding import unblind
 from study_app.store.exclusions import exclusions
 from study_app.store.folders import StudyFolder

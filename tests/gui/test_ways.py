@@ -16,8 +16,8 @@ from study_app.gui.pages.questionnaire import QuestionnaireWidget
 from study_app.gui.pages.text import TextWidget
 from study_app.gui.participant import ParticipantWindow
 from study_app.protocol.wording.languages import words
-from study_app.session.events import Chosen, Continue, ItemShown, LanguageChosen, ResumeAsked, Submitted
 from study_app.session.pages import PausePage
+from study_app.session.transitions.events import Chosen, Continue, ItemShown, LanguageChosen, ResumeAsked, Submitted
 from tests.gui.small import STATEMENTS, ManualClock, questionnaire, text_page
 
 GIVEN = (6, 5, 4, None, 7, 2, 1, 4, 7)

@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from study_app.protocol.model import Protocol
-from study_app.session.events import Begin, Continue
+from study_app.session.transitions.events import Begin, Continue
 from tests.session import small
 from tests.session.fakes import World
 

@@ -9,11 +9,11 @@ import numpy as np
 
 from study_app.errors import StoreError
 from study_app.haptics.model.scene import Scene
-from study_app.session.events import Begin, Chosen, Continue, Submitted
 from study_app.session.pages import TaskPage
 from study_app.session.ports import Ports
 from study_app.session.runner import Runner
-from study_app.session.state import Phase, SessionState
+from study_app.session.transitions.events import Begin, Chosen, Continue, Submitted
+from study_app.session.transitions.state import Phase, SessionState
 from tests.session import small
 
 LEFT, RIGHT, AWAY = (-0.02, 0.0, 0.0), (0.02, 0.0, 0.0), (0.0, 0.01, 0.0)

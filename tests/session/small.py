@@ -9,9 +9,9 @@ import numpy as np
 from study_app.haptics.model.layout import SAMPLE
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule, draw_key, stream
-from study_app.session.events import Begin, Chosen, Continue, ItemShown, Submitted, TaskDone
-from study_app.session.machine import advance, open_session
-from study_app.session.state import Phase, SessionState
+from study_app.session.transitions.events import Begin, Chosen, Continue, ItemShown, Submitted, TaskDone
+from study_app.session.transitions.state import Phase, SessionState
+from study_app.session.transitions.table import advance, open_session
 
 # Numbers that occur nowhere by chance, so that a leak can be searched for.
 ODD_DELAY_MS = 137.0

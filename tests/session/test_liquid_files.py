@@ -14,7 +14,6 @@ import pytest
 
 from study_app.errors import ProtocolError, StoreError
 from study_app.evaluation.replay import replay
-from study_app.gui.choices import resumed
 from study_app.protocol.describe import describe
 from study_app.protocol.liquid_summary import warnings
 from study_app.protocol.load import load, load_scenes, parse, protocol_hash, source_bytes
@@ -22,11 +21,12 @@ from study_app.protocol.model import schema
 from study_app.protocol.orders.block_orders import block_codes
 from study_app.protocol.orders.schedule import Trial, build_schedule, stream
 from study_app.protocol.source.liquid_files import unbundled
-from study_app.session import rehearsal
-from study_app.session.compose import page
-from study_app.session.machine import open_session
 from study_app.session.pages import TaskPage
-from study_app.session.state import Phase
+from study_app.session.request import resumed
+from study_app.session.simulated import rehearsal
+from study_app.session.transitions.page_builder import page
+from study_app.session.transitions.state import Phase
+from study_app.session.transitions.table import open_session
 from study_app.store.blinded.blinding import open_or_draw_key, read_key
 from study_app.store.folders import StudyFolder
 from study_app.store.sessions.begin import begin

@@ -16,9 +16,9 @@ from study_app.haptics.runtime.clocks.grants import Grant
 from study_app.haptics.runtime.servo import Servo
 from study_app.haptics.runtime.telemetry import Timing
 from study_app.protocol.model import Protocol
-from study_app.session import measuring
-from study_app.session.measuring import measure
+from study_app.session import preflight_measurements
 from study_app.session.preflight import Facts, Screen, checks, refused
+from study_app.session.preflight_measurements import measure
 from tests.compiled import needs_servo
 from tests.session import small
 
@@ -161,6 +161,6 @@ def test_a_disk_that_takes_nothing_is_a_failure_with_its_reason(
     def full(_folder: Path) -> int:
         raise StoreError("the disk is full")
 
-    monkeypatch.setattr(measuring, "probe", full)
+    monkeypatch.setattr(preflight_measurements, "probe", full)
     facts = measured(tmp_path)
     assert "the disk is full" in refused(checks(facts, small.protocol()))

@@ -13,8 +13,9 @@ from study_app.protocol.describe import expected_duration_s
 from study_app.protocol.load import load
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule, draw_key, stream
-from study_app.session.commands import ShowPage, Write
-from study_app.session.events import (
+from study_app.session.pages import Progress, TextPage
+from study_app.session.transitions.commands import ShowPage, Write
+from study_app.session.transitions.events import (
     Begin,
     Continue,
     ForceStopped,
@@ -23,9 +24,8 @@ from study_app.session.events import (
     ResumeAsked,
     TaskDone,
 )
-from study_app.session.machine import advance, open_session
-from study_app.session.pages import Progress, TextPage
-from study_app.session.state import FINAL, Phase, SessionState
+from study_app.session.transitions.state import FINAL, Phase, SessionState
+from study_app.session.transitions.table import advance, open_session
 from tests.session import small
 
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import pytest
 
 from study_app.errors import DeviceLost, SessionError
-from study_app.session.commands import FadeIn, StartTrial, StopForce, Write
-from study_app.session.events import Broke, PauseAsked, Reconnected, ResumeAsked, broken
-from study_app.session.machine import advance
-from study_app.session.state import Phase
+from study_app.session.transitions.commands import FadeIn, StartTrial, StopForce, Write
+from study_app.session.transitions.events import Broke, PauseAsked, Reconnected, ResumeAsked, broken
+from study_app.session.transitions.state import Phase
+from study_app.session.transitions.table import advance
 from study_app.store.tables import session_tables
 from tests.faults.worlds import StoredWorld
-from tests.session.test_machine import state_in
+from tests.session.transitions.test_table import state_in
 
 FAULT = "the device 'memory' stopped answering"
 AGAIN = Reconnected(30.0, {"name": "memory", "force_limit_n": 8.0})

@@ -11,12 +11,12 @@ from study_app.errors import SessionError
 from study_app.protocol.load import protocol_hash, source_bytes
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import PageStep, Trial, build_schedule
-from study_app.session.commands import FadeIn, ShowPage, StartTrial, Write
-from study_app.session.events import Begin, ResumeAsked
-from study_app.session.machine import advance, open_session
 from study_app.session.pages import PausePage
 from study_app.session.resume import REHEARSED_SCREENS, find_protocol, is_rehearsal, resume_at
-from study_app.session.state import Phase, SessionState
+from study_app.session.transitions.commands import FadeIn, ShowPage, StartTrial, Write
+from study_app.session.transitions.events import Begin, ResumeAsked
+from study_app.session.transitions.state import Phase, SessionState
+from study_app.session.transitions.table import advance, open_session
 from tests.session import small
 
 STARTED = {"event": "session_started", "t_s": 0.0}

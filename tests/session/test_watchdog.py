@@ -13,10 +13,10 @@ from study_app.haptics.model.layout import STATUS_OK
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from study_app.session.pages import TroublePage
-from study_app.session.state import Phase
+from study_app.session.transitions.state import Phase
 from tests.compiled import needs_servo
 from tests.session import small
-from tests.session.test_runner_with_servo import Bench
+from tests.session.runner.test_runner_with_servo import Bench
 
 pytestmark = needs_servo
 

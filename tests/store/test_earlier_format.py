@@ -10,7 +10,7 @@ import pytest
 
 from study_app.analysis.export import export
 from study_app.analysis.report.writing import report
-from study_app.session import rehearsal
+from study_app.session.simulated import rehearsal
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.sessions.rebuild import rebuild

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from study_app.protocol.load import load, source_bytes
-from study_app.session.answers_only import rehearse_answers
+from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.blinded import blinding
 from study_app.store.sessions.begin import begin
 

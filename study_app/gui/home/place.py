@@ -16,7 +16,6 @@ from study_app.errors import StudyError
 from study_app.gui.application import open_here
 from study_app.gui.background import Background
 from study_app.gui.cards import SHADOW
-from study_app.gui.choices import resumed
 from study_app.gui.controls import ActionButton
 from study_app.gui.devices.view import DeviceShown, looking
 from study_app.gui.home.banner import ResumeBanner
@@ -41,6 +40,7 @@ from study_app.gui.screens import screens_shown
 from study_app.gui.sessions.facts import SessionFacts, sessions
 from study_app.gui.sessions.page import SessionPage
 from study_app.gui.themed import dress
+from study_app.session.request import resumed
 from study_app.store.workstation import DEFAULTS, MachineSettings
 from study_app.workspace import workspace
 

@@ -12,8 +12,8 @@ from PySide6.QtWidgets import QWidget
 from study_app.gui.pages.base import page_painter, page_scale
 from study_app.gui.pages.reading import ReadingPage
 from study_app.gui.theme import PARTICIPANT, RADIUS_CARD
-from study_app.session.events import ResumeAsked
 from study_app.session.pages import EndPage, PausePage, TroublePage
+from study_app.session.transitions.events import ResumeAsked
 
 if TYPE_CHECKING:
     from study_app.protocol.wording.languages import Words

@@ -18,8 +18,8 @@ from study_app.gui.pages.rows import WRAP_LEFT, Row
 from study_app.gui.pages.speech import say
 from study_app.gui.progress import ProgressLine
 from study_app.gui.theme import PARTICIPANT, TYPE, font
-from study_app.session.events import Chosen, ItemShown, Submitted
 from study_app.session.pages import QuestionnairePage
+from study_app.session.transitions.events import Chosen, ItemShown, Submitted
 
 if TYPE_CHECKING:
     from study_app.protocol.wording.languages import Words

@@ -15,8 +15,8 @@ from study_app.gui.pages.reading import ReadingPage
 from study_app.gui.pages.speech import say
 from study_app.gui.progress import ProgressLine
 from study_app.gui.theme import PARTICIPANT, font
-from study_app.session.events import Continue, EndAsked, LanguageChosen
 from study_app.session.pages import TextPage
+from study_app.session.transitions.events import Continue, EndAsked, LanguageChosen
 
 if TYPE_CHECKING:
     from study_app.protocol.wording.languages import Words

@@ -252,7 +252,7 @@ def test_the_command_ended_by_the_user_writes_what_it_has(
         raise KeyboardInterrupt
 
     monkeypatch.setattr(sweeping, "sweep", until)
-    monkeypatch.setattr("study_app.session.feelings.feelings", lambda protocol, **_: felt_in(protocol))
+    monkeypatch.setattr("study_app.session.simulated.trial_features.feelings", lambda protocol, **_: felt_in(protocol))
     to = tmp_path / "power"
     result = CliRunner().invoke(commands, ["power", "rek2024", "--sizes", "5,9", "--to", str(to)])
     assert result.exit_code == 130

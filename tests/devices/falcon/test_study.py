@@ -21,8 +21,8 @@ from study_app.haptics.model.limits import slew_limit_n
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.load import load
-from study_app.session import rehearsal
-from study_app.session.strokes import exploration
+from study_app.session.simulated import rehearsal
+from study_app.session.simulated.exploration import exploration
 from study_app.store.blinded.unblinding import unblind
 from study_app.store.folders import StudyFolder
 from study_app.store.verification.verify_study import verify

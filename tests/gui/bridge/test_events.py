@@ -9,8 +9,8 @@ import pytest
 from PySide6.QtCore import Qt
 
 from study_app.errors import StoreError
-from study_app.session.events import Continue
 from study_app.session.pages import PausePage, TaskPage, TextPage
+from study_app.session.transitions.events import Continue
 from tests.gui.bridge.world import begin_trial, tick
 
 

@@ -18,8 +18,8 @@ from study_app.gui.operator.progress import SessionProgress
 from study_app.gui.operator.watch import WatchedJournal
 from study_app.protocol.load import load
 from study_app.protocol.orders.schedule import build_schedule
-from study_app.session.events import Continue
 from study_app.session.pages import PausePage, TaskPage
+from study_app.session.transitions.events import Continue
 from tests.compiled import needs_servo
 from tests.gui.bridge.world import World, begin_trial
 

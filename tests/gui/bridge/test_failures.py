@@ -15,8 +15,8 @@ from PySide6.QtWidgets import QApplication
 
 from study_app.errors import StoreError
 from study_app.gui.dialogs import Notice
-from study_app.session.events import Submitted
 from study_app.session.pages import TaskPage, TroublePage
+from study_app.session.transitions.events import Submitted
 from tests.gui.bridge.world import begin_trial
 
 

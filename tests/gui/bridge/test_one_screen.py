@@ -7,7 +7,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication
 
 from study_app.gui.operator.strip import Strip
-from study_app.session.events import Continue
+from study_app.session.transitions.events import Continue
 from tests.gui.bridge.world import begin_trial
 
 

@@ -8,8 +8,8 @@ import pytest
 from PySide6.QtCore import Qt
 
 from study_app.errors import DeviceNotFound
-from study_app.session.events import EndAsked
 from study_app.session.pages import PausePage, TaskPage
+from study_app.session.transitions.events import EndAsked
 from tests.gui.bridge.world import begin_trial
 
 FAULT = "the device 'memory' stopped answering"

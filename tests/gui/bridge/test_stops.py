@@ -5,8 +5,8 @@ from __future__ import annotations
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 
-from study_app.session.events import ForceStopped, ResumeAsked
 from study_app.session.pages import PausePage, TaskPage, TroublePage
+from study_app.session.transitions.events import ForceStopped, ResumeAsked
 from tests.gui.bridge.world import begin_trial
 
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from study_app.errors import StoreError
 from study_app.haptics.model.layout import SAMPLE, records
-from study_app.session.events import Continue
 from study_app.session.pages import TaskPage
+from study_app.session.transitions.events import Continue
 
 
 class World:

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from study_app.errors import StoreError
-from study_app.session.rehearsal import rehearse
+from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.verification.reproduction import reproduced
 from tests.compiled import needs_servo
 

@@ -14,8 +14,8 @@ from study_app.protocol.load import load
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.protocol.questions.simulated_answers import Felt
-from study_app.session.answers_only import rehearse_answers
-from study_app.session.rehearsal import rehearse
+from study_app.session.simulated.answers_only import rehearse_answers
+from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.sessions.begin import SessionStore, begin
 from study_app.store.verification.verify_study import verify
 from tests.faults import short

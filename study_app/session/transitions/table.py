@@ -25,9 +25,10 @@ from typing import Any, TypeAlias
 from study_app.errors import SessionError
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule
-from study_app.session import moves
-from study_app.session.commands import Command
-from study_app.session.events import (
+from study_app.session.resume import FIRST, Start
+from study_app.session.transitions import moves
+from study_app.session.transitions.commands import Command
+from study_app.session.transitions.events import (
     Begin,
     Broke,
     Chosen,
@@ -45,8 +46,7 @@ from study_app.session.events import (
     Submitted,
     TaskDone,
 )
-from study_app.session.resume import FIRST, Start
-from study_app.session.state import Phase, Plan, SessionState
+from study_app.session.transitions.state import Phase, Plan, SessionState
 
 Move: TypeAlias = Callable[[SessionState, Any], tuple[SessionState, tuple[Command, ...]]]
 

@@ -18,14 +18,14 @@ from study_app.protocol.load import parse, source_bytes
 from study_app.protocol.model import Explore, Protocol, Reach
 from study_app.protocol.orders.schedule import build_schedule, stream
 from study_app.protocol.questions.simulated_answers import Felt, rater
-from study_app.session.commands import Command, Finish, ShowPage, StartTrial, Write
-from study_app.session.events import Begin, Chosen, Continue, Event, ItemShown, Submitted, TaskDone
-from study_app.session.feelings import FEELING, Feelings, feelings
-from study_app.session.machine import advance, open_session
 from study_app.session.pages import Page, QuestionnairePage, TaskPage, TextPage
 from study_app.session.resume import REHEARSED_SCREENS
-from study_app.session.simulated import Draw, filled_in, reading_s
-from study_app.session.state import FINAL
+from study_app.session.simulated.observers import Draw, filled_in, reading_s
+from study_app.session.simulated.trial_features import FEELING, Feelings, feelings
+from study_app.session.transitions.commands import Command, Finish, ShowPage, StartTrial, Write
+from study_app.session.transitions.events import Begin, Chosen, Continue, Event, ItemShown, Submitted, TaskDone
+from study_app.session.transitions.state import FINAL
+from study_app.session.transitions.table import advance, open_session
 from study_app.store.clock import SessionClock
 from study_app.store.folders import rehearsal_folder
 from study_app.store.sessions.simulated_sessions import SimulatedSession, SimulatedStudy

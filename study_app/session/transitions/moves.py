@@ -7,8 +7,9 @@ from typing import Any, TypeAlias
 
 from study_app.errors import SessionError
 from study_app.protocol.orders.schedule import Trial
-from study_app.session import compose
-from study_app.session.commands import (
+from study_app.session.resume import FIRST
+from study_app.session.transitions import page_builder
+from study_app.session.transitions.commands import (
     Command,
     FadeIn,
     Finish,
@@ -20,7 +21,7 @@ from study_app.session.commands import (
     Write,
     WriteTables,
 )
-from study_app.session.events import (
+from study_app.session.transitions.events import (
     Begin,
     Broke,
     Chosen,
@@ -37,8 +38,7 @@ from study_app.session.events import (
     Submitted,
     TaskDone,
 )
-from study_app.session.resume import FIRST
-from study_app.session.state import Answer, Hold, Phase, SessionState
+from study_app.session.transitions.state import Answer, Hold, Phase, SessionState
 
 END_SHOWN_S = 0.1  # a closed ring is seen for so long before the next page
 
@@ -256,7 +256,7 @@ def _which(state: SessionState) -> dict[str, Any]:
 
 
 def _show(state: SessionState) -> ShowPage:
-    return ShowPage(compose.page(state))
+    return ShowPage(page_builder.page(state))
 
 
 def _with_answer(state: SessionState, item: str, answer: Answer) -> SessionState:

@@ -17,11 +17,11 @@ from study_app.errors import SessionError, StoreError
 from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.model import Reach
 from study_app.protocol.orders.schedule import stream
-from study_app.session import rehearsal
-from study_app.session.feelings import feelings
 from study_app.session.pages import TextPage
-from study_app.session.simulated import Reacher, Senses, choices, reading_s
-from study_app.session.strokes import RATE_HZ, exploration
+from study_app.session.simulated import rehearsal
+from study_app.session.simulated.exploration import RATE_HZ, exploration
+from study_app.session.simulated.observers import Reacher, Senses, choices, reading_s
+from study_app.session.simulated.trial_features import feelings
 from study_app.session.tasks import TaskView
 from study_app.session.trial import TankView
 from study_app.store.folders import StudyFolder

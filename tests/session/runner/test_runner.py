@@ -8,7 +8,9 @@ from typing import Any
 import pytest
 
 from study_app.errors import ServoFault, SessionError
-from study_app.session.events import (
+from study_app.session.pages import EndPage, PausePage, QuestionnairePage, TroublePage
+from study_app.session.runner import BUTTON_CONTINUE, BUTTON_STOP
+from study_app.session.transitions.events import (
     Begin,
     Chosen,
     Continue,
@@ -21,10 +23,8 @@ from study_app.session.events import (
     ResumeAsked,
     Submitted,
 )
-from study_app.session.moves import END_SHOWN_S
-from study_app.session.pages import EndPage, PausePage, QuestionnairePage, TroublePage
-from study_app.session.runner import BUTTON_CONTINUE, BUTTON_STOP
-from study_app.session.state import Phase
+from study_app.session.transitions.moves import END_SHOWN_S
+from study_app.session.transitions.state import Phase
 from study_app.session.trial import SETTLED_S
 from tests.session.fakes import AWAY, LEFT, RIGHT, World, at_block, step
 

@@ -13,7 +13,7 @@ from typing import Final, TypeAlias
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule, draw_key, stream
 from study_app.protocol.questions.simulated_answers import Felt
-from study_app.session.rehearsal import Machine, Rehearsal
+from study_app.session.simulated.rehearsal import Machine, Rehearsal
 from study_app.session.unkept import Unkept
 
 Where: TypeAlias = tuple[str, str]

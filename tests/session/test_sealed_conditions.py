@@ -14,7 +14,7 @@ import pytest
 from scipy.stats import binomtest
 
 from study_app.protocol.load import source_bytes
-from study_app.session.rehearsal import rehearse
+from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.blinded import blinding
 from study_app.store.blinded.unblinding import unblind
 from study_app.store.folders import StudyFolder

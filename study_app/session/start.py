@@ -10,9 +10,9 @@ from typing import Any
 from study_app.devices import is_falcon, is_simulated, kind_of
 from study_app.devices.rig import Machine
 from study_app.errors import DeviceError, SessionError
-from study_app.gui.choices import NewSession
 from study_app.protocol.model import Protocol
 from study_app.session.preflight import Facts, Screen
+from study_app.session.request import NewSession
 from study_app.store.clock import SessionClock
 from study_app.store.folders import StudyFolder, check_participant, check_unused
 from study_app.store.sessions.begin import begin
@@ -55,7 +55,7 @@ def check(chosen: NewSession, study: Protocol) -> None:
 
 def measured(machine: Machine, chosen: NewSession, *, sleep: Callable[[float], object] = time.sleep) -> Facts:
     """Return what the pre-flight judges, but for the screen; a ``sleep`` that does not wait cuts it short."""
-    from study_app.session.measuring import measure  # noqa: PLC0415 - the compiler: only once it is needed
+    from study_app.session.preflight_measurements import measure  # noqa: PLC0415 - the compiler: only once it is needed
 
     return measure(
         machine.servo,

@@ -5,18 +5,10 @@ from __future__ import annotations
 import pytest
 
 from study_app.errors import SessionError, StoreError
-from study_app.session.events import (
-    Begin,
-    Chosen,
-    EndAsked,
-    ForceStopped,
-    Note,
-    ResumeAsked,
-    Submitted,
-)
 from study_app.session.pages import EndPage, PausePage, TaskPage, TroublePage
 from study_app.session.runner import BUTTON_CONTINUE, RETRY_S
-from study_app.session.state import Phase
+from study_app.session.transitions.events import Begin, Chosen, EndAsked, ForceStopped, Note, ResumeAsked, Submitted
+from study_app.session.transitions.state import Phase
 from tests.session.fakes import LEFT, RIGHT, World, at_block
 
 

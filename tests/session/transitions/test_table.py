@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from study_app.errors import SessionError
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Trial, build_schedule
-from study_app.session.commands import (
+from study_app.session.pages import EndPage, PausePage, Progress, QuestionnairePage, TaskPage, TextPage, TroublePage
+from study_app.session.transitions.commands import (
     FadeIn,
     Finish,
     Rest,
@@ -23,7 +24,7 @@ from study_app.session.commands import (
     Write,
     WriteTables,
 )
-from study_app.session.events import (
+from study_app.session.transitions.events import (
     Begin,
     Broke,
     Chosen,
@@ -41,9 +42,8 @@ from study_app.session.events import (
     Submitted,
     TaskDone,
 )
-from study_app.session.machine import TRANSITIONS, advance, open_session
-from study_app.session.pages import EndPage, PausePage, Progress, QuestionnairePage, TaskPage, TextPage, TroublePage
-from study_app.session.state import FINAL, Phase, SessionState
+from study_app.session.transitions.state import FINAL, Phase, SessionState
+from study_app.session.transitions.table import TRANSITIONS, advance, open_session
 from tests.session import small
 
 EVENTS = get_args(Event)

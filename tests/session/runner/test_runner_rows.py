@@ -5,12 +5,7 @@ from __future__ import annotations
 import pytest
 
 from study_app.haptics.model.layout import LIMITER_GLITCH
-from study_app.session.events import (
-    Begin,
-    PauseAsked,
-    RepeatAsked,
-    ResumeAsked,
-)
+from study_app.session.transitions.events import Begin, PauseAsked, RepeatAsked, ResumeAsked
 from study_app.session.trial import SETTLED_S
 from tests.session.fakes import LEFT, RIGHT, World, at_block, step
 

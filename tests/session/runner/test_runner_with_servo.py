@@ -14,11 +14,19 @@ from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule, draw_key, stream
-from study_app.session.events import Begin, Continue, EndAsked, ForceStopped, PauseAsked, RepeatAsked, ResumeAsked
 from study_app.session.pages import PausePage, TaskPage, TroublePage
 from study_app.session.ports import Ports
 from study_app.session.runner import BUTTON_STOP, Runner
-from study_app.session.state import Phase
+from study_app.session.transitions.events import (
+    Begin,
+    Continue,
+    EndAsked,
+    ForceStopped,
+    PauseAsked,
+    RepeatAsked,
+    ResumeAsked,
+)
+from study_app.session.transitions.state import Phase
 from study_app.session.trial import SETTLED_S
 from study_app.store.blinded.sealing import opened
 from study_app.store.clock import SessionClock

@@ -17,7 +17,7 @@ from study_app.devices.simulated.hand_commands import HandOrders
 from study_app.protocol.model import Explore, Reach
 from study_app.protocol.questions.simulated_answers import Felt, Rater, rate
 from study_app.session.pages import QuestionnairePage, TextPage
-from study_app.session.strokes import exploration
+from study_app.session.simulated.exploration import exploration
 from study_app.session.trial import TankView
 
 Draw = Callable[[], float]

@@ -15,7 +15,7 @@ from study_app.session.pages import (
     TextPage,
     TroublePage,
 )
-from study_app.session.state import Phase, SessionState
+from study_app.session.transitions.state import Phase, SessionState
 
 
 def page(state: SessionState) -> Page:

@@ -30,12 +30,12 @@ from study_app.protocol.load import parse, source_bytes
 from study_app.protocol.model import Protocol, Reach
 from study_app.protocol.orders.schedule import Schedule, build_schedule, stream
 from study_app.protocol.questions.simulated_answers import Felt, rater
-from study_app.session.events import Begin, Chosen, Continue, Event, ItemShown, ResumeAsked, Submitted
 from study_app.session.pages import Page, PausePage, QuestionnairePage, TaskPage, TextPage
 from study_app.session.ports import KeptSession, Ports
 from study_app.session.resume import FIRST, REHEARSED_SCREENS, Start, find_protocol, resume_at, source_to_resume
 from study_app.session.runner import Runner
-from study_app.session.simulated import Draw, Explorer, Reacher, Senses, filled_in, reading_s
+from study_app.session.simulated.observers import Draw, Explorer, Reacher, Senses, filled_in, reading_s
+from study_app.session.transitions.events import Begin, Chosen, Continue, Event, ItemShown, ResumeAsked, Submitted
 from study_app.session.trial import TankView
 from study_app.session.unkept import Unkept
 from study_app.store.clock import SessionClock

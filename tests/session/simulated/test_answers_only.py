@@ -15,10 +15,10 @@ from study_app.cli import commands
 from study_app.errors import StoreError
 from study_app.protocol.load import load
 from study_app.protocol.questions.simulated_answers import Felt
-from study_app.session import answers_only
-from study_app.session.answers_only import rehearse_answers
-from study_app.session.feelings import Feelings, feelings
-from study_app.session.rehearsal import rehearse
+from study_app.session.simulated import answers_only
+from study_app.session.simulated.answers_only import rehearse_answers
+from study_app.session.simulated.rehearsal import rehearse
+from study_app.session.simulated.trial_features import Feelings, feelings
 from study_app.store.blinded.blinding import reveal
 from study_app.store.folders import StudyFolder
 from study_app.store.verification.reproduction import reproduced

@@ -9,8 +9,8 @@ import pytest
 from study_app import app
 from study_app.app import entry
 from study_app.errors import StoreError
-from study_app.gui.choices import NewSession, resumed
 from study_app.protocol.load import load, source_bytes
+from study_app.session.request import NewSession, resumed
 from study_app.store.sessions.begin import SessionStore, begin
 
 

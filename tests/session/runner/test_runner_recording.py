@@ -7,13 +7,7 @@ from typing import Any
 
 import pytest
 
-from study_app.session.events import (
-    Begin,
-    Continue,
-    EndAsked,
-    PauseAsked,
-    ResumeAsked,
-)
+from study_app.session.transitions.events import Begin, Continue, EndAsked, PauseAsked, ResumeAsked
 from tests.session.fakes import World
 
 

@@ -1,0 +1,1 @@
+"""Simulated participants: observers, exploration, rehearsals."""

@@ -1,0 +1,1 @@
+"""The state machine of a session: events, state, commands, transition table."""
