@@ -29,9 +29,9 @@ from study_app.evaluation.appraiser import Appraiser
 from study_app.gui.lab.place import LabPlace
 from study_app.gui.lab.view import DeviceShown, LabView, Now
 from study_app.gui.tank import caustics
+from study_app.lab.ab_comparison import Chance, Setting, Side, Workbench
 from study_app.lab.presets import Choice, liquids_at_hand, spoken
-from study_app.lab.programmes import TITLES
-from study_app.lab.workbench import Chance, Setting, Side, Workbench
+from study_app.lab.programmed_paths import TITLES
 
 if TYPE_CHECKING:
     from study_app.lab.live import Live

@@ -20,11 +20,11 @@ from study_app.haptics.model.layout import SAMPLE, records
 from study_app.haptics.model.limits import slew_limit_n
 from study_app.haptics.model.scene import Scene
 from study_app.haptics.runtime.servo import Servo
+from study_app.lab.ab_comparison import Side, Workbench, other
 from study_app.lab.limiters import Limiter, LimiterCounts
-from study_app.lab.programmes import led_to, programme
+from study_app.lab.programmed_paths import led_to, programme
 from study_app.lab.shadow import Shadow, Trace
-from study_app.lab.tail import Tail
-from study_app.lab.workbench import Side, Workbench, other
+from study_app.lab.wake_tail import Tail
 from study_app.protocol.streams import stream
 
 if TYPE_CHECKING:

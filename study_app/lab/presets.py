@@ -8,7 +8,7 @@ from pathlib import Path
 
 from study_app.errors import ProtocolError
 from study_app.haptics.model.scene import Scene
-from study_app.lab.workbench import Setting
+from study_app.lab.ab_comparison import Setting
 from study_app.protocol.load import load_scene, load_scenes, shipped
 from study_app.protocol.scene_file import for_new_file, scene_text
 from study_app.store.atomic import write_file

@@ -22,8 +22,8 @@ from study_app.haptics.model.scene import Scene
 from study_app.haptics.runtime.pack import adjust_into, pack, pack_into
 from study_app.haptics.runtime.recompute import new_trail, take_again
 from study_app.haptics.runtime.scene_records import scaled_length
-from study_app.lab.tail import Tail, tail_of
-from study_app.lab.workbench import Side, other
+from study_app.lab.ab_comparison import Side, other
+from study_app.lab.wake_tail import Tail, tail_of
 
 Floats: TypeAlias = NDArray[np.float64]
 

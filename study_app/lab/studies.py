@@ -12,8 +12,8 @@ from typing import Any, Final
 from study_app.errors import ProtocolError, StoreError
 from study_app.haptics.model.liquid import MAX_ID
 from study_app.haptics.model.scene import Scene
+from study_app.lab.ab_comparison import Setting
 from study_app.lab.presets import preset_text, save
-from study_app.lab.workbench import Setting
 from study_app.protocol.load import load
 from study_app.store.atomic import cannot_read, write_file
 

@@ -14,8 +14,8 @@ import time
 import numpy as np
 
 from study_app.haptics.model.layout import LIMITER_FADE
+from study_app.lab.ab_comparison import Setting, Workbench
 from study_app.lab.live import Live, open_live
-from study_app.lab.workbench import Setting, Workbench
 from study_app.protocol.load import load_scenes
 
 ROUNDS, SECONDS = 8, 2.0

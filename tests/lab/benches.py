@@ -7,8 +7,8 @@ from random import Random
 from study_app.devices.scripted import ScriptedDevice
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo
+from study_app.lab.ab_comparison import Setting, Workbench
 from study_app.lab.live import Live
-from study_app.lab.workbench import Setting, Workbench
 from study_app.protocol.load import load_scenes
 
 SCENES = load_scenes("rek2024")

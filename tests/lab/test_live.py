@@ -15,9 +15,9 @@ from study_app.haptics.model.layout import LIMITER_ENERGY, LIMITER_FADE, LIMITER
 from study_app.haptics.model.scene import Kalman
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo
+from study_app.lab.ab_comparison import Setting, Workbench
 from study_app.lab.live import Live, open_live
-from study_app.lab.programmes import REACHED, TITLES, led_to, programme
-from study_app.lab.workbench import Setting, Workbench
+from study_app.lab.programmed_paths import REACHED, TITLES, led_to, programme
 from tests.haptics.probe import Probe
 from tests.lab.benches import SCENES, bench, live_with, run, scripted
 

@@ -14,7 +14,7 @@ from study_app.gui.lab.view import FormSection, LabView, form
 from study_app.gui.labels import Clamped, label
 from study_app.gui.theme import font
 from study_app.gui.themed import dress
-from study_app.lab.workbench import Setting, other
+from study_app.lab.ab_comparison import Setting, other
 
 HIDDEN = "Hidden while blind"
 

@@ -23,7 +23,7 @@ from study_app.gui.lab.tank import LabTank
 from study_app.gui.lab.view import LabView
 from study_app.gui.place import Place
 from study_app.gui.theme import SPACE
-from study_app.lab.workbench import Setting
+from study_app.lab.ab_comparison import Setting
 from study_app.workspace import workspace
 
 FORM_WIDTH, FORM_WIDTH_NARROW, SIDE_WIDTH = 404, 380, 300

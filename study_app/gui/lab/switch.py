@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QAbstractButton, QHBoxLayout, QSizePolicy, QWidget
 from study_app.gui.lab.view import SIDES, LabView
 from study_app.gui.theme import RADIUS_CONTROL, Theme, font
 from study_app.gui.themed import Themed
-from study_app.lab.workbench import Side
+from study_app.lab.ab_comparison import Side
 
 HEIGHT = 44
 WIDEST = 190

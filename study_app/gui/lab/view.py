@@ -12,8 +12,8 @@ from typing import Protocol, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from study_app.lab.ab_comparison import Setting, Side, Workbench
 from study_app.lab.parameters import Parameter, Value, sections
-from study_app.lab.workbench import Setting, Side, Workbench
 
 Floats: TypeAlias = NDArray[np.float64]
 Point: TypeAlias = tuple[float, float, float]

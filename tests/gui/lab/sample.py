@@ -16,10 +16,10 @@ from study_app.haptics.model.layout import SAMPLE, records
 from study_app.haptics.model.scene import Scene
 from study_app.haptics.runtime.pack import pack
 from study_app.haptics.runtime.recompute import new_trail, take_again
+from study_app.lab.ab_comparison import Setting, Workbench
 from study_app.lab.limiters import LimiterCounts
 from study_app.lab.presets import spoken
 from study_app.lab.shadow import Shadow
-from study_app.lab.workbench import Setting, Workbench
 from study_app.protocol.load import load_scene
 
 RATE_HZ = 1000

@@ -18,7 +18,7 @@ from study_app.gui.lab.place import preset_name
 from study_app.gui.lab.view import LabView
 from study_app.gui.theme import DARK, LIGHT
 from study_app.gui.themed import wear
-from study_app.lab.workbench import Workbench
+from study_app.lab.ab_comparison import Workbench
 from tests.gui.lab.sample import blind, heard, settle, still_view, workbench
 
 

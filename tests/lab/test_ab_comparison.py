@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from study_app.errors import StudyError
-from study_app.lab.workbench import Setting, Side, Workbench, other
+from study_app.lab.ab_comparison import Setting, Side, Workbench, other
 from study_app.protocol.load import load_scenes
 
 SCENES = load_scenes("rek2024")
