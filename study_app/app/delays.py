@@ -18,9 +18,6 @@ from PySide6.QtWidgets import QApplication
 
 from study_app.devices.rig import open_machine
 from study_app.errors import SessionError, StudyError
-from study_app.evaluation.accuracy.race import machine as machine_here
-from study_app.evaluation.timing.delays import BESIDE, DELAYS_S, VIRTUAL_HZ, Delayed, Shown
-from study_app.evaluation.timing.load import LoadName, busy_cores
 from study_app.gui.application import application_here
 from study_app.gui.bridge import SessionBridge
 from study_app.gui.collector import collecting_here
@@ -35,6 +32,9 @@ from study_app.session.request import NewSession
 from study_app.session.start import open_store
 from study_app.store.recording_files import read_frames
 from study_app.store.sessions.open_session import SessionStore
+from study_app.validation.accuracy.comparison import machine as machine_here
+from study_app.validation.timing.delay_results import BESIDE, DELAYS_S, VIRTUAL_HZ, Delayed, Shown
+from study_app.validation.timing.machine_load import LoadName, busy_cores
 
 SIZE_PX: Final = (1920, 1080)
 OPERATOR_PX: Final = (1600, 900)

@@ -25,7 +25,7 @@ from study_app.app.lab_prices import AsksPrice, Prices
 from study_app.app.lab_rows import cost_rows, device_choices, error_rows, title_of
 from study_app.app.lab_saving import LabSaving
 from study_app.errors import StudyError
-from study_app.evaluation.appraiser import Appraiser
+from study_app.evaluation.appraisal_worker import Appraiser
 from study_app.gui.lab.place import LabPlace
 from study_app.gui.lab.view import DeviceShown, LabView, Now
 from study_app.gui.tank import caustics

@@ -6,8 +6,8 @@ import logging
 from collections.abc import Callable
 from typing import Protocol
 
-from study_app.evaluation.appraised import Costs, Errors
-from study_app.evaluation.appraiser import Told
+from study_app.evaluation.appraisal import Costs, Errors
+from study_app.evaluation.appraisal_worker import Told
 from study_app.haptics.model.scene import Scene
 
 log = logging.getLogger(__name__)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from study_app.devices import list_devices
-from study_app.evaluation.appraised import Costs, Errors
+from study_app.evaluation.appraisal import Costs, Errors
 from study_app.gui.devices.view import TITLES
 from study_app.gui.lab.view import CostRow, ErrorRow
 from study_app.gui.new_session import DEVICE_WORDS

@@ -12,8 +12,8 @@ from PySide6.QtCore import QObject, QTimer, Signal
 from PySide6.QtGui import QScreen
 
 from study_app.errors import StudyError
-from study_app.evaluation.appraised import Costs, Errors
-from study_app.evaluation.appraiser import Appraiser
+from study_app.evaluation.appraisal import Costs, Errors
+from study_app.evaluation.appraisal_worker import Appraiser
 from study_app.gui.preflight.view import preflight_view, resumed_rows
 from study_app.gui.preflight.window import PreflightWindow
 from study_app.gui.screens import place

@@ -12,7 +12,6 @@ import numpy as np
 from PySide6.QtCore import QCoreApplication, QEventLoop, QObject, Qt, QTimer, Signal
 
 from study_app.devices.scripted import ScriptedDevice
-from study_app.evaluation.timing.load import LoadName
 from study_app.gui.application import application_here
 from study_app.gui.collector import collecting_here
 from study_app.gui.operator import OperatorWindow
@@ -27,6 +26,7 @@ from study_app.protocol.wording.languages import words
 from study_app.session.pages import TaskPage
 from study_app.session.tasks import TaskView
 from study_app.session.trial import TankView
+from study_app.validation.timing.machine_load import LoadName
 
 FRAME_MS, TRACE_MS, TILES_MS = 16, 33, 500
 HEARTBEAT_MS = 100  # Python hears Ctrl+C only while it runs; Qt waits outside it

@@ -33,10 +33,10 @@ def accuracy(scene: str | None, liquid: str | None, path: str, to: Path | None) 
     FILE is a protocol or scene file; default: rek2024 and physical_liquids.
     Wakes are measured against their definition, models of a real liquid against experiments and exact solutions.
     """
-    from study_app.evaluation.accuracy.files import markdown
-    from study_app.evaluation.accuracy.files import write as write_all
-    from study_app.evaluation.accuracy.race import accuracy as measure
     from study_app.evaluation.output import make_folder
+    from study_app.validation.accuracy.accuracy_report import markdown
+    from study_app.validation.accuracy.accuracy_report import write as write_all
+    from study_app.validation.accuracy.comparison import accuracy as measure
 
     numerical, physical, notes = _subjects(scene, liquid)
     one = numerical or physical
@@ -80,8 +80,8 @@ def _subjects(scene: str | None, liquid: str | None) -> tuple[Scene | None, Scen
 
 
 def _motion(path: str, scene: Scene) -> Motion:
-    from study_app.evaluation.accuracy.motions import stir
-    from study_app.evaluation.identify.measured import at_rate
+    from study_app.evaluation.hand_motions import stir
+    from study_app.evaluation.identify.measured_force import at_rate
     from study_app.haptics.model import motion, paths
 
     if path == DEFAULT_PATH:

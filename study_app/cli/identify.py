@@ -32,7 +32,7 @@ def identify(
     CSV has columns t_s, x_m, y_m, z_m, fx_n, fy_n, fz_n (scene frame; the liquid's force on the ball), and vx_mps,
     vy_mps, vz_mps where they are known; or t_s, velocity_mps, force_n for a motion along one line.
     """
-    from study_app.evaluation.identify import measured as measurements
+    from study_app.evaluation.identify import measured_force as measurements
     from study_app.evaluation.identify import preset as identified
     from study_app.evaluation.identify.fit import fit
     from study_app.haptics.model.overrides import override_all

@@ -46,8 +46,8 @@ def assignment(change: str) -> tuple[str, str]:
 @click.option("--liquid", metavar="NAME", help="Only this one; default: every liquid of the file.")
 def scene(scene: str, liquid: str | None) -> None:
     """Print which effects a scene calls for, why, the measured cost of each, and how wrong the force is to expect."""
-    from study_app.evaluation.accuracy.expected import foretold
     from study_app.evaluation.cost import report
+    from study_app.evaluation.expected_error import foretold
     from study_app.protocol.load import load_scene, load_scenes
 
     chosen = [load_scene(scene, liquid)] if liquid else list(load_scenes(scene).values())
@@ -58,7 +58,7 @@ def scene(scene: str, liquid: str | None) -> None:
 @click.option("--to", required=True, type=Target(), metavar="DIR", help="Folder to write into.")
 def figures(to: Path) -> None:
     """Draw the thesis' Figs 3 to 8 anew: force over time on programmed paths, with captions."""
-    from study_app.evaluation.figures import figures as draw
+    from study_app.validation.thesis_figures import figures as draw
 
     for written in draw(to):
         click.echo(written)

@@ -14,7 +14,7 @@ from study_app.cli.timing import LOAD, windows_thread
 from study_app.cli.words import EXIT_FOUND, Target
 
 if TYPE_CHECKING:
-    from study_app.evaluation.timing.load import LoadName
+    from study_app.validation.timing.machine_load import LoadName
 
 
 @click.command()
@@ -33,9 +33,9 @@ def soak(
     FILE holds the liquids; default: rek2024. Ctrl+C ends it with the report so far.
     """
     from study_app.evaluation.output import make_folder
-    from study_app.evaluation.soak.run import soak as soak_servo
-    from study_app.evaluation.timing.load import beside
     from study_app.protocol.load import load_scenes
+    from study_app.validation.soak.soak import soak as soak_servo
+    from study_app.validation.timing.machine_load import beside
 
     scenes = load_scenes(protocol)
     if to is not None:

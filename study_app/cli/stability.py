@@ -12,7 +12,7 @@ import click
 from study_app.cli.words import EXIT_FOUND, Target
 
 if TYPE_CHECKING:
-    from study_app.evaluation.stability.verdict import Verdict
+    from study_app.validation.stability.verdict import Verdict
 
 
 @click.command()
@@ -35,10 +35,10 @@ def stability(
     of hand and device, a delay that is misjudged, lost samples, releases in mid-stroke, and the driver of the Falcon in
     front of its emulator. Ends with 3 if one is unstable with safety on.
     """
-    from study_app.evaluation.stability import sweep as found
-    from study_app.evaluation.stability.cases import parse
-    from study_app.evaluation.stability.fidelity import fidelities
-    from study_app.evaluation.stability.groups import groups, some, sweep
+    from study_app.validation.stability import sweep as found
+    from study_app.validation.stability.case_groups import groups, some, sweep
+    from study_app.validation.stability.fidelity import fidelities
+    from study_app.validation.stability.stability_cases import parse
 
     if line is not None:
         case = parse(line)
@@ -67,7 +67,7 @@ def stability(
 
 def _print_withheld() -> None:
     """Print the shares of force withheld; end with 3 if a goal is not met."""
-    from study_app.evaluation.stability.withheld import measure, report
+    from study_app.validation.stability.withheld_force import measure, report
 
     shares = measure()
     click.echo(report(shares))

@@ -19,7 +19,7 @@ from study_app.errors import DisplayError, StudyError
 
 if TYPE_CHECKING:
     from study_app.app.timing import WindowsThread
-    from study_app.evaluation.timing.load import LoadName
+    from study_app.validation.timing.machine_load import LoadName
 
 LOAD = click.Choice(("none", "gui", "gui+cpu"))
 
@@ -55,8 +55,8 @@ def timing(seconds: float, load: LoadName, spin_us: float | None, of_delays: boo
         time_delays(seconds, load, to)
         return
     from study_app.evaluation.output import make_folder
-    from study_app.evaluation.timing.files import text, write
-    from study_app.evaluation.timing.race import timing as time_loops
+    from study_app.validation.timing.measurement import timing as time_loops
+    from study_app.validation.timing.timing_report import text, write
 
     if to is not None:
         make_folder(to)
@@ -77,7 +77,7 @@ def timing(seconds: float, load: LoadName, spin_us: float | None, of_delays: boo
 def time_delays(seconds: float, load: LoadName, to: Path | None) -> None:
     """Print how well delays are kept; without a display, on none."""
     from study_app.evaluation.output import make_folder
-    from study_app.evaluation.timing.delays_files import text, write
+    from study_app.validation.timing.delay_report import text, write
 
     if sys.platform == "linux" and not any(map(os.environ.get, ("QT_QPA_PLATFORM", "DISPLAY", "WAYLAND_DISPLAY"))):
         os.environ["QT_QPA_PLATFORM"] = "offscreen"

@@ -34,12 +34,12 @@ def validate_report(studies: int, jobs: int, seed: int, to: Path | None) -> None
         raise click.BadParameter("0 jobs do nothing: give 1 or more, or -1 for one a core", param_hint="--jobs")
     from study_app.analysis.output import write_files
     from study_app.analysis.power.planned import plan
-    from study_app.analysis.validation.rate_tables import markdown, table
-    from study_app.analysis.validation.rates import Rate
-    from study_app.analysis.validation.running import validate
-    from study_app.analysis.validation.studies import simulated
     from study_app.protocol.load import load
     from study_app.session.simulated.trial_features import feelings
+    from study_app.validation.report_rates.rate_tables import markdown, table
+    from study_app.validation.report_rates.rates import Rate
+    from study_app.validation.report_rates.simulated_studies import simulated
+    from study_app.validation.report_rates.simulation import validate
 
     protocol = load("rek2024")
     studied = simulated(protocol, plan(protocol, feelings(protocol, seed=seed)))

@@ -17,8 +17,8 @@ from PySide6.QtWidgets import QApplication, QMainWindow
 from study_app.app.lab import LabVisit, compose_lab
 from study_app.app.lab_opening import LabOpening
 from study_app.errors import DeviceNotFound, ServoFault
-from study_app.evaluation.appraised import Costs, EffectCost, Errors
-from study_app.evaluation.appraiser import Told
+from study_app.evaluation.appraisal import Costs, EffectCost, Errors
+from study_app.evaluation.appraisal_worker import Told
 from study_app.gui.lab.place import LabPlace
 from study_app.haptics.model.scene import Scene
 from study_app.lab.presets import Choice, save

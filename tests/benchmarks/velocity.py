@@ -14,10 +14,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from study_app.evaluation.cost import measure
-from study_app.evaluation.stability.boundary import boundary_nspm
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Ewma, Foaw, Knee, Line, Raw, Scene
 from study_app.haptics.runtime.offline import simulate
+from study_app.validation.stability.damping_boundary import boundary_nspm
 
 COUNT_M = 38e-6
 AMPLITUDE_M = 0.03

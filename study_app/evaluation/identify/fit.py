@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
-from study_app.evaluation.identify.measured import Measured, along_x
+from study_app.evaluation.identify.measured_force import Measured, along_x
 from study_app.evaluation.identify.parameters import Parameter, find
 from study_app.evaluation.identify.search import Problem, coordinate, solve, u_range
 from study_app.haptics.model.gate import resolve

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from study_app.errors import StudyError
-from study_app.evaluation.identify.measured import Measured, at_rate
+from study_app.evaluation.identify.measured_force import Measured, at_rate
 from study_app.evaluation.identify.parameters import Parameter, replace
 from study_app.haptics.model.motion import Floats
 from study_app.haptics.model.scene import Scene

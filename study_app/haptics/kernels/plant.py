@@ -7,7 +7,7 @@
 F is the force of the servo, held between its writes, after the device's own delay, limit and steps (`push`); r is
 where the hand wants the handle, K and B how stiffly and how well damped it insists, m_hand what of it moves along; b
 and f_c are the device's viscous and Coulomb friction. A handle let go knows no hand. Mouse, scripted hand, the cases of
-``evaluation.stability`` and every emulated device are this model with other numbers.
+``validation.stability`` and every emulated device are this model with other numbers.
 
 It is integrated in sub-steps of at most 50 us, each implicit in every force but F: with dv/dt and dx/dt = v taken at
 the end of the step the velocity follows from one division, and Coulomb friction, the proximal step of |v|, shortens it

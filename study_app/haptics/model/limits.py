@@ -1,6 +1,6 @@
 """What damping a sampled loop bears: the table behind the slope limit, which knows nothing of compiled code.
 
-The table is ``slope_limits.csv`` beside this file, measured by ``evaluation.stability`` on the servo's own
+The table is ``slope_limits.csv`` beside this file, measured by ``validation.stability`` on the servo's own
 tick; how its numbers follow from the measurement is said there.
 """
 

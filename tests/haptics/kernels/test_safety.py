@@ -4,7 +4,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from study_app.errors import StudyError
-from study_app.evaluation.stability.boundary import measured_estimators
 from study_app.haptics.kernels.safety import begin_scene, new_safety
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.layout import (
@@ -31,6 +30,7 @@ from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Box, Ewma, Foaw, Given, Kalman, Line, Raw
 from study_app.haptics.runtime.offline import simulate
 from study_app.haptics.runtime.pack import pack, pack_into
+from study_app.validation.stability.damping_boundary import measured_estimators
 from tests.haptics.scenes import (
     EVERYTHING,
     HONEY,

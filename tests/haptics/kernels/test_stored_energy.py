@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from study_app.evaluation.stability.withheld import MOST, QUICK, measure
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.layout import LIMITER_ENERGY
 from study_app.haptics.model.scene import AddedMass, Ewma, Given, History, Kalman, Scene
 from study_app.haptics.runtime.pack import pack
+from study_app.validation.stability.withheld_force import MOST, QUICK, measure
 from tests.haptics.scenes import COMPILED, Hand, liquid
 
 compiled = pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from study_app.evaluation.references import local_wakes
+from study_app.evaluation.reference_model import local_wakes
 from study_app.haptics.model.effects.records import CELLS
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.paths import path

@@ -5,9 +5,6 @@ import math
 import numpy as np
 import pytest
 
-from study_app.evaluation.stability.boundary import boundary_nspm
-from study_app.evaluation.stability.measures import fast_part
-from study_app.evaluation.stability.withheld import measure
 from study_app.haptics.kernels.estimators import kalman
 from study_app.haptics.kernels.safety import new_safety
 from study_app.haptics.model.device_dynamics import Dynamics
@@ -18,6 +15,9 @@ from study_app.haptics.model.scene import Ewma, Kalman, Scene
 from study_app.haptics.runtime.offline import simulate
 from study_app.haptics.runtime.pack import built_alike, pack
 from study_app.haptics.runtime.recompute import new_trail, take_again
+from study_app.validation.stability.damping_boundary import boundary_nspm
+from study_app.validation.stability.trace_measures import fast_part
+from study_app.validation.stability.withheld_force import measure
 from tests.haptics.scenes import COMPILED, HONEY, UNBENT, WATER, Hand, scene, vectors
 
 COUNT_M = 38e-6

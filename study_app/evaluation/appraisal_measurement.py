@@ -1,0 +1,82 @@
+"""What a scene of one liquid costs and how true it is: short enough to be asked for while somebody feels it."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from study_app.evaluation import reference_model
+from study_app.evaluation.appraisal import Costs, EffectCost, Errors
+from study_app.evaluation.cost import measure
+from study_app.haptics.model.gate import ORDER, calls_for, resolve
+from study_app.haptics.model.motion import Motion
+from study_app.haptics.model.paths import path
+from study_app.haptics.model.scene import Effect, Everywhere, Knee, Scene
+from study_app.haptics.runtime.offline import simulate
+
+BATCHES: Final = 60
+RAMP_MPS2: Final = 2.0
+_RAMP_S: Final = 0.5
+_COMPARED: Final[tuple[Effect, ...]] = ("drag", "wake")
+_MOTIONS: Final = (
+    ("reverse", {"revolutions": 1.0, "against_s": 0.7, "rest_s": 0.5}),
+    ("zigzag", {"leg_s": 0.25, "legs": 8.0}),
+)
+
+
+def costs(scene: Scene, *, batches: int = BATCHES) -> Costs:
+    """Measure what a scene of one liquid costs."""
+    found = measure(scene, batches=batches)
+    liquid = resolve(scene).liquids[0]
+    asked = scene.liquids[0].effects != "auto"
+    bounds_n = {verdict.effect: verdict.bound_n for verdict in calls_for(scene)}
+    rows = []
+    for effect in ORDER:
+        ns = found.effects_ns.get((liquid.id, effect))
+        if effect in liquid.effects and ns is not None:
+            rows.append(EffectCost(effect, max(ns, 0.0)))
+        else:
+            out = f"out, {bounds_n[effect]:.2f} N" if effect in bounds_n else "not asked for"
+            rows.append(EffectCost(effect, None, "not asked for" if asked else out))
+    return Costs(found.scene_ns, found.rest_ns, tuple(rows))
+
+
+def errors(scene: Scene) -> Errors:
+    """Return how far a scene of one liquid is from the definition: its drag and its wake, everywhere."""
+    scene = resolve(scene)
+    liquid = scene.liquids[0]
+    kept = tuple(effect for effect in liquid.effects if effect in _COMPARED)
+    plain = liquid.model_copy(update={"effects": kept, "region": Everywhere()})
+    compared = scene.model_copy(update={"liquids": (plain,), "origin_m": (0.0, 0.0, 0.0)})
+    wake: float | None = None
+    force_n: float | None = None
+    if kept:
+        found = [_difference(compared, path(name, rate_hz=scene.rate_hz, **how)) for name, how in _MOTIONS]
+        force_n = max(newtons for _, newtons in found)
+        wake = max(share for share, _ in found) if "wake" in kept else None
+    left_out = tuple(effect for effect in liquid.effects if effect not in kept)
+    return Errors(wake, force_n, lag_s(scene), left_out)
+
+
+def lag_s(scene: Scene) -> float:
+    """Return how late a scene's velocity is [s], while the body speeds up evenly: (v − v_filtered)/a."""
+    t_s = np.arange(round(_RAMP_S * scene.rate_hz) + 1) / scene.rate_hz
+    rest = np.zeros_like(t_s)
+    motion = Motion(t_s, np.column_stack([0.5 * RAMP_MPS2 * t_s**2, rest, rest]))
+    still = scene.model_copy(update={"liquids": (), "knee": Knee(law="none"), "origin_m": (0.0, 0.0, 0.0)})
+    seen = simulate(still, motion)
+    last = len(t_s) // 4  # of the end, where the filter has long settled
+    return float(np.mean(RAMP_MPS2 * t_s[-last:] - seen["vx_mps"][-last:])) / RAMP_MPS2
+
+
+def _difference(scene: Scene, motion: Motion) -> tuple[float, float]:
+    """Return the largest differences of wake, as a share of Σ|e|/S, and force [N] along a motion."""
+    table = simulate(scene, motion)
+    true = reference_model.respond(scene, motion, exact=True)
+    wake_mps = np.column_stack([table[f"wake_{axis}_mps"] for axis in "xyz"])
+    force_n = np.column_stack([table[f"f{axis}_n"] for axis in "xyz"])
+    largest_mps = float(true.size_mps.max())
+    apart_mps = float(np.linalg.norm(wake_mps - true.wake_mps, axis=1).max())
+    share = apart_mps / largest_mps if largest_mps > 0 else 0.0
+    return share, float(np.linalg.norm(force_n - true.force_n, axis=1).max())

@@ -1,0 +1,147 @@
+"""What to expect of a scene's choice of effects: its cost a tick, and how wrong its force is while a hand strokes.
+
+The hand strokes to and fro with the greatest speed and acceleration of the scene's motion, read in whole counts of an
+encoder, through the scene's own velocity estimator. The force is that of the effects, before safety limits it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from study_app.evaluation import reference_solutions
+from study_app.evaluation.cost import measure
+from study_app.evaluation.hand_motions import stroke
+from study_app.evaluation.reference_model import local_wakes, lowered, resistance_nspm, respond
+from study_app.evaluation.reference_solutions import CYCLES, Case, Truth
+from study_app.haptics.model.bounds import GRAVITY_MPS2
+from study_app.haptics.model.gate import resolve
+from study_app.haptics.model.motion import Floats, Motion
+from study_app.haptics.model.scene import Effect, Everywhere, LocalWake, Scene
+from study_app.haptics.runtime.offline import simulate
+from study_app.validation.accuracy.candidate_sets import with_effects
+from study_app.validation.accuracy.candidates import COUNT_M
+from study_app.validation.accuracy.comparison import ROUNDING, Error, error_of
+
+SETTLED: Final = 2 / 3
+"""After this share of the strokes the flow has forgotten how they began."""
+
+
+class Expected(NamedTuple):
+    """What a scene's choice costs a tick, and the RMS error of its force, as a share of the true force's RMS and in N.
+
+    ``known_velocity_share`` is the same with velocities known exactly: what is left is that of effects and laws.
+    ``against`` says what the truth is made of.
+    """
+
+    cost_ns: float
+    error_share: float
+    error_n: float
+    known_velocity_share: float
+    against: str
+
+
+def expected(scene: Scene) -> Expected:
+    """Measure a scene's cost and foretell its error; of several liquids that with the greatest one."""
+    return Expected(measure(scene).scene_ns, *_errors(resolve(scene)))
+
+
+def foretold(scene: Scene) -> str:
+    """Return the expected error as a line of text."""
+    error_share, error_n, known_share, against = _errors(resolve(scene))
+    known = f"{100 * known_share:.2g} %" if known_share > ROUNDING else "none"
+    return (
+        f"expected error in its fastest strokes: {error_n:.2g} N, {100 * error_share:.2g} % of the force; {known} if "
+        f"velocities were known exactly; against {against}"
+    )
+
+
+def _errors(scene: Scene) -> tuple[float, float, float, str]:
+    if not scene.liquids:
+        return 0.0, 0.0, 0.0, "a scene without liquid"
+    return max((_of_one(scene, index) for index in range(len(scene.liquids))), key=lambda it: it[1])
+
+
+def _of_one(scene: Scene, index: int) -> tuple[float, float, float, str]:
+    """Return the errors of one liquid, as if it were alone, everywhere and without a flow of its own."""
+    liquid = scene.liquids[index].model_copy(update={"region": Everywhere(), "current": None})
+    named: tuple[Effect, ...] = () if liquid.effects == "auto" else liquid.effects
+    kept = tuple(it for it in named if it not in {"current", "surface"})
+    alone = with_effects(scene.model_copy(update={"liquids": (liquid,)}), *kept)
+    box = alone.motion_in(liquid)
+    speed_mps, rate_per_s = box.speed_mps or math.nan, reference_solutions.strokes_per_s(alone)
+    motion = stroke(speed_mps, rate_per_s, CYCLES, alone.rate_hz)
+    if liquid.viscosity_pa_s is not None and not {"wake", "local_wake"} & set(kept):
+        true_n = physical_n(alone, speed_mps, rate_per_s, motion.t_s)
+        against = (
+            "drag by experiments, added mass, buoyancy and the history of creeping flow, which is the most it can be"
+        )
+    else:
+        kept = tuple(it for it in kept if it in {"drag", "wake", "local_wake"})
+        alone = with_effects(alone, *kept)
+        true_n = _defined_n(alone, motion)
+        against = f"the definition of {' and '.join(kept).replace('_', ' ') or 'nothing'}"
+    truth = Truth("", "", (Case(motion, true_n, motion.t_s >= SETTLED * motion.t_s[-1]),))
+    if not true_n.any():
+        return 0.0, 0.0, 0.0, against
+    felt, known = _error(alone, motion, truth, counted=True), _error(alone, motion, truth, counted=False)
+    return felt.rms, felt.rms_n, known.rms, against
+
+
+def _error(scene: Scene, motion: Motion, truth: Truth, *, counted: bool) -> Error:
+    """Return how wrong the scene is, from encoder counts or from velocities known exactly."""
+    if counted and scene.velocity.kind != "given":
+        step_m = COUNT_M * scene.scale
+        motion = Motion(motion.t_s, np.rint(motion.position_m / step_m) * step_m)
+    table = simulate(scene, motion)
+    return error_of([np.column_stack([table.fx_n, table.fy_n, table.fz_n])], truth)
+
+
+def physical_n(scene: Scene, speed_mps: float, rate_per_s: float, t_s: Floats) -> Floats:
+    """Return the force (n, 3) [N] on a ball that strokes along x, v = speed · sin ωt, as well as it is known.
+
+    Steady drag by experiment, −½ρV dv/dt of the added mass, −6πµR (R/δ)(v + (dv/dt)/ω) of the history, which creeping
+    flow has exactly (Landau & Lifshitz §24) and faster flow at most, and what buoyancy and weight leave.
+    """
+    liquid, radius_m = scene.liquids[0], scene.body.diameter_m / 2
+    mu, rho, volume_m3 = liquid.viscosity_pa_s or math.nan, liquid.density_kg_m3, 4 / 3 * math.pi * radius_m**3
+    v, dv = speed_mps * np.sin(rate_per_s * t_s), speed_mps * rate_per_s * np.cos(rate_per_s * t_s)
+    drag_n = np.sign(v) * reference_solutions.measured_drag_n(liquid, scene.body.diameter_m, np.abs(v))
+    added_n = 0.5 * rho * volume_m3 * dv
+    delta_m = math.sqrt(2 * mu / (rho * rate_per_s))
+    history_n = 6 * math.pi * mu * radius_m**2 / delta_m * (v + dv / rate_per_s)
+    lift_n = (rho - scene.body.density_kg_m3) * volume_m3 * GRAVITY_MPS2
+    return np.column_stack([-drag_n - added_n - history_n, np.full_like(v, lift_n), np.zeros_like(v)])
+
+
+def _defined_n(scene: Scene, motion: Motion) -> Floats:
+    """Return drag and wake by the letter, (n, 3) [N]."""
+    liquid = scene.liquids[0]
+    if "drag" not in liquid.effects:
+        return np.zeros_like(motion.position_m)
+    local = liquid.local_wake
+    if local is None or "local_wake" not in liquid.effects:
+        return respond(scene, motion, exact=True).force_n
+    velocity_mps = motion.velocity_mps if motion.velocity_mps is not None else np.zeros_like(motion.position_m)
+    v = np.array([lowered(row, scene.knee) for row in velocity_mps])
+    w = v - _local_wake(scene, local, v, motion)
+    speeds = np.linalg.norm(w, axis=1)
+    return -np.array([resistance_nspm(scene, speed) for speed in speeds.tolist()])[:, np.newaxis] * w
+
+
+def _local_wake(scene: Scene, wake: LocalWake, v: Floats, motion: Motion) -> Floats:
+    upright = 1.0 if wake.axes == "xyz" else 0.0
+    found: Floats = local_wakes(
+        v * np.array([1.0, upright, 1.0]),
+        motion.position_m,
+        np.full(len(v), 1 / scene.rate_hz),
+        max(1, math.floor(wake.length * scene.rate_hz / 1000)),
+        wake.scaling * scene.rate_hz / 1000,
+        wake.exponent,
+        wake.decay,
+        wake.reach_m or scene.body.diameter_m,
+        wake.spreading_m2ps,
+    )
+    return found

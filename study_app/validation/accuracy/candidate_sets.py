@@ -1,0 +1,149 @@
+"""Which rungs are compared: from what costs most to what costs least, and from what is truest to what is cheapest."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from study_app.haptics.model.bounds import REFERENCE
+from study_app.haptics.model.gate import resolve
+from study_app.haptics.model.laws import Law
+from study_app.haptics.model.scene import Drag, Effect, Estimator, Everywhere, Ewma, Foaw, Given, Line, Raw, Scene
+from study_app.validation.accuracy.candidates import InterpretedRung, LinearRung, ListRung, Rung, TickRung, given
+from study_app.validation.accuracy.naive_wake import NumpyTail, PlainTail
+
+SLOWER = (2, 4, 10)
+RESOLUTIONS_M = (0.005, 0.02)
+LEAST_RATE_HZ = 50.0
+_WORDS: dict[Effect, str] = {"added_mass": "added mass", "history": "history"}
+_SHORT: dict[Law, str] = {
+    "constant": "constant C$_d$",
+    "schiller-naumann": "Schiller–Naumann (SN)",
+    "haider-levenspiel": "Haider–Levenspiel (HL)",
+    "brown-lawler": "Brown–Lawler (BL)",
+}
+_PLAIN: dict[Law, str] = {
+    "constant": "constant C_d",
+    "schiller-naumann": "Schiller–Naumann",
+    "haider-levenspiel": "Haider–Levenspiel",
+    "brown-lawler": "Brown–Lawler",
+}
+_INITIALS: dict[Law, str] = {
+    "constant": _SHORT["constant"],
+    "schiller-naumann": "SN",
+    "haider-levenspiel": "HL",
+    "brown-lawler": "BL",
+}
+
+
+def drag_and_wake(scene: Scene) -> Scene:
+    """Return the scene's first liquid everywhere, with its law of drag and its wake alone, if it calls for that one."""
+    liquid = resolve(scene).liquids[0]
+    effects = ("drag", "wake") if "wake" in liquid.effects else ("drag",)
+    return _only(scene, liquid.model_copy(update={"effects": effects}))
+
+
+def numerical(scene: Scene) -> tuple[tuple[Rung, ...], Rung]:
+    """Return the ways to compute one and the same definition, or less of it; and the one that runs in the program.
+
+    ``scene`` is of one liquid, by `drag_and_wake`. What is about the wake is left out where there is none.
+    """
+    exact = given(scene)
+    name = "O(1) wake" if _has_wake(scene) else "drag"
+    program = TickRung(name, name, "tick", exact)
+    rungs: list[Rung] = [program]
+    if _has_wake(scene):
+        rungs += _lists(exact)
+    for every in SLOWER:
+        if scene.rate_hz / every >= LEAST_RATE_HZ:
+            slower = exact.model_copy(update={"rate_hz": scene.rate_hz / every})
+            hertz = f"{slower.rate_hz:g} Hz"
+            rungs.append(TickRung(f"{program.name}, {hertz}", hertz, "rate", slower, every=every))
+    for estimator in _estimators(scene):
+        name = f"{program.name}, velocity by {estimator.kind} from encoder counts"
+        noisy = scene.model_copy(update={"velocity": estimator})
+        rungs.append(TickRung(name, f"velocity: {estimator.kind}", "estimator", noisy, counted=True))
+    return tuple(rungs), program
+
+
+def _lists(exact: Scene) -> list[Rung]:
+    """Return what else a wake could be: lists, shorter or coarser ones, none."""
+    length = _wake(exact).length
+    half, quarter = max(1, length // 2), max(1, length // 4)
+    rungs: list[Rung] = [
+        ListRung("O(N) compiled", "O(N) compiled", "list", exact),
+        ListRung("O(N) compiled, float32", "O(N) float32", "list", exact, precision=np.float32),
+        InterpretedRung("O(N) numpy", "numpy", "list", exact, tail=NumpyTail),
+        InterpretedRung("O(N) plain Python", "Python", "list", exact, tail=PlainTail),
+        ListRung("O(N) compiled, tail N/2", "O(N), N/2", "list", with_wake(exact, length=half)),
+        ListRung("O(N) compiled, tail N/4", "O(N), N/4", "list", with_wake(exact, length=quarter)),
+        TickRung("O(1) wake, tail N/4", "tail N/4", "tick", with_wake(exact, length=quarter)),
+    ]
+    for step_m in RESOLUTIONS_M:
+        step = f"{1e3 * step_m:g} mm"
+        coarse = with_wake(exact, resolution_m=step_m)
+        rungs.append(TickRung(f"O(1) wake, resolution {step}", f"resolution {step}", "tick", coarse))
+    rungs.append(TickRung("drag alone", "drag alone", "tick", with_effects(exact, "drag")))
+    return rungs
+
+
+def _estimators(scene: Scene) -> tuple[Estimator, ...]:
+    """Return one of each kind, the scene's own as it is."""
+    own = scene.velocity
+    kinds: tuple[Estimator, ...] = (Ewma(), Line(), Foaw(), Raw())
+    return tuple(own if not isinstance(own, Given) and own.kind == it.kind else it for it in kinds)
+
+
+def physical(scene: Scene) -> tuple[tuple[Rung, ...], Rung]:
+    """Return models of a liquid with a viscosity, each a little truer; and the one that the gate would choose."""
+    exact = given(_only(scene, scene.liquids[0]))
+    rungs: list[Rung] = [LinearRung("linear viscosity", "linear viscosity", "law", exact)]
+    rungs += [
+        TickRung(_PLAIN[law], label, "law", with_effects(exact, "drag", law=law)) for law, label in _SHORT.items()
+    ]
+    carried: tuple[Effect, ...] = ()
+    for effect in ("added_mass", "history"):
+        carried = (*carried, effect)
+        rungs.append(_carrying(exact, REFERENCE, carried))
+    gated = resolve(_only(scene, scene.liquids[0].model_copy(update={"effects": "auto"}))).liquids[0]
+    carried = tuple(it for it in _WORDS if it in gated.effects)
+    if "drag" not in gated.effects:
+        choice: Rung = TickRung("no resistance", "no resistance", "effects", with_effects(exact, *carried))
+    else:
+        choice = _carrying(exact, gated.drag.law, carried)
+    same = next((rung for rung in rungs if type(rung) is TickRung and rung.scene == choice.scene), None)
+    return (tuple(rungs), same) if same is not None else ((*rungs, choice), choice)
+
+
+def _carrying(exact: Scene, law: Law, carried: tuple[Effect, ...]) -> Rung:
+    """Return drag with what of added mass and history comes on top."""
+    words = [_WORDS[it] for it in carried]
+    of = with_effects(exact, "drag", *carried, law=law)
+    return TickRung(" + ".join([_PLAIN[law], *words]), " + ".join([_INITIALS[law], *words]), "effects", of)
+
+
+def with_wake(scene: Scene, **changes: Any) -> Scene:
+    """Return the scene with other parameters of its wake."""
+    wake = _wake(scene).model_copy(update=changes)
+    return scene.model_copy(update={"liquids": (scene.liquids[0].model_copy(update={"wake": wake}),)})
+
+
+def with_effects(scene: Scene, *effects: Effect, law: Law | None = None) -> Scene:
+    """Return the scene with other effects, and perhaps another law of drag."""
+    changes: dict[str, Any] = {"effects": effects} | ({} if law is None else {"drag": Drag(law=law)})
+    return scene.model_copy(update={"liquids": (scene.liquids[0].model_copy(update=changes),)})
+
+
+def _only(scene: Scene, liquid: Any) -> Scene:
+    """Return the scene with one liquid, that is everywhere and does not flow by itself."""
+    alone = liquid.model_copy(update={"region": Everywhere(), "current": None})
+    return scene.model_copy(update={"liquids": (alone,)})
+
+
+def _has_wake(scene: Scene) -> bool:
+    return "wake" in scene.liquids[0].effects
+
+
+def _wake(scene: Scene) -> Any:
+    return scene.liquids[0].wake

@@ -1,0 +1,103 @@
+"""Solved flows as CSV files, with comment lines ``# name: value`` on what made them; read without the solver."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib import resources
+from importlib.resources.abc import Traversable
+from typing import Final
+
+import numpy as np
+
+from study_app.errors import StudyError
+from study_app.haptics.model.motion import Floats
+from study_app.validation.cfd.cases import Case
+
+MOTION: Final = ("t_s", "velocity_mps", "force_n")
+"""Along one axis; the force on the ball, so against the motion at first."""
+STEADY: Final = ("reynolds", "drag_coefficient", "drag_coefficient_coarse", "drag_coefficient_narrow")
+"""C_d, the same on a coarser grid, and in a box of half the size."""
+STEADY_FILE: Final = "steady.csv"
+_OF_THE_CASE: Final = ("density_kg_m3", "viscosity_pa_s", "diameter_m", "speed_mps")
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """One file: its notes and its named columns, each (n,)."""
+
+    notes: dict[str, str]
+    columns: dict[str, Floats]
+
+    @property
+    def case(self) -> Case:
+        """What was solved, by the notes of a table of `MOTION`."""
+        return Case(self.notes["liquid"], *(float(self.notes[name]) for name in _OF_THE_CASE))
+
+
+def text(notes: Mapping[str, str], columns: Mapping[str, Sequence[float] | Floats], digits: int = 7) -> bytes:
+    """Return a table as the bytes of its file."""
+    target = io.StringIO()
+    for name, value in notes.items():
+        target.write(f"# {name}: {value}\n")
+    writer = csv.writer(target, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows([f"{value:.{digits}g}" for value in row] for row in zip(*columns.values(), strict=True))
+    return target.getvalue().encode()
+
+
+def notes_of(case: Case) -> dict[str, str]:
+    """Return the notes that say what was solved."""
+    values = (case.density_kg_m3, case.viscosity_pa_s, case.diameter_m, case.speed_mps)
+    return {
+        "liquid": case.liquid_id,
+        **{name: f"{value:.6g}" for name, value in zip(_OF_THE_CASE, values, strict=True)},
+    }
+
+
+def stored(folder: Traversable | None = None) -> tuple[Table, ...]:
+    """Return the tables of `MOTION`, of the package or of a folder, by liquid and speed.
+
+    Raises
+    ------
+    StudyError
+        There is none, or one cannot be understood.
+    """
+    place = folder or _package()
+    files = sorted((it for it in place.iterdir() if it.name.endswith("mmps.csv")), key=lambda it: it.name)
+    if not files:
+        raise StudyError(f"{place} holds no tables of the fluid solver: make them with liquid-study cfd --solve")
+    return tuple(_read(it, MOTION) for it in files)
+
+
+def steady(folder: Traversable | None = None) -> Table:
+    """Return the table of `STEADY`.
+
+    Raises
+    ------
+    StudyError
+        It is not there, or cannot be understood.
+    """
+    return _read((folder or _package()) / STEADY_FILE, STEADY)
+
+
+def _package() -> Traversable:
+    return resources.files("study_app.validation.cfd")
+
+
+def _read(file: Traversable, names: Sequence[str]) -> Table:
+    try:
+        lines = file.read_text(encoding="utf-8").splitlines()
+        notes = dict(line[1:].split(":", 1) for line in lines if line.startswith("#"))
+        header, *rows = csv.reader(line for line in lines if not line.startswith("#"))
+        if tuple(header) != tuple(names):
+            raise ValueError(f"its columns are {','.join(header)}, not {','.join(names)}")  # noqa: TRY301
+        numbers = np.array([[float(field) for field in row] for row in rows]).T
+        columns = dict(zip(names, numbers, strict=True))
+    except (OSError, ValueError) as error:
+        raise StudyError(
+            f"the solver's table {file.name} cannot be used ({error}): make it again with liquid-study cfd --solve"
+        ) from error
+    return Table({name.strip(): value.strip() for name, value in notes.items()}, columns)

@@ -1,0 +1,113 @@
+"""What a case runs on: model, safety layer, handle and hand, ready to begin, and copies of them in mid-motion."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, Final
+
+from study_app.haptics.kernels.plant import new_handle
+from study_app.haptics.kernels.safety import new_safety
+from study_app.haptics.kernels.tick_schedule import new_pace
+from study_app.haptics.model.device_dynamics import Dynamics
+from study_app.haptics.model.layout import SAMPLE, records
+from study_app.haptics.model.limits import Bearable
+from study_app.haptics.runtime.pack import Model, pack
+from study_app.validation.stability.arm_plant import ARMS, new_arm
+from study_app.validation.stability.closed_loop import LOOP, TRACE, begin, run
+from study_app.validation.stability.stability_cases import GRIPS, LETS_GO, MOTIONS, SECOND, THROWN, Case, scene_of
+
+MOVING_S: Final = 1.2
+LASTS_S: Final = 1.8
+FREE_S: Final = 1.2
+"""How long a handle that was let go is watched."""
+TREMOR_M: Final = 20e-6
+FORCE_LIMIT_N: Final = 8.0
+
+
+@dataclass(slots=True)
+class Bench:
+    """The records of one closed loop."""
+
+    model: Model
+    safety: Any
+    sample: Any
+    handle: Any
+    pace: Any
+    loop: Any
+
+    def copy(self) -> Bench:
+        """Return a bench of its own, in the same state."""
+        model = Model(*(field.copy() for field in self.model))
+        handle, pace, loop = (record.copy() for record in (self.handle, self.pace, self.loop))
+        return Bench(model, self.safety.copy(), self.sample.copy(), handle, pace, loop)
+
+    def run(self, trace: Any, first: int, until_s: float) -> int:
+        """Run ticks into ``trace`` from row ``first`` on until a time [s]; return the row after the last."""
+        self.loop.until_s = until_s
+        return int(run(self.model, self.safety[0], self.sample[0], self.handle, self.pace, self.loop, trace, first))
+
+
+def lasts_s(case: Case) -> float:
+    """Return how long a case lasts [s]."""
+    return max(LASTS_S, case.release_s + FREE_S) if case.hand == LETS_GO else LASTS_S
+
+
+def new_trace(case: Case) -> Any:
+    """Return an empty trace that has room for a case."""
+    return records(TRACE, math.ceil((lasts_s(case) + 0.1) * case.rate_hz))
+
+
+def trace_of(case: Case) -> Any:
+    """Return the trace of a case with the safety layer."""
+    bench = new_bench(case, safe=True)
+    begin(bench.loop, bench.handle)
+    trace = new_trace(case)
+    return trace[: bench.run(trace, 0, lasts_s(case))]
+
+
+def new_bench(case: Case, *, safe: bool, limits: Bearable | None = None) -> Bench:
+    """Return the records of a case; ``limits`` are tried in place of the table's."""
+    safety = new_safety(FORCE_LIMIT_N, case.believed_delay)
+    safety[0].fade = 1.0
+    loop = records(LOOP, 1)[0]
+    loop.safe = safe
+    loop.motion = MOTIONS.index(case.motion)
+    loop.speed_mps = case.speed_mps
+    loop.way_m = case.way_mm * 1e-3
+    loop.moving_s = max(MOVING_S, case.release_s) if case.hand == LETS_GO else MOVING_S
+    loop.release_s = {THROWN: 0.0, LETS_GO: case.release_s}.get(case.hand, math.inf)
+    loop.tremor_m = 0.0 if case.hand == THROWN else TREMOR_M
+    loop.noise_m = case.noise_um * 1e-6
+    loop.lost, loop.duplicated, loop.burst_s = case.lost, case.duplicated, case.burst_ms * 1e-3
+    loop.slows_to = case.slows_to
+    if case.plant == SECOND:
+        loop.arm = new_arm(ARMS[case.hand], handle_kg=case.mass_kg, **_device(case))
+    grip = GRIPS[case.hand]
+    handle = new_handle(
+        mass_kg=case.mass_kg,
+        hand_kg=grip.mass_kg,
+        stiffness_npm=grip.stiffness_npm,
+        damping_nspm=grip.damping_nspm,
+        quantum_m=case.quantum_um * 1e-6,
+        **_device(case),
+    )
+    model = pack(scene_of(case), limits=limits, dynamics=_dynamics(case))
+    pace = new_pace(1.0 / case.rate_hz, jitter_s=case.jitter / case.rate_hz, missed=case.missed)
+    return Bench(model, safety, records(SAMPLE, 1), handle, pace, loop)
+
+
+def _dynamics(case: Case) -> Dynamics:
+    """Return what the device says of itself: its least mass is what it has, the delay what is believed."""
+    return Dynamics(case.believed_delay / case.rate_hz, case.quantum_um * 1e-6, case.mass_kg)
+
+
+def _device(case: Case) -> dict[str, Any]:
+    """Return what both plants have in common: friction and motors of the device."""
+    return {
+        "viscous_nspm": case.viscous_nspm,
+        "coulomb_n": case.coulomb_n,
+        "motor_limit_n": FORCE_LIMIT_N,
+        "motor_step_n": FORCE_LIMIT_N / 2048,
+        "delay": case.delay,
+    }

@@ -1,0 +1,323 @@
+"""Liquids from measured motion and force: found again, as sure as said, and doubted where numbers mean little."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.stats import t as student
+
+from study_app.errors import StudyError
+from study_app.evaluation.identify import measured_force, parameters, search
+from study_app.evaluation.identify.fit import fit
+from study_app.haptics.model import paths
+from study_app.haptics.model.motion import Motion
+from study_app.haptics.model.overrides import override_all
+from study_app.haptics.model.scene import Box, Liquid, LocalWake, Scene
+from tests.evaluation.identify.measurements import (
+    BALL,
+    OIL,
+    REACH,
+    REVERSE,
+    SEED,
+    TANK,
+    force_of,
+    noisy,
+    slowed,
+    write_csv,
+)
+from tests.haptics.scenes import COMPILED
+
+pytestmark = pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")
+
+
+def test_known_parameters_of_a_wake_are_found_again_in_noise():
+    names = ["drag_coefficient", "length", "scaling"]
+    start = override_all(TANK, {"drag_coefficient": 0.8, "length": 40, "scaling": 2000})
+    found = fit(start, "tank", names, REVERSE, noisy(TANK, REVERSE, 0.02))
+    for name, true in zip(names, (0.42, 300, 400), strict=True):
+        lower, upper = found.intervals[name]
+        assert found.values[name] == pytest.approx(true, abs=upper - lower)  # four deviations
+        assert lower < found.values[name] < upper
+        assert upper - lower < 0.02 * true
+    assert isinstance(found.values["length"], int)
+    assert found.rms_n == pytest.approx(0.02 * math.sqrt(2), rel=0.05)
+    assert found.told_apart
+    assert found.warnings == ()
+
+
+def test_without_noise_they_are_found_exactly():
+    names = ["length", "scaling", "exponent"]
+    start = override_all(TANK, {"length": 100, "scaling": 100, "exponent": 0.7})
+    found = fit(start, "tank", names, REVERSE, force_of(TANK, REVERSE))
+    assert found.values["length"] == 300
+    assert found.values["scaling"] == pytest.approx(400, rel=1e-6)
+    assert found.values["exponent"] == pytest.approx(1, rel=1e-6)
+    assert found.rms_n < 1e-6
+
+
+def test_one_linear_parameter_is_the_quotient_of_linear_regression():
+    """F = C_d g: C_d = Σ F·g / Σ g·g, its interval by Student's t with one degree of freedom less than numbers."""
+    force_n = noisy(BALL, REACH, 0.05)
+    found = fit(BALL, "tank", ["drag_coefficient"], REACH, force_n)
+    unit_n = force_of(override_all(BALL, {"drag_coefficient": 1}), REACH)
+    true = np.sum(force_n * unit_n) / np.sum(unit_n**2)
+    left = (force_n - true * unit_n)[:, [0, 2]]
+    assert found.axes == (0, 2)
+    assert found.following < 0.05
+    widened = math.sqrt((1 + max(found.following, 0)) / (1 - max(found.following, 0)))
+    half = student.ppf(0.975, left.size - 1) * math.sqrt(np.sum(left**2) / (left.size - 1) / np.sum(unit_n**2))
+    assert found.values["drag_coefficient"] == pytest.approx(true, rel=1e-9)
+    lower, upper = found.intervals["drag_coefficient"]
+    assert (upper - lower) / 2 == pytest.approx(half * widened, rel=1e-3)
+    assert (upper + lower) / 2 == pytest.approx(true, rel=1e-9)
+
+
+def test_a_viscosity_an_order_away_and_an_added_mass():
+    start = override_all(OIL, {"viscosity_pa_s": 14.0, "added_mass.coefficient": 0.0})
+    found = fit(start, "oil", ["viscosity_pa_s", "added_mass.coefficient"], REACH, noisy(OIL, REACH, 0.05))
+    assert found.values["viscosity_pa_s"] == pytest.approx(1.41, rel=0.01)
+    assert found.values["added_mass.coefficient"] == pytest.approx(0.5, rel=0.05)
+    assert found.told_apart
+
+
+def test_a_local_wake_whose_force_has_plateaus_over_its_length():
+    """A search that does not look about after its first descent ends on one of them, at 627."""
+    local_wake = LocalWake(length=650, scaling=700)
+    lake = Liquid(id="lake", density_kg_m3=1000, effects=("drag", "local_wake"), local_wake=local_wake)
+    scene, motion = Scene(liquids=(lake,)), paths.path("reach", reaches=4)
+    start = override_all(scene, {"length": 30, "scaling": 300})
+    found = fit(start, "lake", ["length", "scaling"], motion, noisy(scene, motion, 0.02))
+    assert found.values["length"] == pytest.approx(650, rel=0.02)
+    assert found.values["scaling"] == pytest.approx(700, rel=0.02)
+
+
+def test_a_motion_along_a_line_may_have_its_force_along_that_line():
+    motion = paths.path("stop", moving_s=0.6, rest_s=0.6)
+    force_n = noisy(TANK, motion, 0.02)
+    along = fit(TANK, "tank", ["drag_coefficient"], motion, force_n[:, 0])
+    assert along.axes == (0,)
+    assert along.residual_n.shape == (len(motion.t_s), 3)
+    lower, upper = along.intervals["drag_coefficient"]
+    assert lower < 0.42 < upper
+
+
+def test_slower_and_uneven_rows_tell_the_same():
+    motion = REACH
+    force_n, rng = noisy(TANK, motion, 0.005), np.random.default_rng(SEED)
+    some = np.sort(rng.choice(len(motion.t_s), len(motion.t_s) // 5, replace=False))
+    found = fit(
+        override_all(TANK, {"length": 100}), "tank", ["drag_coefficient", "length"], *slowed(motion, force_n, some)
+    )
+    assert found.values["drag_coefficient"] == pytest.approx(0.42, rel=0.02)
+    assert found.values["length"] == pytest.approx(300, rel=0.05)
+    assert len(found.fitted_n) == len(some)
+
+
+def test_a_measured_force_does_not_lag_so_velocities_from_places_do_not(tmp_path):
+    """Through the filter of a device the added mass of a real ball would be felt 9.5 ms late, as less of it."""
+    force_n = noisy(OIL, REACH, 0.01)
+    read = measured_force.read(write_csv(tmp_path / "measured.csv", REACH, force_n, velocities=False))
+    assert read.motion.velocity_mps is None
+    names = ["viscosity_pa_s", "added_mass.coefficient"]
+    centred = fit(OIL, "oil", names, measured_force.centred(read.motion), read.force_n)
+    late = fit(OIL, "oil", names, read.motion, read.force_n)
+    assert centred.values["viscosity_pa_s"] == pytest.approx(1.41, rel=0.005)
+    assert centred.values["added_mass.coefficient"] == pytest.approx(0.5, rel=0.1)
+    assert late.rms_n > 5 * centred.rms_n
+
+
+def test_centred_velocities_are_those_of_a_parabola():
+    t_s = np.arange(60) / 500
+    place = np.column_stack([3 * t_s**2 - t_s, 0 * t_s, 2 - t_s])
+    slopes = measured_force.centred(Motion(t_s, place)).velocity_mps
+    assert slopes == pytest.approx(np.column_stack([6 * t_s - 1, 0 * t_s, -np.ones(60)]), abs=1e-9)
+
+
+# --- How sure --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("following", [0.0, 0.9])
+def test_nineteen_of_twenty_intervals_hold_the_truth(following):
+    """Also where the sensor's noise remembers: taken for white, its intervals would hold it in one case of three."""
+    motion, names = (
+        paths.path("reach", reaches=1, reach_s=0.5, dwell_s=0.1),
+        ["viscosity_pa_s", "added_mass.coefficient"],
+    )
+    scene = override_all(OIL, {"effects": ("drag", "added_mass")})
+    held = np.zeros(2)
+    repeats = 100
+    for seed in range(repeats):
+        found = fit(scene, "oil", names, motion, noisy(scene, motion, 0.2, following=following, seed=seed))
+        for k, true in enumerate((1.41, 0.5)):
+            lower, upper = found.intervals[names[k]]
+            held[k] += lower < true < upper
+    # Two deviations of the binomial distribution to both sides of 0.95; intervals too wide would hold all.
+    assert (held >= 91).all()
+    assert (held <= 99).all()
+
+
+def test_the_wider_the_noise_the_wider_the_interval():
+    widths = []
+    for deviation_n in (0.01, 0.1, 1.0):
+        found = fit(BALL, "tank", ["drag_coefficient"], REACH, noisy(BALL, REACH, deviation_n))
+        lower, upper = found.intervals["drag_coefficient"]
+        widths.append(upper - lower)
+    for narrow, wide in pairwise(widths):
+        assert wide == pytest.approx(10 * narrow, rel=0.2)
+
+
+# --- What is doubted -------------------------------------------------------------------------------------------------
+
+
+def test_two_factors_of_the_same_force_cannot_be_told_apart():
+    names = ["drag_coefficient", "density_kg_m3"]
+    found = fit(BALL, "tank", names, REACH, noisy(BALL, REACH, 0.02))
+    assert not found.told_apart
+    assert found.correlation[0, 1] == pytest.approx(-1, abs=1e-6)
+    (warning,) = found.warnings
+    assert "drag_coefficient and density_kg_m3 cannot be distinguished" in warning
+    assert found.intervals["drag_coefficient"] == (0, 10)
+    known_kg_m3 = found.values["drag_coefficient"] * found.values["density_kg_m3"]
+    assert known_kg_m3 == pytest.approx(470, rel=0.01)
+    alone = fit(BALL, "tank", ["drag_coefficient"], REACH, noisy(BALL, REACH, 0.02))
+    assert alone.told_apart
+
+
+def test_a_parameter_that_does_nothing_is_named_and_left_alone():
+    names = ["drag_coefficient", "viscosity_pa_s"]
+    found = fit(OIL, "oil", names, REACH, noisy(OIL, REACH, 0.02))
+    assert not found.told_apart
+    assert any("drag_coefficient does not change the force" in warning for warning in found.warnings)
+    assert found.values["drag_coefficient"] == 0.47
+    assert np.isnan(found.correlation[0]).all()
+    lower, upper = found.intervals["viscosity_pa_s"]
+    assert lower < 1.41 < upper
+
+
+def test_a_length_beyond_what_was_measured_ends_at_the_edge():
+    short = paths.path("line", moving_s=0.2)
+    found = fit(override_all(TANK, {"length": 100}), "tank", ["length"], short, force_of(TANK, short))
+    assert found.values["length"] == 200
+    assert any("edge of its range, 200 (no more than" in warning for warning in found.warnings)
+
+
+def test_a_scaling_never_falls_below_its_length():
+    """Measured: a liquid that outruns the ball. The model has none such."""
+    pushed = force_of(TANK, REVERSE)
+    pushed[800:1300] *= -1
+    found = fit(TANK, "tank", ["length", "scaling"], REVERSE, pushed)
+    assert found.values["length"] <= found.values["scaling"]
+    alone = fit(TANK, "tank", ["scaling"], REVERSE, force_of(override_all(TANK, {"scaling": 300}), REVERSE))
+    assert alone.values["scaling"] == pytest.approx(300)
+    assert any("no less than the length" in warning for warning in alone.warnings)
+
+
+def test_a_missing_effect_shows_in_residuals_that_follow_one_another():
+    lacking = override_all(OIL, {"effects": ("drag",)})
+    found = fit(lacking, "oil", ["viscosity_pa_s"], REACH, noisy(OIL, REACH, 0.01))
+    assert found.following > 0.9
+    assert any("follow one another" in warning for warning in found.warnings)
+    white = fit(OIL, "oil", ["viscosity_pa_s"], REACH, noisy(OIL, REACH, 0.01))
+    widths = [upper - lower for lower, upper in (found.intervals["viscosity_pa_s"], white.intervals["viscosity_pa_s"])]
+    assert widths[0] > 20 * widths[1]
+
+
+def test_a_sharp_turn_that_velocities_from_places_blur_is_doubted():
+    """The force is wrong for 25 ms at a turn: residuals follow one another little, but more than noise would."""
+    places = measured_force.centred(Motion(REVERSE.t_s, REVERSE.position_m))
+    force_n = noisy(TANK, REVERSE, 0.06)
+    blurred = fit(TANK, "tank", ["drag_coefficient"], places, force_n)
+    assert blurred.following < 0.5
+    assert any("blur sharp turns" in warning for warning in blurred.warnings)
+    assert fit(TANK, "tank", ["drag_coefficient"], REVERSE, force_n).warnings == ()
+
+
+# --- What may be fitted ----------------------------------------------------------------------------------------------
+
+
+def test_ranges_are_those_of_the_scenes_models():
+    names = ["drag_coefficient", "wake.length", "scaling", "decay", "body.density_kg_m3", "density_kg_m3"]
+    found = {it.name: it for it in parameters.find(TANK, "tank", names)}
+    ranges = {name: (it.least, it.most, it.above, it.whole) for name, it in found.items()}
+    assert ranges == {
+        "drag_coefficient": (0, 10, False, False),
+        "wake.length": (1, 100_000, False, True),
+        "scaling": (1, 1e9, False, False),
+        "decay": (0.5, 1, False, False),
+        "body.density_kg_m3": (0.01, 25_000, False, False),
+        "density_kg_m3": (0.01, 25_000, False, False),
+    }
+    assert (found["body.density_kg_m3"].table, found["density_kg_m3"].table) == ("body", "liquid")
+
+
+def test_parameters_are_set_where_simulate_would_set_them():
+    for name, value in (("length", 77), ("drag_coefficient", 0.2), ("density_kg_m3", 800.0), ("exponent", 2.0)):
+        found = parameters.find(TANK, "tank", [name])
+        assert parameters.replace(TANK, "tank", found, [value]) == override_all(TANK, {name: value})
+
+
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [
+        ([], "no parameter is named"),
+        (["drag_coeficient"], "did you mean 'drag_coefficient'"),
+        (["viscosity_pa_s"], "gives no viscosity_pa_s to start from"),
+        (["breaking_angle_deg"], "is a threshold"),
+        (["alpha"], "nothing to fit is called 'alpha'"),
+        (["axes"], "nothing to fit is called 'axes'"),
+        (["reach_m"], "nothing to fit is called 'reach_m'"),
+        (["length", "wake.length"], "are the same parameter"),
+    ],
+)
+def test_what_cannot_be_fitted_is_said(names, said):
+    with pytest.raises(StudyError, match=said):
+        fit(TANK, "tank", names, REVERSE, force_of(TANK, REVERSE))
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda m, f: (m, 0 * f), "zero throughout"),
+        (lambda m, f: (m, f[:-1]), r"finite and \(n, 3\)"),
+        (lambda m, f: (m, f * math.nan), "finite"),
+        (lambda m, f: slowed(m, f, [0]), "one row is no motion"),
+        (lambda m, f: slowed(m, f, [0, 1, 2, 99, 100]), "row 4 comes 0.097 s after the one before"),
+    ],
+)
+def test_what_was_not_measured_is_said(change, said):
+    motion, force_n = change(REVERSE, force_of(TANK, REVERSE))
+    with pytest.raises(StudyError, match=said):
+        fit(TANK, "tank", ["drag_coefficient"], motion, force_n)
+
+
+def test_another_liquid_is_named():
+    with pytest.raises(StudyError, match="no liquid 'lake': there is tank"):
+        fit(TANK, "lake", ["drag_coefficient"], REVERSE, force_of(TANK, REVERSE))
+
+
+def test_between_whole_lengths_the_force_is_interpolated_and_at_them_it_is_simulated():
+    known = measured_force.Measured(REVERSE, force_of(TANK, REVERSE))
+    problem = search.Problem(TANK, "tank", parameters.find(TANK, "tank", ["length"]), known)
+    whole = [force_of(override_all(TANK, {"length": n}), REVERSE) for n in (250, 251)]
+    for length, expected_n in ((250, whole[0]), (251, whole[1]), (250.25, 0.75 * whole[0] + 0.25 * whole[1])):
+        assert problem.force_n(np.array([math.log(length)])) == pytest.approx(expected_n, abs=1e-9)
+
+
+def test_effects_left_to_choice_are_chosen_once_and_named():
+    box = Box(size_m=(9, 9, 9))
+    auto = Scene(liquids=(Liquid(id="oil", density_kg_m3=900, viscosity_pa_s=0.1, region=box, effects="auto"),))
+    found = fit(auto, "oil", ["density_kg_m3"], REACH, force_of(auto, REACH))
+    assert found.scene.liquids[0].effects != "auto"
+    assert found.values["density_kg_m3"] == pytest.approx(900)
+
+
+def test_every_number_has_a_range_to_be_searched_in():
+    tail = LocalWake(length=300, scaling=400)
+    liquid = Liquid(
+        id="tank", density_kg_m3=1000, viscosity_pa_s=1, effects=("drag", "local_wake", "history"), local_wake=tail
+    )
+    names = ["reach_m", "viscosity_pa_s", "density_kg_m3", "scaling", "exponent", "spreading_m2ps", "drag_coefficient"]
+    for found in parameters.find(Scene(liquids=(liquid,)), "tank", names):
+        least, most = search.u_range(found)
+        assert -math.inf < least < most < math.inf

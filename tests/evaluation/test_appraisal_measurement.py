@@ -1,0 +1,179 @@
+"""What a scene costs and how true it is, here and in the process that answers a lab."""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+import os
+import signal
+from dataclasses import replace
+
+import numba
+import numpy as np
+import pytest
+
+if numba.config.DISABLE_JIT:
+    pytest.skip("costs are those of compiled code", allow_module_level=True)
+
+from study_app.evaluation import appraisal_measurement
+from study_app.evaluation.appraisal import Costs
+from study_app.evaluation.appraisal_worker import Appraiser, serve
+from study_app.evaluation.fastest import withheld_share
+from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
+from study_app.haptics.model.liquid import Box
+from study_app.haptics.model.motion import Motion
+from study_app.haptics.model.scene import Ewma, Line, Raw
+from study_app.haptics.runtime.offline import samples_along
+from study_app.protocol.load import load, load_scenes
+from study_app.protocol.trials.task import Explore, Reach, Stroke, fastest_stroke
+
+THESIS, PHYSICAL = load_scenes("rek2024"), load_scenes("physical_liquids")
+SHAKE = Stroke(5.0, 0.03)
+QUICK = Stroke(8.0, 0.03)
+
+
+def test_costs_name_every_effect_and_why_it_is_not_there() -> None:
+    found = {it.effect: it for it in appraisal_measurement.costs(THESIS["water"], batches=5).effects}
+    assert found["wake"].ns is not None
+    assert found["wake"].ns > 0
+    assert (found["history"].ns, found["history"].why) == (None, "not asked for")
+    chosen = {it.effect: it for it in appraisal_measurement.costs(PHYSICAL["water"], batches=5).effects}
+    assert chosen["buoyancy"].ns is None
+    assert chosen["buoyancy"].why.startswith("out, 0.")
+    assert chosen["current"].why == "not asked for"
+
+
+@pytest.mark.parametrize("name", ["water", "light_oil", "syrup"])
+def test_the_thesis_liquids_are_the_definition_to_rounding(name: str) -> None:
+    found = appraisal_measurement.errors(THESIS[name])
+    assert found.wake is not None
+    assert found.force_n is not None
+    assert found.wake < 1e-12
+    assert found.force_n < 1e-9
+    assert found.left_out == ()
+
+
+def test_an_error_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A reference with a tail of one element less is another liquid."""
+    true = appraisal_measurement.references.respond
+
+    def shorter(scene, motion, *, exact=False):  # type: ignore[no-untyped-def]
+        liquid = scene.liquids[0]
+        wake = liquid.wake.model_copy(update={"length": liquid.wake.length - 1})
+        other = scene.model_copy(update={"liquids": (liquid.model_copy(update={"wake": wake}),)})
+        return true(other, motion, exact=exact)
+
+    monkeypatch.setattr(appraisal_measurement.references, "respond", shorter)
+    found = appraisal_measurement.errors(THESIS["light_oil"])
+    assert found.wake is not None
+    assert found.wake > 1e-4
+
+
+def test_effects_without_a_reference_are_named() -> None:
+    found = appraisal_measurement.errors(PHYSICAL["honey"])
+    assert found.wake is None
+    assert found.force_n is not None
+    assert found.force_n < 1e-9
+    assert found.left_out == ("buoyancy", "added_mass", "history")
+
+
+@pytest.mark.parametrize(
+    ("velocity", "lag_ms"),
+    [(Ewma(), 9.5), (Ewma(alpha=0.5), 1.5), (Raw(), 0.5), (Line(samples=15), 7.0)],
+    ids=["ewma", "quick", "raw", "line"],
+)
+def test_the_lag_of_a_filter_is_that_of_its_closed_form(velocity: Ewma, lag_ms: float) -> None:
+    scene = THESIS["water"].model_copy(update={"velocity": velocity})
+    assert 1e3 * appraisal_measurement.lag_s(scene) == pytest.approx(lag_ms, rel=1e-6)
+
+
+def test_an_exploration_may_be_shaken_and_a_reach_goes_as_far_as_its_targets() -> None:
+    tank_m = (0.1, 0.06, 0.06)
+    assert fastest_stroke(Explore(kind="explore", min_s=1, max_s=3, instruction="Explore."), tank_m) == SHAKE
+    assert fastest_stroke(Explore(kind="explore", min_s=1, max_s=3, instruction="Explore."), (0.04, 0.06, 0.06)) == (
+        5.0,
+        0.02,
+    )
+    reach = load("rek2024").tasks["reach"]
+    assert isinstance(reach, Reach)
+    stroke = fastest_stroke(reach, tank_m)
+    following = zip(reach.targets_m, (*reach.targets_m[1:], reach.targets_m[0]), strict=True)
+    assert 2 * stroke.amplitude_m == pytest.approx(max(math.dist(*pair) for pair in following))
+    assert stroke.frequency_hz == pytest.approx(1 / 0.6)
+
+
+def test_slow_strokes_lack_nothing_and_the_share_withheld_is_that_of_the_samples() -> None:
+    assert withheld_share(THESIS["water"], Stroke(0.5, 0.03), UNKNOWN) < 1e-6
+    assert withheld_share(THESIS["water"].model_copy(update={"liquids": ()}), SHAKE, UNKNOWN) == 0.0
+    assert 0.0 < withheld_share(THESIS["light_oil"], QUICK, UNKNOWN) <= 1.0
+
+
+def test_a_stroke_is_made_where_the_device_is_in_the_scene() -> None:
+    here = THESIS["light_oil"]
+    origin_m = (2.0, -1.0, 0.5)
+    there = here.model_copy(
+        update={
+            "origin_m": origin_m,
+            "liquids": tuple(
+                liquid.model_copy(update={"region": Box(centre_m=origin_m, size_m=(1.0, 1.0, 1.0))})
+                for liquid in here.liquids
+            ),
+        }
+    )
+    assert withheld_share(there, QUICK, UNKNOWN) == pytest.approx(withheld_share(here, QUICK, UNKNOWN), rel=1e-3)
+
+
+def test_what_is_withheld_depends_on_the_device_and_the_rate() -> None:
+    scene = THESIS["light_oil"]
+    usual = withheld_share(scene, QUICK, Dynamics(1e-3))
+    light = withheld_share(scene, QUICK, Dynamics(1e-3, mass_kg=0.02))
+    late = withheld_share(scene, QUICK, Dynamics(3e-3))
+    slow = withheld_share(scene.model_copy(update={"rate_hz": 500.0}), QUICK, Dynamics(1e-3))
+    assert len({usual, light, late, slow}) == 4
+    t_s = np.arange(10) / 1000
+    delays = samples_along(scene, Motion(t_s, np.zeros((10, 3))), Dynamics(2.5e-3)).delay_ticks
+    assert set(delays) == {3}
+
+
+def test_the_process_answers_the_newest_question_and_ends_when_told() -> None:
+    appraiser = Appraiser()
+    try:
+        appraiser.ask(THESIS["honey"])
+        device = Dynamics(2e-3, mass_kg=0.05)
+        newest = appraiser.ask(THESIS["light_oil"], QUICK, device)
+        answered: dict[int, list[object]] = {}
+        while len(answered.get(newest, [])) < 2:
+            told = appraiser.answers(wait_s=120.0)  # the first time it compiles
+            assert told
+            for number, answer in told:
+                answered.setdefault(number, []).append(answer)
+        first, second = answered[newest]
+        assert isinstance(first, Costs)
+        assert [it.effect for it in first.effects if it.ns is not None] == ["drag", "wake"]
+        share = withheld_share(THESIS["light_oil"], QUICK, device)
+        assert share != withheld_share(THESIS["light_oil"], QUICK, UNKNOWN)
+        assert second == replace(appraisal_measurement.errors(THESIS["light_oil"]), withheld=share)
+        assert appraiser.works
+    finally:
+        appraiser.close()
+    assert not appraiser.works
+    appraiser._listening.join(20.0)
+    assert appraiser._process.returncode is not None
+    appraiser.ask(THESIS["honey"])
+    assert appraiser.answers() == []
+
+
+def test_what_cannot_be_measured_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "nice", lambda _by: 0)  # the tests go on in this process
+    wild = THESIS["water"].model_copy(update={"rate_hz": 100.0})  # slower than any loop that is known to be stable
+    question = json.dumps({"number": 7, "scene": wild.model_dump(mode="json")})
+    out = io.StringIO()
+    before = signal.getsignal(signal.SIGINT)
+    try:
+        serve([question], out)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    (told,) = (json.loads(line) for line in out.getvalue().splitlines())
+    assert told["number"] == 7
+    assert "no stable force is known" in told["why"]

@@ -1,0 +1,80 @@
+"""The definition itself, against lists worked out by hand."""
+
+import numpy as np
+import pytest
+
+from study_app.evaluation.reference_model import respond, wakes
+from study_app.haptics.model.motion import Motion
+from study_app.haptics.model.scene import Given, Liquid, Scene, Wake
+
+X, Z = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
+
+
+def tail(velocities, *, n=4, s=4.0, y=1.0, beta_deg=45.0, span_m=0.0, decay=1.0, resolution_m=0.0):
+    """Return the wake met after these ticks of 1 ms."""
+    h = np.array([*velocities, np.zeros(3)])
+    interval_s = np.full(len(h), 1e-3)
+    position_m = np.cumsum(h * 1e-3, axis=0)
+    met, _ = wakes(h, position_m, interval_s, n, s, y, np.cos(np.radians(beta_deg)), span_m, decay, resolution_m)
+    return met[-1]
+
+
+def test_nothing_is_no_wake():
+    assert not tail([]).any()
+
+
+def test_one_segment_takes_the_direction_of_its_newest_element_with_all_magnitudes():
+    slightly = np.array([0.8, 0.0, 0.6])  # 36.9° from x
+    assert tail([2 * X, slightly]) == pytest.approx(slightly * 3 / 4)
+
+
+def test_two_segments_add_as_vectors():
+    assert tail([X, X, Z]) == pytest.approx([0.5, 0.0, 0.25])
+
+
+def test_the_oldest_falls_off():
+    assert tail([X, X, Z, Z, Z]) == pytest.approx([0.25, 0.0, 0.75])
+
+
+def test_zero_elements_take_places_and_break_nothing():
+    zero = np.zeros(3)
+    assert tail([X, zero, X]) == pytest.approx([0.5, 0.0, 0.0])
+    assert tail([X, X, zero, zero, zero]) == pytest.approx([0.25, 0.0, 0.0])
+    assert not tail([X, zero, zero, zero, zero]).any()
+
+
+def test_decay_is_that_of_age():
+    assert tail([X, X], decay=0.5) == pytest.approx([1.5 / 4, 0.0, 0.0])
+
+
+def test_a_slow_curve_breaks_over_the_span_where_neighbours_would_not():
+    curve = [np.array([np.cos(a), 0.0, np.sin(a)]) for a in np.radians([0, 30, 60])]
+    assert tail(curve) == pytest.approx(curve[2] * 3 / 4)
+    assert tail(curve, span_m=2e-3) == pytest.approx((2 * curve[1] + curve[2]) / 4)
+
+
+def test_the_response_acts_on_the_fill():
+    assert tail([X, X], y=2.0) == pytest.approx([0.25, 0.0, 0.0])
+    assert tail([X, X], y=0.5) == pytest.approx([0.5 * (0.25 + 0.0025) ** -0.25, 0.0, 0.0])
+
+
+def test_a_coarse_resolution_skips_elements():
+    assert tail([X] * 4, resolution_m=1.9e-3) == pytest.approx([0.5, 0.0, 0.0])
+
+
+def test_the_force_is_the_drag_of_the_relative_velocity():
+    wake = Wake(length=2, scaling=4, decay=1, breaking_span_m=0)
+    liquid = Liquid(id="water", density_kg_m3=1000, effects=("drag", "wake"), wake=wake)
+    motion = Motion(np.arange(3) / 1000, np.zeros((3, 3)), np.tile(X, (3, 1)))
+    felt = respond(Scene(liquids=(liquid,), velocity=Given()), motion)
+    factor = 0.5 * 1000 * 0.47 * np.pi * 0.034**2
+    assert felt.wake_mps[:, 0] == pytest.approx([0, 0.25, 0.5])
+    assert felt.force_n[:, 0] == pytest.approx(-factor * np.array([1, 0.75, 0.5]) ** 2)
+    assert felt.size_mps == pytest.approx([0, 0.25, 0.5])
+
+
+def test_filtering_other_than_ewma_is_not_defined():
+    motion = Motion(np.arange(2) / 1000, np.zeros((2, 3)))
+    liquid = Liquid(id="water", density_kg_m3=1000)
+    with pytest.raises(TypeError, match="given"):
+        respond(Scene(liquids=(liquid,), velocity=Given()), motion)

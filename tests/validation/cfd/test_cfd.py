@@ -1,0 +1,265 @@
+"""The fluid solver: its motion and exact linear force, what is stored of it, the fits to that, and a coarse flow."""
+
+import re
+import shutil
+import sys
+from importlib import resources
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from scipy.integrate import quad
+
+from study_app.cli.solver import cfd
+from study_app.errors import StudyError
+from study_app.evaluation import reference_solutions
+from study_app.evaluation.style import file_bytes
+from study_app.protocol.load import load_scene
+from study_app.validation.cfd import cases, figure, flow, model_comparison, solver, stored_flows
+from study_app.validation.cfd import fits as fitted
+from study_app.validation.cfd.cases import END, RAMP, STOP, Case
+from tests.haptics.scenes import COMPILED as IS_COMPILED
+
+COMPILED = pytest.mark.skipif(not IS_COMPILED, reason="fits need the compiled tick")
+PACKAGE = resources.files("study_app.validation.cfd")
+NAMES = tuple(it.name for it in cases.cases())
+COARSE = flow.Grid(ahead=15, behind=30, aside=15, ball=0.2, near=0.8, far=6)
+
+
+@pytest.fixture(scope="module")
+def stored():
+    return {it.case.name: it for it in stored_flows.stored()}
+
+
+@pytest.fixture(scope="module")
+def fits(stored):
+    return model_comparison.read_fits(PACKAGE / model_comparison.FITS_FILE, tuple(stored.values()))
+
+
+def of(fits, name, model):
+    (found,) = [it for it in fits if it.case.name == name and it.model.name == model]
+    return found
+
+
+# --- The motion and the exact force ---
+
+
+def test_acceleration_is_the_slope_of_the_speed_which_begins_and_ends_at_rest():
+    t = np.linspace(-0.1, END, 4001)
+    speeds = np.array([cases.speed(at) for at in t])
+    slopes = np.array([(cases.speed(at + 1e-6) - cases.speed(at - 1e-6)) / 2e-6 for at in t])
+    np.testing.assert_allclose([cases.acceleration(at) for at in t], slopes, atol=1e-5)
+    assert (speeds[t <= 0] == 0).all()
+    assert (speeds[(t >= RAMP) & (t <= STOP)] == 1).all()
+    assert (speeds[t >= STOP + RAMP] == 0).all()
+
+
+@pytest.mark.parametrize("t", [0.05, 0.2, 0.3, 5.0, 10.1, 10.2, 12.0, 20.0])
+@pytest.mark.parametrize("reynolds", [1.0, 100.0])
+def test_the_exact_linear_force_is_what_plain_quadrature_gives(t, reynolds):
+    viscosity, ends = 1 / reynolds, [it for it in (0.0, RAMP, STOP, STOP + RAMP) if it < t]
+    memory = 0.0
+    for least, most in zip(ends, [*ends[1:], t], strict=True):
+        at_end = {"weight": "alg", "wvar": (0, -0.5)} if most == t else {}
+        weight = (lambda _: 1.0) if most == t else (lambda tau: (t - tau) ** -0.5)
+        memory += quad(lambda tau, weight=weight: cases.acceleration(tau) * weight(tau), least, most, **at_end)[0]
+    expected = 3 * np.pi * viscosity * cases.speed(t) + np.pi / 12 * cases.acceleration(t)
+    expected += 1.5 * np.sqrt(np.pi * viscosity) * memory
+    assert cases.linear_drag(t, reynolds) == pytest.approx(expected, rel=1e-6, abs=1e-9)
+
+
+def test_moments_cover_the_motion_in_steps_that_start_and_stop_short():
+    times = cases.moments(0.005)
+    steps = np.diff(times)
+    assert (times[0], times[-1]) == (0.0, END)
+    assert steps.min() == pytest.approx(0.005)
+    assert steps.max() == pytest.approx(0.02)
+    np.testing.assert_allclose(steps[(times[1:] < 0.45) | ((times[1:] > STOP) & (times[1:] < STOP + 0.45))], 0.005)
+
+
+def test_what_is_not_axisymmetric_is_refused():
+    with pytest.raises(StudyError, match="Reynolds number of 241"):
+        Case("water", 998.2, 1.0016e-3, 0.068, 241 * 1.0016e-3 / 998.2 / 0.068)
+
+
+# --- What is stored ---
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_table_is_of_the_shipped_liquid_and_says_what_made_it(stored, name):
+    table = stored[name]
+    (expected,) = [it for it in cases.cases() if it.name == name]
+    assert table.case.liquid_id == expected.liquid_id
+    for field in ("density_kg_m3", "viscosity_pa_s", "diameter_m", "speed_mps"):
+        assert getattr(table.case, field) == pytest.approx(getattr(expected, field), rel=1e-5)
+    assert table.notes["command"] == solver.COMMAND
+    assert "ngsolve" in table.notes["solver"]
+    assert table.notes["machine"]
+    assert float(table.notes["computing_s_per_s"]) > 0
+    for check in ("from_coarse", "from_exact"):
+        at_ramps, elsewhere = (float(it) for it in re.findall(r"([\d.]+)%", table.notes[check])[:2])
+        assert at_ramps < 1, check
+        assert elsewhere < 0.2, check
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_stored_motion_is_the_one_that_was_asked_for(stored, name):
+    table = stored[name]
+    t_s, velocity_mps, _ = table.columns.values()
+    expected = [table.case.speed_mps * cases.speed(t) for t in t_s / table.case.unit_s]
+    np.testing.assert_allclose(velocity_mps, expected, atol=1e-4)
+    assert t_s[-1] == pytest.approx(END * table.case.unit_s)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_stored_force_resists_then_pushes_on_and_fades(stored, name):
+    table = stored[name]
+    t_s, _, force_n = table.columns.values()
+    t = t_s / table.case.unit_s
+    assert (force_n[(t > 0.01) & (t <= STOP)] < 0).all()
+    after = force_n[t > STOP + RAMP]
+    assert (after > 0).all()
+    assert (np.diff(after) < 0).all()
+    assert after[-1] < 0.1 * -force_n[t <= STOP][-1]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_before_the_stop_the_force_is_that_of_steady_drag(stored, name):
+    table, steady = stored[name], stored_flows.steady()
+    t_s, _, force_n = table.columns.values()
+    reynolds, coefficient = (np.log(it) for it in list(steady.columns.values())[:2])
+    expected = np.exp(np.interp(np.log(table.case.reynolds), reynolds, coefficient)) * np.pi / 8 * table.case.unit_n
+    assert -force_n[t_s <= STOP * table.case.unit_s][-1] == pytest.approx(expected, rel=0.03)
+
+
+def test_steady_drag_is_what_was_published_and_independent_of_the_grid():
+    reynolds, drag, coarse, narrow = stored_flows.steady().columns.values()
+    np.testing.assert_allclose(coarse, drag, rtol=4e-3)
+    np.testing.assert_allclose(narrow, drag, rtol=2e-3)
+    np.testing.assert_allclose([model_comparison.clift(it) for it in reynolds.tolist()], drag, rtol=0.016)
+    for at, published in model_comparison.MITTAL.items():
+        assert drag[reynolds == at] == pytest.approx(published, rel=0.006)
+    assert drag[reynolds == 1] > 24 * (1 + 3 / 16) * 0.9  # Oseen's correction, too large by a little
+    assert drag[reynolds == 1] < 24 * (1 + 3 / 16)
+
+
+def test_truths_find_the_tables_of_their_liquid():
+    honey = load_scene("physical_liquids", "honey")
+    found = reference_solutions.stored(honey)
+    assert [it.name for it in found] == ["stop at 0.2 m/s", "stop at 0.6 m/s"]
+    assert all(it.computing_s is not None and it.computing_s > 0 for it in found)
+
+
+def test_a_table_that_was_damaged_is_named(tmp_path):
+    with pytest.raises(StudyError, match="holds no tables"):
+        stored_flows.stored(tmp_path)
+    shutil.copy(str(PACKAGE / f"{NAMES[0]}.csv"), tmp_path)
+    file = tmp_path / f"{NAMES[0]}.csv"
+    file.write_text(file.read_text("utf-8").replace("velocity_mps,", "v,"), "utf-8")
+    with pytest.raises(StudyError, match=rf"{NAMES[0]}.*cfd --solve"):
+        stored_flows.stored(tmp_path)
+
+
+# --- The fits ---
+
+
+@COMPILED
+def test_the_stored_fits_have_the_errors_they_say(fits):
+    rows = model_comparison.fits_csv(fits).decode().splitlines()
+    said = (PACKAGE / model_comparison.FITS_FILE).read_text("utf-8").splitlines()
+    assert len(rows) == 1 + len(NAMES) * len(fitted.MODELS)
+    for row, other in zip(rows, said, strict=True):
+        assert row.split(",")[:2] == other.split(",")[:2]
+        if not row.startswith("table"):
+            ours, theirs = (np.array([float(it) for it in one.rsplit(",", 6)[1:]]) for one in (row, other))
+            np.testing.assert_allclose(ours, theirs, rtol=1e-3, atol=1e-4, err_msg=other)
+
+
+@COMPILED
+def test_a_fit_made_again_is_the_stored_one(stored, fits):
+    (model,) = [it for it in fitted.MODELS if it.free == ("coefficient",)]
+    values, _ = fitted.fit_one(model, stored["glycerin-600mmps"])
+    assert values == pytest.approx(of(fits, "glycerin-600mmps", model.name).values, rel=1e-3)
+
+
+@COMPILED
+@pytest.mark.parametrize("name", NAMES)
+def test_drag_alone_never_pushes_and_history_does(fits, name):
+    assert of(fits, name, "drag of the Reynolds number").push == 0
+    history = of(fits, name, "... history, added mass")
+    assert 0.5 < history.push < 2
+    assert (
+        history.rms_n < of(fits, name, "... and added mass").rms_n < of(fits, name, "drag of the Reynolds number").rms_n
+    )
+
+
+@COMPILED
+def test_a_model_of_what_was_solved_without_convection_has_no_error(stored):
+    creeping = Case("pitch", 1261.0, 1e4, 0.068, 0.6)
+    times = cases.moments(0.005)
+    velocity_mps = creeping.speed_mps * np.array([cases.speed(t) for t in times.tolist()])
+    force_n = 0.0 - cases.linear_drags(times, creeping.reynolds) * creeping.unit_n
+    columns = dict(
+        zip(stored_flows.MOTION, (times[::8] * creeping.unit_s, velocity_mps[::8], force_n[::8]), strict=True)
+    )
+    table = stored_flows.Table(stored_flows.notes_of(creeping), columns)
+    (model,) = [it for it in fitted.MODELS if it.name == "... history, added mass"]
+    judged = fitted.judge(model, table, {})
+    assert judged.share < 0.01
+    assert judged.push == pytest.approx(1, abs=0.1)
+
+
+@COMPILED
+def test_tables_and_figure_tell_what_was_found(stored, fits):
+    said = model_comparison.fits_markdown(fits)
+    assert said.count("\n| ") == len(NAMES) * (1 + len(fitted.MODELS))
+    assert "| drag, constant C_d | drag_coefficient 10* |" in said  # honey at 0.2 m/s; a scene permits no more
+    assert said.count("drag_coefficient 6.81 |") == 1
+    assert "| 100 | 1.08" in model_comparison.steady_markdown(stored_flows.steady())
+    drawing = figure.draw(tuple(stored.values()), fits)
+    assert [ax.get_title(loc="left").split(",")[0] for ax in drawing.axes] == ["glycerin", "honey"]
+    assert all(len(ax.lines) == 2 + len(figure.LOOKS) for ax in drawing.axes)
+    assert file_bytes(drawing, "svg", "t") == file_bytes(figure.draw(tuple(stored.values()), fits), "svg", "t")
+
+
+# --- The solver ---
+
+
+def test_without_the_library_one_line_says_what_to_install(monkeypatch, tmp_path):
+    monkeypatch.setitem(sys.modules, "ngsolve", None)
+    finished = CliRunner().invoke(cfd, ["--solve", "--to", str(tmp_path / "new")])
+    assert isinstance(finished.exception, StudyError)
+    assert "pip install ngsolve" in str(finished.exception)
+    assert CliRunner().invoke(cfd, ["--solve"]).exit_code == 2
+
+
+@pytest.fixture(scope="module")
+def coarse():
+    pytest.importorskip("ngsolve", reason="the extra cfd is not installed")
+    return flow.Flow(COARSE)
+
+
+def test_a_coarse_flow_without_convection_is_the_exact_one(coarse):
+    times = cases.moments(0.02)
+    drag = coarse.unsteady(20.0, times, cases.speed, convection=False)
+    exact = cases.linear_drags(times, 20.0)
+    assert np.abs(drag - exact).max() < 0.05 * np.abs(exact).max()
+    held = (times > 1) & (times < STOP)
+    np.testing.assert_allclose(drag[held], exact[held], rtol=5e-3)
+
+
+def test_a_coarse_flow_resists_as_it_should(coarse):
+    (slow, fast) = coarse.steady([20.0, 50.0])
+    assert slow == pytest.approx(model_comparison.clift(20.0), rel=0.02)
+    assert fast == pytest.approx(model_comparison.clift(50.0), rel=0.02)
+
+
+def test_a_solution_that_misses_the_coarse_one_is_not_stored(coarse, monkeypatch):
+    monkeypatch.setattr(solver, "PERMITTED", 1e-6)
+    with pytest.raises(StudyError, match=r"differs from the coarse solution .* nothing is stored"):
+        solver.motion_table(cases.cases()[0], coarse, coarse, step=0.025)
+
+
+def test_steps_that_are_too_long_are_said_to_be(coarse):
+    with pytest.raises(StudyError, match="take shorter steps"):
+        coarse.unsteady(200.0, np.linspace(0, 200, 401), lambda t: min(t, 1.0))

@@ -1,0 +1,235 @@
+"""How often verdicts are wrong: rates and their limits, the simulated truth, and the quick way to the same verdicts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from study_app.analysis.block_tests import of_tables
+from study_app.analysis.evaluate import found_in
+from study_app.analysis.power.planned import plan
+from study_app.analysis.statistics.threshold import noticed
+from study_app.cli import commands
+from study_app.protocol.load import load
+from study_app.protocol.questions.simulated_answers import Felt
+from study_app.validation.report_rates import simulated_studies as studies
+from study_app.validation.report_rates import simulation, single_test_rates
+from study_app.validation.report_rates.rate_tables import markdown, table
+from study_app.validation.report_rates.rates import Limit, Rate
+from study_app.validation.report_rates.simulated_studies import (
+    EXTENTS,
+    GENERATORS,
+    Extent,
+    Generator,
+    Simulated,
+    alike,
+    answers,
+    simulated,
+)
+from study_app.validation.report_rates.simulation import validate
+from study_app.validation.report_rates.study_rates import CLAIMED, LOST, Cell, count, truth
+
+
+@pytest.fixture(scope="module")
+def rek() -> Simulated:
+    """The thesis' study as if each liquid had its own force, without any rehearsal."""
+    protocol = load("rek2024")
+    force_n = {"water": 0.3, "honey": 1.2, "light_oil": 0.6}
+    felt = {
+        (block.id, name): (
+            Felt(force_n.get(name, 0.3), 3 * force_n.get(name, 0.3), 0.1, 0.05, 0.1, protocol.delay_s(name)),
+        )
+        for block in protocol.main_blocks
+        for name in block.conditions
+    }
+    return simulated(protocol, plan(protocol, felt))
+
+
+@pytest.mark.parametrize(
+    ("limit", "hits", "studies", "holds"),
+    [
+        ("at most 5 %", 50, 1000, "yes"),
+        ("at most 5 %", 62, 1000, "too few studies"),
+        ("at most 5 %", 66, 1000, "too few studies"),
+        ("at most 5 %", 80, 1000, "no"),
+        ("at most 5 %", 0, 20, "too few studies"),
+        ("at least 93 %", 930, 1000, "yes"),
+        ("at least 93 %", 900, 1000, "no"),
+        ("at least 77 %", 760, 1000, "yes"),
+        ("at least 77 %", 700, 1000, "no"),
+        ("at most 83 %", 900, 1000, "no"),
+        ("none", 0, 10, "yes"),
+        ("none", 1, 1000, "no"),
+        ("counted", 10, 10, "counted"),
+    ],
+)
+def test_a_rate_holds_as_far_as_its_interval_tells(limit: Limit, hits: int, studies: int, holds: str) -> None:
+    assert Rate("cell", 5, "what", limit, hits, studies).holds == holds
+
+
+@pytest.mark.parametrize("generator", GENERATORS)
+@pytest.mark.parametrize("extent", EXTENTS)
+def test_settings_that_are_alike_are_answered_alike_on_average(
+    rek: Simulated, generator: Generator, extent: Extent
+) -> None:
+    for block, given in zip(rek.blocks, answers(rek, generator, extent, 300, 3, 1), strict=True):
+        assert given.shape == (300, len(block.settings), len(block.items))
+        assert set(np.unique(given)) <= set(range(1, 8))
+        means = given.mean(axis=0)
+        like = alike(block, extent)
+        for place, other in like.items():
+            assert means[place] == pytest.approx(means[other], abs=0.45)
+        if extent == "full":
+            assert np.ptp(means, axis=0).max() > 1
+
+
+@pytest.mark.parametrize("participants", [5, 15])
+def test_verdicts_alone_are_those_of_the_whole_evaluation(rek: Simulated, participants: int) -> None:
+    people = tuple(f"P{number}" for number in range(participants))
+    for extent in EXTENTS:
+        given = answers(rek, "ordinal probit", extent, participants, 5, 2)
+        for block, values in zip(rek.blocks, given, strict=True):
+            single_ = {item.id: values[:, :, [column]] for column, item in enumerate(block.items)}
+            whole, quick = (
+                found_in(
+                    None, of_tables(block, rek.decided, people, single_, planning=False, verdicts_only=verdicts_only)
+                )
+                for verdicts_only in (False, True)
+            )
+            assert [one.verdict for one in quick.against] == [one.verdict for one in whole.against]
+            assert [one.found.effect for one in quick.against] == [one.found.effect for one in whole.against]
+            for one, other in zip(quick.against, whole.against, strict=True):
+                told = {field.name: getattr(one.found, field.name) for field in fields(one.found)}
+                told = {name: value for name, value in told.items() if value not in (None, "") and name != "note"}
+                told.pop("checks_agree", None)
+                assert told == {name: getattr(other.found, name) for name in told}
+            assert quick.equivalent_up_to == whole.equivalent_up_to
+            assert (quick.omnibus, quick.pairs) == (whole.omnibus, whole.pairs)
+            assert [one.p_adjusted for one in quick.trends] == [one.p_adjusted for one in whole.trends]
+            assert (quick.lowest, quick.threshold, quick.mixed) == (whole.lowest, whole.threshold, ())
+            if whole.named is not None and quick.named is not None:
+                assert (quick.named.verdict, quick.named.found.p) == (whole.named.verdict, whole.named.found.p)
+            assert (quick.named is None) == (whole.named is None)
+
+
+@pytest.mark.parametrize("generator", GENERATORS)
+def test_every_kind_of_study_is_counted(rek: Simulated, generator: Generator, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(studies, "TRUTH", 200)
+    cells = [Cell(generator, extent, 5) for extent in EXTENTS]
+    rates = [rate for cell in cells for rate in count(rek, cell, truth(rek, cell), 1, 0, 2)]
+    assert {rate.studies for rate in rates} == {2}
+    assert {rate.cell for rate in rates} == {f"{generator}, {extent}" for extent in EXTENTS}
+    assert [rate.hits for rate in rates if rate.what == LOST[0]] == [0, 0, 0]
+    assert sum(rate.what == CLAIMED for rate in rates) == 2
+    assert {"detection threshold printed (delays)", "equal liquids distinguished (liquids)"} <= {
+        one.what for one in rates
+    }
+    assert rates == [rate for cell in cells for rate in count(rek, cell, truth(rek, cell), 1, 0, 2)]
+    assert len(markdown(rates).splitlines()) == len(table(rates).splitlines()) + 1 == len(rates) + 2
+
+
+def test_two_studies_in_one_process_have_truths_of_their_own(rek: Simulated, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(studies, "TRUTH", 200)
+    decided = replace(rek.decided, rising=rek.decided.falling, falling=rek.decided.rising)
+    turned = replace(rek, plan=replace(rek.plan, decided=decided))
+    cell = Cell("ordinal probit", "full", 5)
+    first, second = (truth(one, cell) for one in (rek, turned))
+    place = [block.kind for block in rek.blocks].index("delays")
+    clear = np.abs(first[place]) > 1
+    assert clear.any()
+    assert (np.sign(second[place]) == -np.sign(first[place]))[clear].all()
+
+
+@pytest.mark.parametrize(
+    ("hits", "code", "last"),
+    [
+        ((20, 0), 0, "every rate keeps to its limit"),
+        ((62, 0), 4, "1 of 2 rates undecided: simulate more studies"),
+        ((62, 300), 3, "1 of 2 rates beyond their limits, 1 undecided"),
+        ((), 4, "nothing was counted"),
+    ],
+)
+def test_the_command_tells_rates_that_are_undecided_from_rates_that_hold(
+    hits: tuple[int, ...], code: int, last: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rates = tuple(Rate("cell", 5, f"what {at}", "at most 5 %", hit, 1000) for at, hit in enumerate(hits))
+    rates += (Rate("cell", 5, "size", "counted", 7, 1000),) if rates else ()
+    monkeypatch.setattr("study_app.session.simulated.trial_features.feelings", lambda *_args, **_named: None)
+    monkeypatch.setattr("study_app.analysis.power.planned.plan", lambda *_args: None)
+    monkeypatch.setattr("study_app.validation.report_rates.simulated_studies.simulated", lambda *_args: None)
+    monkeypatch.setattr(
+        "study_app.validation.report_rates.simulation.validate", lambda *_args, **_named: [(1000, rates)]
+    )
+    done = CliRunner().invoke(commands, ["validate-report"])
+    assert done.exit_code == code, done.output
+    assert done.output.splitlines()[-1] == last
+
+
+def test_single_tests_are_counted() -> None:
+    (leaning,) = single_test_rates.count(("one in five differs by 5 points, the others by 0", 24), 1, 0, 4)
+    assert (leaning.studies, leaning.limit) == (4, "at most 5 %")
+    printed, covered = single_test_rates.count(("one threshold for all", 12), 1, 0, 4)
+    assert (printed.what, printed.hits, printed.studies, printed.limit) == (
+        single_test_rates.PRINTED,
+        4,
+        4,
+        "at least 93 %",
+    )
+    assert covered.hits >= 2
+
+
+def test_an_interval_that_is_not_printed_covers_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(
+        single_test_rates, "noticed", lambda *_args, **_named: noticed([[np.nan] * 7], single_test_rates.LEVELS_MS)
+    )
+    printed, covered = single_test_rates.count(("one threshold for all", 12), 1, 0, 4)
+    assert (printed.hits, printed.studies) == (0, 4)
+    assert (covered.hits, covered.studies) == (0, 0)
+    assert covered.holds == "too few studies"
+    assert replace(printed, studies=100).holds == "no"
+
+
+@pytest.fixture
+def continued(monkeypatch: pytest.MonkeyPatch) -> dict[str, list[tuple[int, int]]]:
+    """Two cells without any study; the batches that are counted of each."""
+    batches: dict[str, list[tuple[int, int]]] = {"clear": [], "unclear": []}
+
+    def counted(name: str, hits_of_25: int) -> Callable[[int, int, int], tuple[Rate, ...]]:
+        def count_(seed: int, batch: int, many: int) -> tuple[Rate, ...]:
+            assert seed == 1
+            batches[name].append((batch, many))
+            return (Rate(name, 5, "what", "at most 5 %", hits_of_25 if batch < 12 else 0, many),)
+
+        return count_
+
+    monkeypatch.setattr(
+        simulation, "_counts", lambda *_: {("clear", 5): counted("clear", 0), ("unclear", 5): counted("unclear", 2)}
+    )
+    return batches
+
+
+def test_cells_with_an_undecided_rate_are_continued_with_other_studies(
+    rek: Simulated, continued: dict[str, list[tuple[int, int]]]
+) -> None:
+    told: list[str] = []
+    *_, (done, rates) = validate(rek, 290, jobs=1, progress=told.append)
+    assert continued["clear"] == [(batch, 25) for batch in range(11)] + [(11, 15)]
+    assert [batch for batch, _ in continued["unclear"]] == list(range(24))  # 24 of 290 are undecided, of 580 4.1 % hold
+    assert [(rate.hits, rate.studies, rate.holds) for rate in rates] == [(0, 290, "yes"), (24, 580, "yes")]
+    assert done == 3 * 290
+    assert told == ["continued: unclear, n = 5: what: 24 of 290, 8.3 % (5.6 to 12.0), at most 5 %: too few studies"]
+
+
+def test_a_cell_is_continued_until_it_is_beyond_or_has_four_times_the_studies(
+    rek: Simulated, continued: dict[str, list[tuple[int, int]]]
+) -> None:
+    told: list[str] = []
+    *_, (done, rates) = validate(rek, 10, jobs=1, progress=told.append)
+    assert [(rate.hits, rate.studies, rate.holds) for rate in rates] == [(0, 40, "too few studies"), (6, 30, "no")]
+    assert continued == {"clear": [(batch, 10) for batch in range(4)], "unclear": [(batch, 10) for batch in range(3)]}
+    assert done == 70
+    assert len(told) == 5

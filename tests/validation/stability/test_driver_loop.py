@@ -1,0 +1,148 @@
+"""Cases through the Falcon's driver: what drives the grip, what is measured there, and what is called unstable."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from study_app import cli
+from study_app.devices.falcon.exchange import FALCON
+from study_app.validation.stability import driver_loop
+from study_app.validation.stability.driver_loop import BEYOND_SCRIPTED_J, STOP_M, judge_driven
+from study_app.validation.stability.stability_cases import Case, parse
+from study_app.validation.stability.sweep import in_words
+from study_app.validation.stability.trace_measures import given_out_j
+from tests.haptics.scenes import COMPILED
+
+if not COMPILED:
+    pytest.skip("the servo and its devices exist compiled only", allow_module_level=True)
+
+RELEASE = Case(plant="falcon", liquid="light_oil", hand="lets-go", motion="sine", speed_mps=0.37699, release_s=0.7875)
+
+
+def traces(case):
+    """Return the traces of the Falcon and of a scripted device."""
+    falcon = driver_loop._opened_falcon()
+    falcon.renew()
+    scripted = driver_loop._Scripted(48e-6)
+    return (
+        driver_loop._falcon_trace(case, falcon),
+        driver_loop._trace(case, scripted, scripted, falcon.dynamics),
+    )
+
+
+def test_falcon_and_scripted_device_are_in_the_same_hand():
+    case = dataclasses.replace(RELEASE, liquid="water", mass_kg=0.25, release_s=0.9)
+    falcon, scripted = traces(case)
+    held = falcon.t_s < case.release_s
+    assert np.ptp(falcon.position_m[held, 0]) == pytest.approx(0.8 * 0.06, rel=0.5)
+    assert np.abs(falcon.position_m - scripted.position_m)[held].max() < 2.5e-3
+    lengths_n = np.linalg.norm(scripted.acting_n, axis=1)
+    assert np.abs(falcon.acting_n - scripted.acting_n)[held].max() < 0.25 * lengths_n.max()
+
+
+def test_force_acts_a_tick_after_it_is_sent():
+    falcon, scripted = traces(dataclasses.replace(RELEASE, hand="middle"))
+    for trace in (falcon, scripted):
+        sizes = [np.abs(trace.acting_n[late : -5 + late] - trace.sent_n[:-5]).max() for late in (0, 1, 2)]
+        assert sizes[1] < 0.15
+        assert min(sizes[0], sizes[2]) > 2 * sizes[1]
+
+
+def test_grip_that_is_let_go_moves_by_the_motors_alone():
+    case = dataclasses.replace(RELEASE, viscous_nspm=0.0)
+    falcon, _ = traces(case)
+    first, last = (int(np.searchsorted(falcon.t_s, case.release_s + after_s)) for after_s in (0.002, 0.05))
+    energy_j = 0.5 * case.mass_kg * (falcon.velocity_mps**2).sum(axis=1)
+    work_j = sum(falcon.acting_n[k] @ (falcon.position_m[k + 1] - falcon.position_m[k]) for k in range(first, last))
+    assert energy_j[last] - energy_j[first] == pytest.approx(work_j, abs=0.15 * energy_j[first : last + 1].max())
+    assert np.abs(falcon.position_m).max() <= max(STOP_M) + 1e-9
+
+
+def test_energy_given_out_is_the_most_that_was_given_beyond_what_was_taken():
+    trace = traces(RELEASE)[0][:6].copy()
+    trace.acting_n, trace.position_m = 0.0, 0.0
+    trace.position_m[:, 0] = [0, 1, 2, 3, 4, 5]
+    trace.acting_n[:, 0] = [-1, 3, 2, -4, 1, 9]
+    assert given_out_j(trace) == 4.0
+    trace.acting_n[:, 0] = -1
+    assert given_out_j(trace) == 0.0
+
+
+def test_case_is_judged_the_same_each_time_and_after_others():
+    first = judge_driven(RELEASE)
+    judge_driven(dataclasses.replace(RELEASE, liquid="honey", hand="firm"))
+    assert judge_driven(RELEASE) == first
+    assert first.stable
+    assert first.safe
+
+
+@pytest.mark.parametrize("phase", range(4))
+def test_driver_gives_out_no_more_than_the_scripted_device(phase):
+    case = dataclasses.replace(RELEASE, release_s=0.6 + phase / 8)
+    verdict = judge_driven(case)
+    assert verdict.stable, verdict
+    assert verdict.balance_j >= verdict.permitted_j
+
+
+def test_driver_that_lets_go_slowly_gives_out_too_much(monkeypatch):
+    """The motors go on with what they push for 5 ms."""
+    follow = driver_loop._falcon_trace
+
+    def slow(case, falcon):
+        trace = follow(case, falcon)
+        trace.acting_n[5:] = trace.acting_n[:-5].copy()
+        return trace
+
+    monkeypatch.setattr(driver_loop, "_falcon_trace", slow)
+    case = dataclasses.replace(RELEASE, speed_mps=0.75398, liquid="honey", release_s=0.6625)
+    assert judge_driven(case).reasons == ("energy",)
+
+
+def test_force_that_trembles_is_unstable(monkeypatch):
+    follow = driver_loop._falcon_trace
+
+    def trembling(case, falcon):
+        trace = follow(case, falcon)
+        trace.sent_n[:, 1] += 0.2 * np.sin(2 * np.pi * 100 * trace.t_s)
+        return trace
+
+    monkeypatch.setattr(driver_loop, "_falcon_trace", trembling)
+    assert judge_driven(RELEASE).reasons == ("force",)
+
+
+def test_position_that_is_no_number_is_unstable(monkeypatch):
+    follow = driver_loop._falcon_trace
+
+    def lost(case, falcon):
+        trace = follow(case, falcon)
+        trace.position_m[100] = math.nan
+        return trace
+
+    monkeypatch.setattr(driver_loop, "_falcon_trace", lost)
+    assert judge_driven(RELEASE).reasons == ("not finite",)
+
+
+def test_renewed_falcon_is_as_after_it_was_opened():
+    falcon = driver_loop._opened_falcon()
+    falcon.renew()
+    before = falcon._memory.tobytes(), falcon.hand.memory.tobytes()
+    driver_loop._falcon_trace(RELEASE, falcon)
+    assert falcon._memory.tobytes() != before[0]
+    falcon.renew()
+    assert (falcon._memory.tobytes(), falcon.hand.memory.tobytes()) == before
+    assert falcon._memory.dtype == FALCON
+
+
+def test_command_judges_a_case_through_the_driver():
+    line = "plant=falcon liquid=light_oil hand=lets-go motion=sine speed_mps=0.37699 release_s=0.7875"
+    ran = CliRunner().invoke(cli.commands, ["stability", "--case", line], standalone_mode=False)
+    assert ran.exception is None
+    case, on = ran.stdout.splitlines()
+    assert parse(case) == RELEASE
+    assert on == in_words(judge_driven(RELEASE))
+    assert "with the scripted device" in on
+    assert RELEASE.release_s > 0.6
+    assert -judge_driven(RELEASE).permitted_j > BEYOND_SCRIPTED_J

@@ -1,0 +1,275 @@
+"""Hard cases of the closed loop: some of them unstable without safety, none with it; and what safety takes away."""
+
+import csv
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from study_app import cli
+from study_app.cli.words import EXIT_FOUND
+from study_app.errors import StoreError, StudyError
+from study_app.haptics.model.layout import LIMITER_NAMES
+from study_app.protocol.load import load, shipped
+from study_app.validation.stability import sweep as stability
+from study_app.validation.stability.case_groups import Group, groups, some, sweep
+from study_app.validation.stability.device_bench import trace_of
+from study_app.validation.stability.fidelity import LIMITED, STUDY_LOOPS, fidelities
+from study_app.validation.stability.stability_cases import GRIPS, Case, liquids, parse, scene_of
+from study_app.validation.stability.trace_measures import fast_part, smooth
+from study_app.validation.stability.verdict import judge
+from tests.haptics.scenes import COMPILED
+
+compiled = pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")
+
+UNSTABLE = "liquid=physical_honey scale=10 rate_hz=1000 delay=4 hand=thrown speed_mps=0.6"
+PRESETS = [name for name in liquids() if name not in LIMITED]
+
+
+@pytest.fixture(scope="module")
+def swept():
+    return stability.run_sweep(some(sweep(), 120), [Group("gentle", (Case(), Case(plant="arm")))])
+
+
+def test_the_sweep_has_5000_cases_and_everything_that_it_should():
+    cases = sweep()
+    assert len(cases) == len(set(cases)) >= 5000
+    assert {case.rate_hz for case in cases} == {250, 500, 1000, 2000}
+    assert {case.delay for case in cases} == {0, 1, 2, 3, 4}
+    assert {case.scale for case in cases} >= {1, 10, 40}
+    assert max(case.speed_mps for case in cases) == 1.0
+    assert {case.estimator for case in cases} == {"ewma", "line", "foaw", "raw"}
+    assert {case.hand for case in cases} == set(GRIPS)
+    assert {min(case.mass_kg for case in cases), max(case.mass_kg for case in cases)} == {0.1, 0.6}
+    assert {case.liquid for case in cases} == set(liquids())
+    for name in shipped():
+        study = load(name)
+        assert set(study.liquids) <= {key.removeprefix("physical_") for key in liquids()} or name == "demo"
+    assert liquids()["dense"].liquids[0].density_kg_m3 == 10_000
+    assert sweep() == cases != sweep("another")
+
+
+@compiled
+def test_many_are_unstable_without_safety_and_none_with_it(swept):
+    unstable = [verdict for verdict in swept.off if not verdict.stable]
+    assert len(unstable) > 25
+    assert {reason for verdict in unstable for reason in verdict.reasons} == {"energy", "oscillation", "force"}
+    assert [str(verdict.case) for verdict in swept.unstable] == []
+
+
+@compiled
+def test_a_case_is_judged_the_same_each_time():
+    case = parse(UNSTABLE)
+    first, second = (judge(case, safe=False) for _ in range(2))
+    assert first == second
+    assert not first.stable
+    assert judge(case, safe=True).stable
+
+
+@compiled
+@pytest.mark.parametrize("speed_mps", [0.1, 0.2, 0.3, 0.6, 1.0])
+@pytest.mark.parametrize("quantum_um", [20.0, 38.0, 60.0])
+def test_a_handle_without_any_friction_comes_to_rest_in_tar(speed_mps, quantum_um):
+    """No case is harder on a study's loop: three of these swung on, at up to 65 mm/s, while a debt weighed half."""
+    thrown = Case("physical_tar", 20.0, hand="thrown", motion="stroke", viscous_nspm=0.0)
+    for jitter, missed in ((0.0, 0.0), (0.0, 0.02), (0.2, 0.0), (0.2, 0.02)):
+        changed = {"speed_mps": speed_mps, "quantum_um": quantum_um, "jitter": jitter, "missed": missed}
+        verdict = judge(dataclasses.replace(thrown, **changed), safe=True)
+        assert verdict.stable, verdict.case
+        assert verdict.swing_mps < 0.03
+
+
+@compiled
+def test_a_gentle_case_is_stable_even_without_safety():
+    verdict = judge(Case(liquid="water", scale=3.0), safe=False)
+    assert verdict.stable
+    assert verdict.balance_j > -1e-3
+
+
+@pytest.mark.parametrize("case", some(sweep(), 20))
+def test_a_case_is_a_line_that_reproduces_it(case):
+    assert parse(str(case)) == case
+    assert scene_of(case).scale == case.scale
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("plant=leg", "none of handle, arm"),
+        ("believed=5", "between -1 and 4"),
+        ("release_s=2.5", "between 0.3 and 2"),
+        ("scale", "'scale' is none"),
+        ("scales=3", "did you mean 'scale'"),
+        ("delay=1.5", "whole number"),
+        ("scale=thick", "a number"),
+        ("delay=5", "between 0 and 4"),
+        ("rate_hz=100", "between 250 and 5000"),
+        ("speed_mps=nan", "between 0.01 and 5"),
+        ("liquid=mercury", "none of water"),
+        ("hand=three", "none of light"),
+    ],
+)
+def test_a_line_that_is_no_case_is_told_in_one_sentence(line, said):
+    with pytest.raises(StudyError, match=said) as caught:
+        parse(line)
+    assert "\n" not in str(caught.value)
+
+
+@compiled
+@pytest.mark.parametrize("name", PRESETS)
+def test_in_a_studys_loop_a_held_liquid_is_felt_as_it_is(name):
+    for found in fidelities([name], STUDY_LOOPS):
+        assert found.within, found
+        assert found.force_n > 0
+        assert found.beyond < 0.03
+
+
+@compiled
+@pytest.mark.parametrize("name", LIMITED)
+def test_what_no_handle_bears_is_said_to_be_limited(name):
+    (found,) = fidelities([name], STUDY_LOOPS[1:])
+    assert not found.within
+
+
+@compiled
+def test_the_slow_loop_is_told_to_differ():
+    (found,) = fidelities(["honey"], [(250.0, 1)])
+    assert not found.within
+    assert found.share > 0.5
+
+
+@compiled
+def test_the_hand_that_is_simulated_follows_its_path_and_lets_go():
+    held = trace_of(Case(liquid="water", hand="firm", speed_mps=0.1, motion="circles"))
+    radii = np.linalg.norm(held.position_m[300:1000, [0, 2]], axis=1)
+    assert radii == pytest.approx(0.03, abs=0.003)
+    gone = trace_of(Case(liquid="water", scale=1.0, hand="lets-go", motion="stroke", speed_mps=0.1))
+    speeds = np.linalg.norm(gone.velocity_mps, axis=1)
+    assert np.abs(np.diff(speeds[gone.t_s > 0.7])).max() < 1e-3
+    assert not math.isclose(speeds[-1], speeds[650], rel_tol=0.02)
+
+
+@compiled
+def test_the_fast_part_passes_what_is_above_40_hz_and_nothing_below():
+    t_s = np.arange(4000) / 1000
+    for frequency_hz, passed in ((10, 0.0625), (40, 0.707), (200, 1.0)):
+        wave = np.column_stack([np.sin(2 * np.pi * frequency_hz * t_s), 0 * t_s, 0 * t_s])
+        found = fast_part(wave, 1000.0, 40.0, 1000, 4000, 0.1)
+        assert found * math.sqrt(2) == pytest.approx(passed, abs=0.03)
+
+
+@compiled
+def test_what_happens_once_is_left_aside_and_what_goes_on_is_not():
+    t_s = np.arange(1000) / 1000
+    once, always = (np.zeros((1000, 3)) for _ in range(2))
+    once[500:520, 1] = 1.0
+    always[:, 1] = np.sin(2 * np.pi * 100 * t_s)
+    assert fast_part(once, 1000.0, 40.0, 0, 1000, 0.0) > 0.05
+    assert fast_part(once, 1000.0, 40.0, 0, 1000, 0.1) < 1e-3
+    assert fast_part(always, 1000.0, 40.0, 0, 1000, 0.1) == pytest.approx(math.sqrt(0.5), rel=0.03)
+
+
+@compiled
+def test_smoothing_halves_the_power_of_40_hz():
+    trace = trace_of(Case())
+    for axis in range(3):
+        trace.position_m[:, axis] = np.sin(2 * np.pi * 40 * trace.t_s)
+        trace.sent_n[:, axis] = np.sin(2 * np.pi * 40 * trace.t_s)
+    out_m, out_n = np.zeros((len(trace), 3)), np.zeros((len(trace), 3))
+    smooth(trace, math.sqrt(math.log(2)) / (2 * math.pi * 40), out_m, out_n)
+    for out in (out_m, out_n):
+        assert out[200:-200].std() == pytest.approx(math.sqrt(0.5) * trace.position_m[200:-200].std(), rel=0.02)
+
+
+@compiled
+def test_the_files_hold_every_case_and_the_lines_that_reproduce_the_failing_ones(swept, tmp_path):
+    few = stability.Swept(swept.off[:60], swept.on[:60], 1.0)
+    found = fidelities(["honey"], STUDY_LOOPS)
+    written = {path.name: path for path in stability.write(tmp_path / "new", few, found)}
+    with written["cases.csv"].open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 60
+    assert [row["liquid"] for row in rows] == [verdict.case.liquid for verdict in few.on]
+    assert sum(bool(row["unstable_off"]) for row in rows) == sum(not verdict.stable for verdict in few.off)
+    lines = written["unstable-safety-off.txt"].read_text("utf-8").splitlines()
+    assert [parse(line) for line in lines] == [verdict.case for verdict in few.off if not verdict.stable]
+    assert lines
+    assert written["unstable-safety-on.txt"].read_bytes() == b""
+    assert "60 cases" in written["stability.md"].read_text("utf-8")
+    assert written["map.png"].read_bytes().startswith(b"\x89PNG")
+    assert b"Friction b" in written["map.svg"].read_bytes()
+    failing = dataclasses.replace(swept.off[0], reasons=("force",), case=Case(plant="arm"))
+    more = dataclasses.replace(few, others=(stability.Judged("second plant", (failing,)),))
+    lines = next(
+        path for path in stability.write(tmp_path / "more", more, found) if path.name == "unstable-safety-on.txt"
+    )
+    assert [parse(line) for line in lines.read_text("utf-8").splitlines()] == [failing.case]
+    (tmp_path / "file").write_text("")
+    with pytest.raises(StoreError, match="choose another with --to"):
+        stability.write(tmp_path / "file" / "below", few, found)
+
+
+@compiled
+def test_the_summary_counts_cases_reasons_and_limiters(swept):
+    text = stability.summary(swept, fidelities(["honey"], STUDY_LOOPS))
+    assert "120 cases" in text
+    first, gentle = (line.split() for line in text.splitlines() if line.startswith(("  first plant", "  gentle")))
+    assert first[2:4] == ["120", "0"]
+    assert gentle[1:3] == ["2", "0"]
+    assert float(gentle[4]) == 0.0
+    (line,) = [line for line in text.splitlines() if line.startswith("unstable")]
+    assert line.split() == ["unstable", str(sum(not verdict.stable for verdict in swept.off)), "0"]
+    assert "slope" in text
+    assert "honey" in text
+    worst = max(swept.off, key=lambda verdict: verdict.fast_n)
+    assert "unstable (" in stability.in_words(worst)
+    acting = next(verdict for verdict in swept.on if verdict.acted[LIMITER_NAMES.index("energy")])
+    assert "energy" in stability.in_words(acting)
+
+
+def command(*words):
+    return CliRunner().invoke(cli.commands, ["stability", *words], standalone_mode=False)
+
+
+@compiled
+def test_the_command_judges_one_case_in_words():
+    ran = command("--case", UNSTABLE)
+    assert ran.exception is None
+    assert not ran.return_value
+    case, off, on = ran.stdout.splitlines()
+    assert parse(case) == parse(UNSTABLE)
+    assert off.startswith("safety off: unstable")
+    assert on.startswith("safety on: stable")
+
+
+@compiled
+def test_it_ends_with_3_where_safety_does_not_hold(monkeypatch):
+    judged = stability.judge(parse(UNSTABLE), safe=False)
+    monkeypatch.setattr(stability, "judge", lambda case, safe: dataclasses.replace(judged, case=case, safe=safe))
+    monkeypatch.setattr(stability, "judge_driven", lambda case: dataclasses.replace(judged, case=case, safe=True))
+    few = fidelities(["honey"], STUDY_LOOPS)
+    monkeypatch.setattr("study_app.validation.stability.fidelity.fidelities", lambda: few)
+    ran = command("--cases", "2")
+    assert ran.return_value == EXIT_FOUND
+    lines = [line for line in ran.stderr.splitlines() if line.startswith("liquid=")]
+    assert len(lines) == 2 * (1 + len(groups(count=2)))
+    assert {parse(line).plant for line in lines} == {"handle", "arm", "falcon"}
+
+
+def test_a_line_that_is_none_is_refused():
+    assert isinstance(command("--case", "liquid=mercury").exception, StudyError)
+
+
+@compiled
+def test_the_table_of_limits_is_written_as_it_ships(monkeypatch, tmp_path):
+    from study_app.haptics.model.limits import table
+
+    monkeypatch.setattr(stability, "measure_limits", lambda: iter(table()))
+    ran = command("--table", str(tmp_path / "limits.csv"))
+    assert ran.exception is None
+    from importlib import resources
+
+    whole = (resources.files("study_app.haptics.model") / "slope_limits.csv").read_bytes()
+    assert (tmp_path / "limits.csv").read_bytes() == whole

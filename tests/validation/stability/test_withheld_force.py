@@ -1,0 +1,82 @@
+"""The share of force that passivity controller and slew limit withhold in quick motion."""
+
+import itertools
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from study_app import cli
+from study_app.cli.words import EXIT_FOUND
+from study_app.haptics.model.layout import records
+from study_app.validation.stability import withheld_force
+from study_app.validation.stability.closed_loop import TRACE, follow
+from study_app.validation.stability.device_bench import new_bench
+from study_app.validation.stability.stability_cases import Case
+from study_app.validation.stability.withheld_force import MODES, QUICK, SECONDS, STROKES, Withheld, measure, report
+from tests.haptics.scenes import COMPILED
+
+compiled = pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")
+
+
+def row(liquid, quick=0.0, lasting=0.0, mode=MODES[0]):
+    after = ((0.3, lasting, 0.0, 0.0), *[(0.0,) * SECONDS] * (len(QUICK) - 1))
+    return Withheld(liquid, "ewma", mode, (*(0.0,) * (len(STROKES) - 1), quick), after)
+
+
+def played(case, path_m, *, rigid):
+    bench, trace = new_bench(case, safe=True), records(TRACE, len(path_m))
+    bench.loop.rigid = rigid
+    follow(bench.model, bench.safety[0], bench.sample[0], bench.handle, bench.pace, bench.loop, trace, path_m)
+    return trace
+
+
+@compiled
+def test_slow_strokes_lose_nothing_and_shares_lie_between_0_and_1():
+    shares = measure(["syrup"])
+    assert {(found.estimator, found.mode) for found in shares} == set(itertools.product(("ewma", "kalman"), MODES))
+    for found in shares:
+        assert found.strokes[0] == pytest.approx(0.0, abs=1e-3)
+        assert all(0.0 <= share <= 1.0 for share in (*found.strokes, *sum(found.after, ())))
+
+
+@compiled
+def test_force_withheld_is_the_vector_between_permitted_and_sent_force():
+    t_s = np.arange(1500) / 1000
+    path_m = np.outer(0.03 * np.cos(2 * np.pi * 4 * t_s), [1.0, 0.0, 0.0])
+    trace = played(Case(liquid="light_oil"), path_m, rigid=1)
+    sizes_n = np.linalg.norm(trace.sent_n, axis=1)
+    assert trace.permitted_n.max() == pytest.approx(8.0)
+    assert (np.abs(trace.permitted_n - sizes_n) <= trace.withheld_n + 1e-3).all()
+    assert trace.withheld_n.max() > 0.1
+
+
+@compiled
+def test_position_is_imposed_or_held():
+    t_s = np.arange(600) / 1000
+    path_m = np.outer(0.03 * np.cos(2 * np.pi * t_s), [0.8, 0.0, 0.6])
+    assert (played(Case(liquid="honey"), path_m, rigid=1).position_m == path_m).all()
+    held = played(Case(liquid="honey", hand="firm"), path_m, rigid=0)
+    assert 1e-4 < np.abs(held.position_m - path_m).max() < 0.02
+
+
+def test_goals_are_judged_over_all_liquids_but_tar():
+    met, not_met = row("honey", 0.05, 0.004), row("syrup", 0.051)
+    assert met.met
+    assert not not_met.met
+    assert not row("syrup", 0.0, 0.005).met
+    assert row("physical_tar", 0.9, 0.9).met
+    text = report((met, row("physical_tar", 0.9, 0.9)))
+    assert "at most 5% in every stroke, tar aside: met (5.0%)" in text
+    assert "from one second after a shake on, tar aside: met (0.4%)" in text
+    assert "not met (5.1%)" in report((met, not_met))
+
+
+def test_command_prints_the_table_and_ends_with_3_where_a_goal_is_missed(monkeypatch):
+    for found, code in ((row("honey"), None), (row("honey", 0.5), EXIT_FOUND)):
+        monkeypatch.setattr(withheld_force, "measure", lambda found=found: (found,))
+        ran = CliRunner().invoke(cli.commands, ["stability", "--withheld"], standalone_mode=False)
+        assert ran.exception is None
+        assert (ran.return_value or None) == code
+        assert "honey" in ran.stdout
+        assert "5 Hz ±30" in ran.stdout

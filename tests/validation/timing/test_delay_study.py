@@ -1,0 +1,137 @@
+"""What is said of delays: errors from sample to painting, in ms and in frames, in words, tables and a figure."""
+
+import csv
+import io
+
+import numpy as np
+import pytest
+
+from study_app.cli import commands
+from study_app.validation.timing.delay_report import BEGIN, COLUMNS, END, csv_text, markdown, text, write
+from study_app.validation.timing.delay_results import Delayed, Shown
+
+MS = 1_000_000
+
+
+def shown(errors_ms, *, hz=60.0, delay_s=0.1, load="none", periods=None):
+    """Return frames with these errors, each a period after the one before unless told."""
+    errors_ns = np.rint(np.asarray(errors_ms) * MS).astype(np.int64)
+    places = np.arange(len(errors_ns)) if periods is None else np.cumsum([0, *periods])
+    painted_ns = np.rint(places * 1e9 / hz).astype(np.int64) + 5_000 * MS
+    sample_ns = painted_ns - errors_ns - round(delay_s * 1e9)
+    return Shown(f"virtual, {hz:g} Hz", "by the clock", load, hz, delay_s, painted_ns, sample_ns)
+
+
+def found(*trials):
+    return Delayed("a machine, 2 cores", 10.0, (1920, 1080), trials)
+
+
+WELL = found(
+    *(
+        shown(np.full(200, 3.0), hz=hz, delay_s=delay_s, load=load)
+        for hz in (60.0, 144.0)
+        for load in ("none", "gui+cpu")
+        for delay_s in (0.2, 0.0)
+    )
+)
+
+
+def test_an_error_is_what_was_achieved_less_what_was_asked_for():
+    trial = shown([2.0, 4.0, 6.0], delay_s=0.05)
+    assert trial.errors_ms == pytest.approx([2, 4, 6])
+    assert trial.mean_ms == pytest.approx(4)
+    assert trial.achieved_ms == pytest.approx(54)
+    assert trial.worst_ms == pytest.approx(6)
+    assert trial.percentile_ms(50) == pytest.approx(4)
+
+
+def test_times_of_a_clock_that_runs_since_days_lose_nothing():
+    trial = shown([2.0, 2.5])
+    late = Shown(*(getattr(trial, name) for name in ("screen", "paced", "load", "refresh_hz", "delay_s")),
+                 trial.painted_ns + 10**16, trial.sample_ns + 10**16)  # fmt: skip
+    assert np.array_equal(late.errors_ms, trial.errors_ms)
+
+
+def test_late_is_what_is_more_than_a_frame_too_old():
+    assert shown([16.5, 16.8, 40.0]).late == 2
+    assert shown([6.9, 7.0], hz=144.0).late == 1
+
+
+def test_missed_are_refreshes_that_brought_no_frame_and_jitter_is_none():
+    assert shown([3.0] * 5, periods=[1.3, 0.7, 1.0, 1.2]).missed == 0
+    assert shown([3.0] * 5, periods=[1.0, 3.1, 1.0, 2.0]).missed == 3
+
+
+@pytest.mark.parametrize(
+    ("errors_ms", "held"),
+    [
+        (np.full(1000, 8.2), True),
+        (np.full(1000, 8.4), False),
+        (np.where(np.arange(1000) < 12, 17.0, 3.0), False),
+        (np.where(np.arange(1000) < 8, 17.0, 3.0), True),
+        (np.full(1000, -8.4), False),
+    ],
+)
+def test_each_promise_can_be_missed(errors_ms, held):
+    assert shown(errors_ms).held == held
+    (said,) = found(shown(errors_ms)).promises()
+    assert said.endswith("held" if held else "missed")
+
+
+def test_one_trial_that_missed_it_is_enough():
+    promises = found(*WELL.shown, shown(np.full(200, 9.0), hz=60.0, delay_s=0.1, load="gui+cpu")).promises()
+    assert [said.rsplit(": ", 1)[1] for said in promises] == ["held", "missed", "held", "held"]
+    assert "means within 6.00 ms of each other" in promises[1]
+
+
+def test_trials_come_from_the_shortest_delay_to_the_longest():
+    assert [trial.delay_s for trial in WELL.on("virtual, 144 Hz", "gui+cpu")] == [0.0, 0.2]
+
+
+def test_the_csv_holds_every_trial_once_in_ms_and_in_frames():
+    rows = list(csv.DictReader(io.StringIO(csv_text(WELL))))
+    assert tuple(rows[0]) == COLUMNS
+    assert len(rows) == 8
+    fast = next(row for row in rows if row["screen"] == "virtual, 144 Hz" and row["requested_ms"] == "200")
+    assert float(fast["achieved_ms"]) == pytest.approx(203)
+    assert float(fast["error_p99_ms"]) == pytest.approx(3)
+    assert float(fast["error_p99_frames"]) == pytest.approx(0.432)
+
+
+def test_text_and_markdown_have_every_trial_and_every_promise():
+    said, table = text(WELL), markdown(WELL)
+    for promise in WELL.promises():
+        assert promise in said
+        assert promise in table
+    assert said.count(" 0 of 200") == 8
+    assert table.startswith(BEGIN)
+    assert table.rstrip().endswith(END)
+    rows = [line for line in table.splitlines() if line.startswith("|")]
+    assert len(rows) == 2 + 4, "both loads abreast"
+    assert len({row.count("|") for row in rows}) == 1
+    assert max(len(line) for line in said.splitlines()[2:-4]) < 120
+
+
+def test_files_are_written_and_the_figure_is_the_same_each_time(tmp_path):
+    files = write(WELL, tmp_path)
+    assert [file.name for file in files] == [f"delays.{kind}" for kind in ("txt", "md", "csv", "png", "svg")]
+    first = [file.read_bytes() for file in files]
+    assert [file.read_bytes() for file in write(WELL, tmp_path)] == first
+    assert b"1 frame" in files[-1].read_bytes()
+
+
+def test_a_percentile_off_the_scale_is_written(tmp_path):
+    files = write(found(shown(np.where(np.arange(1000) < 20, 87.0, 3.0))), tmp_path)
+    assert b">87<" in files[-1].read_bytes()
+
+
+def test_delays_have_no_loops_to_spin(cli_runner):
+    finished = cli_runner.invoke(commands, ["timing", "--delays", "--spin", "100"])
+    assert "leave it out with --delays" in str(finished.exception)
+
+
+@pytest.fixture
+def cli_runner():
+    from click.testing import CliRunner
+
+    return CliRunner()

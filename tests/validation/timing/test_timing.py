@@ -1,0 +1,389 @@
+"""How loops are timed: by the same rule, in turns, and said in words, tables and a figure. No time is judged here."""
+
+import csv
+import io
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import numba
+import numpy as np
+import pytest
+
+if numba.config.DISABLE_JIT:
+    pytest.skip("the servo exists compiled only", allow_module_level=True)
+
+from numba.core.runtime import _nrt_python, rtsys
+
+from study_app.cli import main
+from study_app.errors import StudyError
+from study_app.haptics.kernels.c_functions import SLEEP, c_function, record_at
+from study_app.haptics.model.layout import LIMITER_NON_FINITE
+from study_app.haptics.model.scene import Effect
+from study_app.haptics.runtime.clocks.clock import VIRTUAL, VirtualClock
+from study_app.haptics.runtime.clocks.grants import Grant
+from study_app.haptics.runtime.pack import elements_needed
+from study_app.haptics.runtime.servo import Servo
+from study_app.validation.timing.lateness import Lane, Timed
+from study_app.validation.timing.loops import LEAD_IN, PERIOD_NS, BareLoop, ServoLoop, ThreadLoop, granted, taken
+from study_app.validation.timing.machine_load import busy_cores
+from study_app.validation.timing.measurement import timing
+from study_app.validation.timing.timed_scene import FULL, PlayedHand
+from study_app.validation.timing.timing_report import BEGIN, COLUMNS, END, csv_text, markdown, text, write
+
+_virtual_at = record_at(VIRTUAL)
+NORMAL, REAL_TIME = Grant("normal", "no more was asked for"), Grant("real-time", "SCHED_FIFO 60")
+
+
+def lane(kind, grant, lateness_us, overruns=0, busy_us=()):
+    whole = [np.asarray(np.asarray(us) * 1000, np.int64) for us in (lateness_us, busy_us)]
+    return Lane(kind, grant, *whole, overruns)
+
+
+def found(*lanes, load="none", **changed):
+    fields = {
+        "machine": "a machine, 2 cores",
+        "load": load,
+        "seconds": 10.0,
+        "spin_us": 0.0,
+        "spun_share": 0.0,
+        "frames_hz": None,
+        "lanes": lanes,
+        "notes": ("priority: normal",),
+    }
+    return Timed(**(fields | changed))
+
+
+STEADY = np.full(1000, 20.0)
+WELL = found(
+    lane("servo", NORMAL, STEADY + 10, busy_us=np.full(1000, 2.0)),
+    lane("bare", NORMAL, STEADY),
+    lane("thread", NORMAL, np.where(np.arange(1000) < 100, 3000.0, 40.0), busy_us=np.full(1000, 40.0)),
+    lane("qt", NORMAL, np.full(1000, 900.0), overruns=5, busy_us=np.full(1000, 40.0)),
+)
+
+
+# what counts as late
+
+
+def after(*milliseconds):
+    """Return turns of 10 µs that begin so long after the start [(n, 2) ns], after those of the lead-in."""
+    lead = [(k + 1) * PERIOD_NS for k in range(LEAD_IN)]
+    begun = [*lead, *(LEAD_IN * PERIOD_NS + round(ms * 1e6) for ms in milliseconds)]
+    return [(begun_ns, begun_ns + 10_000) for begun_ns in begun]
+
+
+def test_turns_on_time_are_not_late():
+    assert taken(0, after(1, 2, 3.25, 4)).lateness_ns.tolist() == [0, 0, 250_000, 0]
+
+
+def test_a_turn_that_comes_late_is_late_by_all_of_it_and_passes_deadlines_over():
+    late = taken(0, after(1, 5.4, 6))
+    assert late.lateness_ns.tolist() == [0, 3_400_000, 1_000_000]
+    assert late.overruns == 2
+    assert late.busy_ns.tolist() == [10_000] * 3
+
+
+def test_a_timer_that_fires_early_is_not_late_for_that():
+    assert taken(0, after(0.9, 1.95, 3)).lateness_ns.tolist() == [0, 0, 0]
+
+
+def _sleep_late(context, deadline_ns):
+    clock = _virtual_at(context)
+    late_ns = 3_400_000 if (deadline_ns // 1_000_000) % 97 == 0 else 700_000
+    clock.now_ns = max(clock.now_ns, deadline_ns + late_ns)
+    return clock.now_ns
+
+
+@pytest.fixture(scope="module")
+def late_clock():
+    """Return a clock in virtual time whose sleeps are late, now and then by several turns."""
+    clock = VirtualClock()
+    clock.sleep = c_function(SLEEP, _sleep_late)
+    return clock
+
+
+def test_servo_and_bare_loop_count_alike(late_clock):
+    """On one clock that is late by a rule, both must say the same of the same number of turns."""
+    bare = BareLoop.__new__(BareLoop)
+    bare.grant, bare._real_time, bare._clock = NORMAL, False, late_clock
+    late_clock._memory[0].now_ns = 0
+    ours = bare.turn(500)
+    late_clock._memory[0].now_ns = 0
+    servo = Servo(PlayedHand(), clock=late_clock)
+    reader = servo.telemetry.reader()
+    servo.advance(500 + LEAD_IN)
+    samples = reader.read()
+    assert np.array_equal(samples.lateness_ns[LEAD_IN:], ours.lateness_ns)
+    assert (ours.lateness_ns > 3_000_000).any()
+    passed = np.diff(samples.time_ns - samples.lateness_ns)[LEAD_IN:] // PERIOD_NS - 1
+    assert abs(ours.overruns - int(passed.sum())) <= 2, "the last turn's, and the first one's"
+
+
+# the scene, and what a turn may do
+
+
+def test_every_effect_that_can_act_at_once_is_on_and_acts():
+    assert set(FULL.liquids[0].effects) == set(Effect.__args__) - {"local_wake"}
+    servo = Servo(PlayedHand(), clock=VirtualClock(), elements=elements_needed(FULL))
+    reader = servo.telemetry.reader()
+    servo.load(FULL)
+    servo.advance(6000)
+    samples = reader.read()
+    local = servo._loop._slots[servo._loop.control[0].taken % 2].liquid_states[0]
+    for name in ("drag", "added_mass", "history"):
+        assert np.abs(local[name].force_n).max() > 0, name
+    assert np.abs(samples.wake_mps).max() > 0.05
+    assert np.abs(local.current.velocity_mps).max() > 0
+    assert 0.2 < np.linalg.norm(samples.device_force_n, axis=1).max() <= 8
+    assert not (samples.limiters & LIMITER_NON_FINITE).any()
+
+
+def test_a_turn_with_every_effect_allocates_nothing():
+    servo = Servo(PlayedHand(), clock=VirtualClock(), elements=elements_needed(FULL))
+    servo.load(FULL)
+    servo.advance(10)
+    _nrt_python.memsys_enable_stats()
+    try:
+
+        def allocations(turns):
+            before = rtsys.get_allocation_stats()
+            servo.advance(turns)
+            return rtsys.get_allocation_stats().alloc - before.alloc
+
+        assert allocations(1001) == allocations(1)
+    finally:
+        _nrt_python.memsys_disable_stats()
+
+
+def test_no_python_is_called_in_a_turn():
+    """Ten times the turns make not one call more of a Python function, nor of one of its C functions."""
+    servo = Servo(PlayedHand(), clock=VirtualClock(), elements=elements_needed(FULL))
+    servo.load(FULL)
+    servo.advance(1)
+
+    def calls(turns):
+        heard = []
+        sys.setprofile(lambda _frame, event, _argument: heard.append(event))
+        try:
+            servo.advance(turns)
+        finally:
+            sys.setprofile(None)
+        return len(heard)
+
+    assert calls(5000) == calls(500)
+
+
+# the race
+
+
+class FakeWindows:
+    """The windows' thread without Qt: ``timer`` calls at once."""
+
+    frames = 0
+
+    def timer(self, _period_ms, count, fire):
+        for _ in range(count):
+            fire()
+        return 0
+
+    def during(self, work):
+        return work()
+
+
+def test_a_race_times_every_loop_in_every_class_it_is_granted():
+    lines = []
+    raced = timing(0.5, "none", FakeWindows(), tell=lines.append)
+    levels = ["normal"] if granted().best is None else ["normal", granted().best.level]
+    assert list(raced.levels) == levels
+    assert [one.kind for one in raced.lanes][:4] == ["servo", "bare", "thread", "qt"]
+    assert {one.ticks for one in raced.lanes} == {500}
+    assert all((one.lateness_ns >= 0).all() for one in raced.lanes)
+    assert len(raced.promises()) == 4 * len(levels)
+    assert lines[-1] == "100 %"
+    assert raced.frames_hz is None
+    assert not any(thread.name in {"servo", "timed"} for thread in threading.enumerate())
+
+
+def test_without_qt_its_timer_is_left_out_and_said_so():
+    raced = timing(0.5, "none", None, spin_us=100)
+    assert all(one.kind != "qt" for one in raced.lanes)
+    assert "no Qt here" in raced.notes[-1]
+    assert raced.spin_us == 100
+    assert raced.spun_share > 0
+    assert "a spin of 100 µs before each deadline took" in text(raced)
+
+
+def test_one_that_is_to_end_ends():
+    ending = threading.Event()
+    ending.set()
+    with pytest.raises(KeyboardInterrupt):
+        timing(1.0, "none", None, ending=ending)
+
+
+@pytest.mark.parametrize("seconds", [0.0, 0.4, 4000.0, float("nan")])
+def test_times_that_make_no_sense_are_refused(seconds):
+    with pytest.raises(StudyError, match=r"each loop is timed for 0\.5 to 3600 s"):
+        timing(seconds, "none", None)
+
+
+def test_the_loops_of_python_call_the_same_tick():
+    loop = ThreadLoop(NORMAL, real_time=False)
+    before = int(loop._tick._servo.telemetry.written[0])
+    loop.turn(20)
+    assert int(loop._tick._servo.telemetry.written[0]) - before == 20 + LEAD_IN
+
+
+def test_the_servo_that_is_timed_lets_go_after_each_turn():
+    loop = ServoLoop(NORMAL, real_time=False, spin_us=None)
+    for _ in range(2):
+        assert len(loop.turn(20).lateness_ns) == 20
+    assert loop.servo.grant.level == "normal"
+    assert not loop.servo._loop.live
+
+
+def test_cores_are_kept_busy_by_processes_that_end():
+    begun = []
+    popen = subprocess.Popen
+
+    class Watched(popen):
+        def __init__(self, *words, **named):
+            super().__init__(*words, **named)
+            begun.append(self)
+
+    subprocess.Popen = Watched
+    try:
+        with busy_cores(2):
+            assert [one.poll() for one in begun] == [None, None]
+    finally:
+        subprocess.Popen = popen
+    assert all(one.poll() is not None for one in begun)
+
+
+# what it comes to
+
+
+def test_ratios_are_to_the_bare_loop_of_the_same_class():
+    both = found(*WELL.lanes, lane("servo", REAL_TIME, STEADY, busy_us=STEADY), lane("bare", REAL_TIME, STEADY / 4))
+    assert both.ratio(both.lane("servo", "normal"), 50) == pytest.approx(1.5)
+    assert both.ratio(both.lane("servo", "real-time"), 99) == pytest.approx(4.0)
+    assert both.levels == ("normal", "real-time")
+
+
+def test_a_deadline_that_was_passed_over_is_one_over_1_ms_late():
+    one = lane("qt", NORMAL, [10.0, 1001.0, 999.0], overruns=2)
+    assert one.late == 3
+    assert one.late_share == pytest.approx(3 / 5)
+
+
+def test_promises_are_held():
+    assert [promise.held for promise in WELL.promises()] == [True] * 4
+    assert "normal: 0 turns over 1 ms late, 100 fewer than of a Python thread" in str(WELL.promises()[2])
+
+
+@pytest.mark.parametrize(
+    ("servo", "missed"),
+    [
+        (lane("servo", NORMAL, STEADY + 16, busy_us=STEADY / 10), 0),
+        (lane("servo", NORMAL, np.where(np.arange(1000) < 20, 51.0, 20.0), busy_us=STEADY / 10), 1),
+        (lane("servo", NORMAL, np.where(np.arange(1000) < 9, 20.0, 20.0), overruns=21, busy_us=STEADY / 10), 2),
+        (lane("servo", NORMAL, STEADY, busy_us=np.where(np.arange(1000) < 20, 6.0, 1.0)), 3),
+    ],
+)
+def test_each_promise_can_be_missed(servo, missed):
+    promises = found(servo, *WELL.lanes[1:]).promises()
+    assert [promise.held for promise in promises] == [number != missed for number in range(4)]
+    assert str(promises[missed]).endswith("missed")
+
+
+def test_the_text_has_every_loop_and_every_promise():
+    said = text(WELL)
+    for words in ("this servo", "bare compiled loop", "Python thread", "Qt timer", "a machine, 2 cores", "held"):
+        assert words in said
+    assert max(len(line) for line in said.splitlines()) < 200
+
+
+def test_the_csv_holds_each_lane_once():
+    rows = list(csv.DictReader(io.StringIO(csv_text(WELL))))
+    assert tuple(rows[0]) == COLUMNS
+    assert [row["loop"] for row in rows] == [one.name for one in WELL.lanes]
+    assert float(rows[0]["p50_us"]) == 30
+    assert rows[1]["turn_p99_us"] == "n/a"
+    assert rows[3]["overruns"] == "5"
+
+
+def test_the_markdown_is_ready_for_a_readme():
+    said = markdown(WELL)
+    assert said.startswith(BEGIN)
+    assert said.rstrip().endswith(END)
+    table = [line for line in said.splitlines() if line.startswith("|")]
+    assert len({line.count("|") for line in table}) == 1
+    assert len(table) == 2 + len(WELL.lanes)
+
+
+def test_the_readme_has_such_a_table_to_be_replaced_whole():
+    readme = (Path(__file__).resolve().parents[3] / "README.md").read_text(encoding="utf-8")
+    assert readme.count(BEGIN) == readme.count(END) == 1
+    held = readme.split(BEGIN)[1].split(END, maxsplit=1)[0]
+    ours = markdown(WELL)
+    headings = [line for line in ours.splitlines() if line.startswith("| priority")]
+    assert [line for line in held.splitlines() if line.startswith("| priority")] == headings
+    for words in ("this servo", "bare compiled loop", "Python thread", "Qt timer", "cores", "of each loop at 1 kHz"):
+        assert words in held, "put DIR/timing.md, as timing --load gui --to DIR writes it, in place of the table"
+
+
+def test_files_are_written_and_the_figure_is_the_same_each_time(tmp_path):
+    files = write(WELL, tmp_path)
+    assert [file.name for file in files] == ["timing.txt", "timing.md", "timing.csv", "timing.png", "timing.svg"]
+    first = [file.read_bytes() for file in files]
+    assert [file.read_bytes() for file in write(WELL, tmp_path)] == first
+    assert b"1 ms" in files[-1].read_bytes()
+
+
+# the command
+
+
+@pytest.fixture
+def run(monkeypatch, capsys, tmp_path):
+    """Return what runs the command in this process; it returns exit code and what was said."""
+    monkeypatch.chdir(tmp_path)
+
+    def command(*words):
+        monkeypatch.setattr("sys.argv", ["liquid-study", "timing", *words])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        return ended.value.code, *capsys.readouterr()
+
+    return command
+
+
+@pytest.mark.parametrize(
+    ("words", "part"),
+    [
+        (("--seconds", "0.1"), "not 0.1"),
+        (("--seconds", "soon"), "soon"),
+        (("--load", "games"), "games"),
+        (("--spin", "2000"), "not 2000"),
+        (("--to", "taken"), "taken"),
+    ],
+)
+def test_bad_words_are_one_line(run, monkeypatch, tmp_path, words, part):
+    monkeypatch.setattr("study_app.cli.timing.windows_thread", lambda _load: None)  # an application would stay
+    (tmp_path / "taken").write_text("a file", encoding="utf-8")
+    code, said, complaint = run(*words)
+    assert (code, said) == (2, "")
+    assert len(complaint.splitlines()) == 1, complaint
+    assert part in complaint
+
+
+def test_without_a_display_windows_are_refused_in_one_line(run, monkeypatch):
+    pytest.importorskip("PySide6.QtWidgets")
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr("study_app.gui.application.QApplication.instance", lambda: None)
+    if sys.platform != "linux":
+        pytest.skip("a display can be missing")
+    code, said, complaint = run("--seconds", "0.5", "--load", "gui")
+    assert (code, said) == (2, "")
+    assert "no display" in complaint
