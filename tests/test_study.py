@@ -15,8 +15,8 @@ from typing import Any
 
 import pytest
 
-from study_app.analysis.export import export
-from study_app.analysis.figures import plot
+from study_app.analysis.export.export import export
+from study_app.analysis.figures.answer_figures import plot
 from study_app.errors import StoreError
 from study_app.evaluation.replay import replay
 from study_app.protocol.load import load, shipped

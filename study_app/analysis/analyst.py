@@ -14,7 +14,7 @@ from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from typing import Final
 
-from study_app.analysis.orders import Answer, Order, Refused, Stopped
+from study_app.analysis.worker_messages import Answer, Order, Refused, Stopped
 from study_app.errors import StudyError
 
 PATIENCE_S: Final = 2.0

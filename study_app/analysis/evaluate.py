@@ -6,15 +6,15 @@ from collections.abc import Callable
 from functools import partial
 from typing import Final, TypeAlias
 
-from study_app.analysis.block_tests import Asked, asked, sealed
-from study_app.analysis.conduct import delivered, orders
-from study_app.analysis.delays_found import delays_found
-from study_app.analysis.failures import Ended, Failure, Failures
-from study_app.analysis.liquids_found import liquids_found
-from study_app.analysis.performance import Performance, performance
-from study_app.analysis.questions import Block
-from study_app.analysis.results import BlockFound, Results, Waiting
-from study_app.analysis.tables import Study
+from study_app.analysis.designs.block_tests import Asked, asked, sealed
+from study_app.analysis.designs.delays import delays_found
+from study_app.analysis.designs.liquids import liquids_found
+from study_app.analysis.findings.block_results import BlockFound, Results, Waiting
+from study_app.analysis.findings.conduct import delivered, orders
+from study_app.analysis.report.section_failures import Ended, Failure, Failures
+from study_app.analysis.tables.compared_blocks import Block
+from study_app.analysis.tables.performance import Performance, performance
+from study_app.analysis.tables.study import Study
 
 Progress: TypeAlias = Callable[[str, float], object]
 """Is told what is being done, and which share of all is done (0 to 1); what it raises ends the evaluation."""

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
-from study_app.analysis.orders import (
+from study_app.analysis.worker_messages import (
     Answer,
     Done,
     FigureDrawn,
@@ -36,8 +36,8 @@ from study_app.store.folders import StudyFolder
 from study_app.store.tables.participants import participants
 
 if TYPE_CHECKING:
-    from study_app.analysis.questions import Block
-    from study_app.analysis.tables import Study
+    from study_app.analysis.tables.compared_blocks import Block
+    from study_app.analysis.tables.study import Study
 
 # The libraries of an evaluation are loaded where they are needed: sessions are listed before.
 
@@ -104,7 +104,7 @@ def _changed(path: Path) -> float:
 
 def _read(folder: Path, tell: Tell, stop: Callable[[], bool]) -> None:
     """Tell of the sessions, then of the study, then draw; once the key is open, evaluate and draw the rest."""
-    from study_app.analysis.tables import load_study  # noqa: PLC0415
+    from study_app.analysis.tables.study import load_study  # noqa: PLC0415
 
     tell(Progress("reading sessions", 0.0))
     opened = blinding.reveals(folder)
@@ -115,12 +115,12 @@ def _read(folder: Path, tell: Tell, stop: Callable[[], bool]) -> None:
     study = load_study(folder)
     tell(_study_found(study))
     _go_on(stop)
-    from study_app.analysis import captions, figures  # noqa: PLC0415
+    from study_app.analysis.figures import answer_figures, captions  # noqa: PLC0415
 
     for number, block in enumerate(study.blocks):
         tell(Progress("drawing", 0.3 + 0.7 * number / len(study.blocks)))
         if len(study.answers(block)):
-            svg = figures.render(study, block, "svg")
+            svg = answer_figures.render(study, block, "svg")
             tell(FigureDrawn(_name(study, block), captions.title(block), captions.caption(study, block), svg))
         else:
             tell(FigureDrawn(_name(study, block), captions.title(block), "No completed session has answers here yet."))
@@ -168,7 +168,7 @@ def _study_found(study: Study) -> StudyFound:
 def _evaluate(study: Study, tell: Tell, stop: Callable[[], bool]) -> None:
     """Test everything, then draw again what that adds to, and what only then can be drawn."""
     from study_app.analysis.evaluate import evaluate  # noqa: PLC0415
-    from study_app.analysis.report.pictures import pictures  # noqa: PLC0415
+    from study_app.analysis.figures.report_figures import pictures  # noqa: PLC0415
 
     def going(what: str, share: float) -> None:
         _go_on(stop)
@@ -183,7 +183,7 @@ def _evaluate(study: Study, tell: Tell, stop: Callable[[], bool]) -> None:
 
 
 def _title(study: Study, name: str) -> str:
-    from study_app.analysis import captions  # noqa: PLC0415
+    from study_app.analysis.figures import captions  # noqa: PLC0415
 
     blocks = {_name(study, block): captions.title(block) for block in study.blocks}
     return blocks.get(name) or TITLES.get(name.partition("-")[0], name.capitalize())
@@ -195,11 +195,11 @@ def _name(study: Study, block: Block) -> str:
 
 
 def _write_tables(order: WriteTables, tell: Tell, stop: Callable[[], bool]) -> Done:
-    """Do what ``analysis.export.export`` does, and ask between its steps whether to give up."""
-    from study_app.analysis import spss  # noqa: PLC0415
-    from study_app.analysis.export import export_files  # noqa: PLC0415
+    """Do what ``analysis.export.export.export`` does, and ask between its steps whether to give up."""
+    from study_app.analysis.export import spss  # noqa: PLC0415
+    from study_app.analysis.export.export import export_files  # noqa: PLC0415
     from study_app.analysis.output import write_files  # noqa: PLC0415
-    from study_app.analysis.tables import load_study  # noqa: PLC0415
+    from study_app.analysis.tables.study import load_study  # noqa: PLC0415
 
     if "sav" in order.extras:
         spss.require()
@@ -217,7 +217,7 @@ def _write_tables(order: WriteTables, tell: Tell, stop: Callable[[], bool]) -> D
 
 
 def _write_report(order: WriteReport, tell: Tell, stop: Callable[[], bool]) -> Done:
-    from study_app.analysis.report.writing import report  # noqa: PLC0415
+    from study_app.analysis.report.write_report import report  # noqa: PLC0415
 
     warnings: list[str] = []
 

@@ -16,7 +16,7 @@ from typing import Any, Final, TypeAlias
 from PySide6.QtCore import QObject, QTimer
 
 from study_app.analysis.analyst import Analyst
-from study_app.analysis.orders import (
+from study_app.analysis.worker_messages import (
     Answer,
     Done,
     FigureDrawn,

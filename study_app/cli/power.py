@@ -56,10 +56,10 @@ def power(
     if jobs == 0:
         raise click.BadParameter("0 jobs do nothing: give 1 or more, or -1 for one a core", param_hint="--jobs")
     from study_app.analysis.power import sweep
-    from study_app.analysis.power.found import Powers, powers
-    from study_app.analysis.power.listed import power_markdown
-    from study_app.analysis.power.planned import plan
-    from study_app.analysis.power.writing import write
+    from study_app.analysis.power.plan import plan
+    from study_app.analysis.power.power_curves import Powers, powers
+    from study_app.analysis.power.power_files import write
+    from study_app.analysis.power.power_tables import power_markdown
     from study_app.protocol.load import load
     from study_app.session.simulated.trial_features import feelings
 

@@ -18,7 +18,7 @@ def report(results: Path, to: Path) -> None:
 
     Ends with exit code 3 where a section could not be computed: the report names it, and holds everything else.
     """
-    from study_app.analysis.report.writing import report as write_report
+    from study_app.analysis.report.write_report import report as write_report
 
     line = _Line()
     failed: list[str] = []

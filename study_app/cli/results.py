@@ -25,8 +25,8 @@ from study_app.cli.words import BY, EXIT_FOUND, Target, takes_session, takes_stu
 )
 def export(results: Path, to: Path, *, wide: bool, parquet: bool, sav: bool, psych_ds: bool) -> None:
     """Write the tidy tables of all participants, with a codebook."""
-    from study_app.analysis.export import Extra
-    from study_app.analysis.export import export as export_study
+    from study_app.analysis.export.export import Extra
+    from study_app.analysis.export.export import export as export_study
 
     asked: dict[Extra, bool] = {"wide": wide, "parquet": parquet, "sav": sav, "psych-ds": psych_ds}
     extras = [name for name, wanted in asked.items() if wanted]
@@ -39,7 +39,7 @@ def export(results: Path, to: Path, *, wide: bool, parquet: bool, sav: bool, psy
 @click.option("--to", required=True, type=Target(), metavar="DIR", help="Folder to write into.")
 def plot(results: Path, to: Path) -> None:
     """Draw the responses: by code until unblinded, by name after."""
-    from study_app.analysis.figures import plot as plot_study
+    from study_app.analysis.figures.answer_figures import plot as plot_study
 
     for written in plot_study(results, to, warn=partial(click.echo, err=True)):
         click.echo(written)

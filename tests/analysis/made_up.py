@@ -9,9 +9,9 @@ from typing import Any
 
 import pandas as pd
 
-from study_app.analysis.decided import NOTHING, Decided
-from study_app.analysis.questions import Block, Item, Setting
-from study_app.analysis.tables import Study
+from study_app.analysis.tables.compared_blocks import Block, Item, Setting
+from study_app.analysis.tables.planned_analysis import NOTHING, Decided
+from study_app.analysis.tables.study import Study
 from study_app.store.tables.columns import RESPONSES, TRIALS, Column
 
 TYPES = {"text": "string", "time": "string", "integer": "Int64", "number": "Float64", "flag": "boolean"}

@@ -9,14 +9,14 @@ from dataclasses import replace
 import numpy as np
 
 from study_app.analysis.evaluate import evaluate
-from study_app.analysis.failures import Failures
-from study_app.analysis.report import listing, short
-from study_app.analysis.report.first_page import first_page
-from study_app.analysis.report.methods import methods
+from study_app.analysis.findings.block_results import plain
+from study_app.analysis.report import number_files, summary
+from study_app.analysis.report.block_section import block
+from study_app.analysis.report.first_page.page import first_page
+from study_app.analysis.report.methods_paragraph import methods
 from study_app.analysis.report.r_script import r_script
-from study_app.analysis.report.sections import block
-from study_app.analysis.results import plain
-from study_app.analysis.tables import Study
+from study_app.analysis.report.section_failures import Failures
+from study_app.analysis.tables.study import Study
 from tests.analysis.made_up import DECIDED, ITEMS, Presented, delays, liquids, study
 
 
@@ -49,12 +49,12 @@ def check(number: int) -> None:
     results = evaluate(made, planning=False)
     assert results.failures == (), number
     json.dumps(plain(results), allow_nan=False)
-    short.findings(results)
+    summary.findings(results)
     methods(made, results)
     r_script(made, results)
-    listing.tests_csv(results)
+    number_files.tests_csv(results)
     failures = Failures()
-    page = first_page(results, short.limits(made, results), failures)
+    page = first_page(results, summary.limits(made, results), failures)
     assert failures.found == [], number
     assert not re.search(r"\bnan\b|\bNone\b|\binf\b", re.sub(r'src="[^"]*"', "", page)), number
     for found in results.blocks:

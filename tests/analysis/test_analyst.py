@@ -11,10 +11,13 @@ from pathlib import Path
 
 import pytest
 
-from study_app.analysis import captions, style
+from study_app.analysis import style
 from study_app.analysis.analyst import Analyst
-from study_app.analysis.export import export
-from study_app.analysis.orders import (
+from study_app.analysis.export.export import export
+from study_app.analysis.figures import captions
+from study_app.analysis.tables.study import load_study
+from study_app.analysis.worker import carry_out
+from study_app.analysis.worker_messages import (
     Answer,
     Done,
     FigureDrawn,
@@ -32,8 +35,6 @@ from study_app.analysis.orders import (
     WriteReport,
     WriteTables,
 )
-from study_app.analysis.tables import load_study
-from study_app.analysis.worker import carry_out
 from study_app.errors import AnalysisError, StoreError, StudyError
 from study_app.protocol.load import load
 from study_app.store.exclusions import exclusions

@@ -12,19 +12,19 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from study_app.analysis import results
-from study_app.analysis.block_tests import of_tables
-from study_app.analysis.conduct import delivered, orders
-from study_app.analysis.decided import Decided
+from study_app.analysis.designs.block_tests import of_tables
+from study_app.analysis.designs.liquids import pairs_of
+from study_app.analysis.designs.verdicts import judged
 from study_app.analysis.evaluate import evaluate
-from study_app.analysis.judging import judged
-from study_app.analysis.liquids_found import pairs_of
-from study_app.analysis.questions import Block, Item, Setting
-from study_app.analysis.results import BlockFound, Results, plain
-from study_app.analysis.statistics.families import false_discovery, holm
+from study_app.analysis.findings import block_results as results
+from study_app.analysis.findings.block_results import BlockFound, Results, plain
+from study_app.analysis.findings.conduct import delivered, orders
 from study_app.analysis.statistics.friedman import friedman
+from study_app.analysis.statistics.multiple_comparisons import false_discovery, holm
 from study_app.analysis.statistics.paired import paired
-from study_app.analysis.tables import load_study
+from study_app.analysis.tables.compared_blocks import Block, Item, Setting
+from study_app.analysis.tables.planned_analysis import Decided
+from study_app.analysis.tables.study import load_study
 from study_app.errors import AnalysisError
 from study_app.protocol.load import load, parse, source_bytes
 from tests.analysis.conftest import Answer, make_results, twelve

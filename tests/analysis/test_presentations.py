@@ -6,13 +6,13 @@ import json
 
 import numpy as np
 
-from study_app.analysis.codebook import codebook_bytes
 from study_app.analysis.evaluate import evaluate
-from study_app.analysis.report.methods import methods
-from study_app.analysis.report.sections import block
-from study_app.analysis.report.words import said_of_presentations
-from study_app.analysis.results import BlockFound, Results
-from study_app.analysis.tables import Study
+from study_app.analysis.export.codebook import codebook_bytes
+from study_app.analysis.findings.block_results import BlockFound, Results
+from study_app.analysis.findings.words import said_of_presentations
+from study_app.analysis.report.block_section import block
+from study_app.analysis.report.methods_paragraph import methods
+from study_app.analysis.tables.study import Study
 from tests.analysis.made_up import ITEMS, delays, everybody, liquids, study
 
 LEVELS = (0.0, 50.0, 100.0, 150.0)

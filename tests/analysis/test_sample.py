@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from study_app.analysis.export import export
-from study_app.analysis.figures import plot
-from study_app.analysis.tables import load_study
+from study_app.analysis.export.export import export
+from study_app.analysis.figures.answer_figures import plot
+from study_app.analysis.tables.study import load_study
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store import receipt
 from study_app.store.blinded.blinding import read_key

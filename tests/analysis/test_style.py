@@ -4,7 +4,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
 from study_app.analysis import style
-from study_app.analysis.sheet import Sheet
+from study_app.analysis.figures.page_layout import Sheet
 from tests.analysis.colours import EYES, ciede2000, smallest
 
 # Pairs of colours in CIELAB and their difference (Sharma, Wu & Dalal 2005, table 1).

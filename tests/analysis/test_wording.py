@@ -7,12 +7,12 @@ from dataclasses import replace
 import pytest
 
 from study_app.analysis.evaluate import evaluate
-from study_app.analysis.report.methods import methods
+from study_app.analysis.findings.words import all_of, percent
+from study_app.analysis.report.block_section import block
+from study_app.analysis.report.methods_paragraph import methods
 from study_app.analysis.report.r_script import r_script
-from study_app.analysis.report.sections import block
-from study_app.analysis.report.short import findings
-from study_app.analysis.report.words import all_of, percent
-from study_app.analysis.tables import Study
+from study_app.analysis.report.summary import findings
+from study_app.analysis.tables.study import Study
 from tests.analysis.made_up import DECIDED, delays, everybody, liquids, study
 
 LEVELS = (0.0, 50.0, 100.0)

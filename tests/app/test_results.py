@@ -13,8 +13,8 @@ from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
 from study_app.analysis.analyst import Analyst
-from study_app.analysis.orders import Answer, Order, Refused
 from study_app.analysis.worker import carry_out
+from study_app.analysis.worker_messages import Answer, Order, Refused
 from study_app.app.results import ResultsDesk
 from study_app.errors import StudyError
 from study_app.gui.controls import ActionButton

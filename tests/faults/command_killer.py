@@ -15,8 +15,8 @@ import sys
 import time
 from pathlib import Path
 
-from study_app.analysis.export import export
-from study_app.analysis.report.writing import report
+from study_app.analysis.export.export import export
+from study_app.analysis.report.write_report import report
 from study_app.session.simulated import rehearsal
 from study_app.store.blinded.unblinding import unblind
 from study_app.store.sessions.rebuild import rebuild

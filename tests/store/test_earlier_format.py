@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from study_app.analysis.export import export
-from study_app.analysis.report.writing import report
+from study_app.analysis.export.export import export
+from study_app.analysis.report.write_report import report
 from study_app.session.simulated import rehearsal
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal

@@ -15,10 +15,10 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from study_app.analysis import style
-from study_app.analysis.measures import Array
-from study_app.analysis.power.found import OVER_ALL, WANTED, Curve, Powers, Question, interval
-from study_app.analysis.power.planned import Planned
-from study_app.analysis.sheet import MARGIN_PT, Mark, Sheet
+from study_app.analysis.figures.page_layout import MARGIN_PT, Mark, Sheet
+from study_app.analysis.power.plan import Planned
+from study_app.analysis.power.power_curves import OVER_ALL, WANTED, Curve, Powers, Question, interval
+from study_app.analysis.tables.measures import Array
 
 PLOTS_A_ROW: Final = 5
 POWER_PT: Final = 74.0

@@ -10,8 +10,8 @@ from typing import Any, Final, Literal, TypeAlias, get_args
 
 from joblib import Parallel, delayed, parallel_config
 
-from study_app.analysis.power.counting import BATCH, Counts, count
-from study_app.analysis.power.planned import Plan
+from study_app.analysis.power.counts import BATCH, Counts, count
+from study_app.analysis.power.plan import Plan
 from study_app.errors import AnalysisError
 
 Engine: TypeAlias = Literal["processes", "threads", "dask", "ray"]

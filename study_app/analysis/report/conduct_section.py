@@ -6,13 +6,13 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-from study_app.analysis.performance import DEFINITIONS as TRIAL_DEFINITIONS
-from study_app.analysis.performance import OF_REACHES, OF_TRIALS, Performance
-from study_app.analysis.reaches import DEFINITIONS as REACH_DEFINITIONS
-from study_app.analysis.report.page import bullets, heading, paragraph, table
-from study_app.analysis.report.words import counted, listed, ms, name, number, settings_noun
-from study_app.analysis.results import BlockFound, Delivered, Results
-from study_app.analysis.tables import Study
+from study_app.analysis.findings.block_results import BlockFound, Delivered, Results
+from study_app.analysis.findings.words import counted, listed, ms, name, number, settings_noun
+from study_app.analysis.report.html_page import bullets, heading, paragraph, table
+from study_app.analysis.tables.performance import DEFINITIONS as TRIAL_DEFINITIONS
+from study_app.analysis.tables.performance import OF_REACHES, OF_TRIALS, Performance
+from study_app.analysis.tables.reaches import DEFINITIONS as REACH_DEFINITIONS
+from study_app.analysis.tables.study import Study
 from study_app.protocol.orders.balance import Evenness
 from study_app.store.exclusions import named
 

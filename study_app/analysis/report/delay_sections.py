@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from study_app.analysis.report.meaning import VERDICTS, by_delay, tempting_ms
-from study_app.analysis.report.meaning import meaning as paragraphs_on_delay
-from study_app.analysis.report.page import box, heading, paragraph, table
-from study_app.analysis.report.words import beyond, counted, enough, interval, ms, number, p_value, percent, short
-from study_app.analysis.results import Against, BlockFound, Results
-from study_app.analysis.statistics.equivalence import Equivalence
-from study_app.analysis.statistics.equivalence_power import MOST, STUDIES
+from study_app.analysis.findings.block_results import Against, BlockFound, Results
+from study_app.analysis.findings.words import beyond, counted, enough, interval, ms, number, p_value, percent, short
+from study_app.analysis.report.delay_meaning import VERDICTS, by_delay, tempting_ms
+from study_app.analysis.report.delay_meaning import meaning as paragraphs_on_delay
+from study_app.analysis.report.html_page import box, heading, paragraph, table
+from study_app.analysis.statistics.equivalence.power import MOST, STUDIES
+from study_app.analysis.statistics.equivalence.tost import Equivalence
 
 AGAINST = (
     *("Statement", "Delay", "n", "difference", "interval", "people beyond the bound", "p equivalent"),

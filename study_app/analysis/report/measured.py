@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from study_app.analysis.power.found import interval
+from study_app.analysis.power.power_curves import interval
 
 STUDIES: Final = 2000
 CLAIMS: Final[dict[int, int]] = {5: 11, 12: 33, 24: 36}

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
-from study_app.analysis.report.listing import tests
-from study_app.analysis.results import BlockFound, Results
+from study_app.analysis.findings.block_results import BlockFound, Results
+from study_app.analysis.report.number_files import tests
 from study_app.analysis.statistics.friedman import Friedman
 from study_app.analysis.statistics.trend import EXACT_UP_TO
-from study_app.analysis.tables import Study
+from study_app.analysis.tables.study import Study
 
 START: Final = """\
 # Computes the main numbers of report.html again, in base R (4.0 or newer, no packages), from the table of responses

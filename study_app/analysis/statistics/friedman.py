@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import chdtrc, fdtrc
 
-from study_app.analysis.statistics.lattice import doubled_ranks
+from study_app.analysis.statistics.exact_distributions import doubled_ranks
 from study_app.analysis.statistics.outcome import DRAWS, NO_VARIATION, Array, Outcome, Whole, complete
 
 WORK: Final = 1_500_000

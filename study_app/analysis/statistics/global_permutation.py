@@ -14,8 +14,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from study_app.analysis.statistics.exact_distributions import doubled_ranks
 from study_app.analysis.statistics.friedman import shuffles, tied_spread
-from study_app.analysis.statistics.lattice import doubled_ranks
 from study_app.analysis.statistics.outcome import DRAWS, NO_VARIATION, Array, Outcome, Whole, checked
 from study_app.errors import AnalysisError
 

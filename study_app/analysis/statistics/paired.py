@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import norm
 
-from study_app.analysis.statistics.lattice import Lattice, doubled_ranks
+from study_app.analysis.statistics.exact_distributions import Lattice, doubled_ranks
 from study_app.analysis.statistics.outcome import Array, Interval, Outcome, Whole, checked
 from study_app.errors import AnalysisError
 

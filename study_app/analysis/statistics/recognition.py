@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from study_app.analysis.statistics.agreement import kappa
-from study_app.analysis.statistics.lattice import Lattice, of_values, total
+from study_app.analysis.statistics.exact_distributions import Lattice, of_values, total
 from study_app.analysis.statistics.outcome import (
     FEW,
     TOO_FEW,

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import norm
 
-from study_app.analysis.statistics.lattice import Lattice, doubled_ranks, total
+from study_app.analysis.statistics.exact_distributions import Lattice, doubled_ranks, total
 from study_app.analysis.statistics.outcome import (
     FEW,
     NO_VARIATION,

@@ -13,11 +13,11 @@ from typing import Final, Literal, TypeAlias, get_args
 
 import numpy as np
 
-from study_app.analysis.decided import Decided
-from study_app.analysis.measures import Array
-from study_app.analysis.power.planned import Plan
-from study_app.analysis.power.simulating import Opinions, people
-from study_app.analysis.questions import Block, Setting
+from study_app.analysis.power.plan import Plan
+from study_app.analysis.power.simulated_studies import Opinions, people
+from study_app.analysis.tables.compared_blocks import Block, Setting
+from study_app.analysis.tables.measures import Array
+from study_app.analysis.tables.planned_analysis import Decided
 from study_app.protocol.model import Protocol
 
 Generator: TypeAlias = Literal["answer model", "ordinal probit"]

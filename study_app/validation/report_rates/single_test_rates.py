@@ -9,10 +9,10 @@ from typing import Final, TypeAlias
 import numpy as np
 from scipy.special import expit
 
-from study_app.analysis.measures import Array
-from study_app.analysis.statistics.equivalence import tost
-from study_app.analysis.statistics.equivalence_power import participants_needed
-from study_app.analysis.statistics.threshold import noticed
+from study_app.analysis.statistics.equivalence.power import participants_needed
+from study_app.analysis.statistics.equivalence.tost import tost
+from study_app.analysis.statistics.psychometrics.threshold import noticed
+from study_app.analysis.tables.measures import Array
 from study_app.validation.report_rates.rates import Limit, Rate
 
 Case: TypeAlias = tuple[str, int]

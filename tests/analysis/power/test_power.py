@@ -20,13 +20,13 @@ import pytest
 from click.testing import CliRunner
 
 from study_app.analysis.power import sweep as sweeping
-from study_app.analysis.power.counting import BATCH, EFFECTS, FULL, Counts, count
-from study_app.analysis.power.found import Curve, Powers, interval, powers
-from study_app.analysis.power.listed import COLUMNS, power_csv, power_markdown
-from study_app.analysis.power.planned import Plan, plan
-from study_app.analysis.power.simulating import people
+from study_app.analysis.power.counts import BATCH, EFFECTS, FULL, Counts, count
+from study_app.analysis.power.plan import Plan, plan
+from study_app.analysis.power.power_curves import Curve, Powers, interval, powers
+from study_app.analysis.power.power_files import write
+from study_app.analysis.power.power_tables import COLUMNS, power_csv, power_markdown
+from study_app.analysis.power.simulated_studies import people
 from study_app.analysis.power.sweep import sweep
-from study_app.analysis.power.writing import write
 from study_app.analysis.statistics.trend import step_down
 from study_app.cli import commands
 from study_app.errors import AnalysisError

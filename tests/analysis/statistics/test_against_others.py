@@ -7,12 +7,12 @@ import pandas as pd
 import pytest
 
 from study_app.analysis.statistics.agreement import kappa
-from study_app.analysis.statistics.equivalence import tost
-from study_app.analysis.statistics.families import false_discovery, holm
+from study_app.analysis.statistics.equivalence.tost import tost
 from study_app.analysis.statistics.friedman import friedman
+from study_app.analysis.statistics.multiple_comparisons import false_discovery, holm
 from study_app.analysis.statistics.ordinal import ordinal
 from study_app.analysis.statistics.paired import paired
-from study_app.analysis.statistics.threshold import threshold
+from study_app.analysis.statistics.psychometrics.threshold import threshold
 from study_app.analysis.statistics.trend import page
 
 

@@ -9,8 +9,8 @@ from scipy.stats import friedmanchisquare, studentized_range
 from scipy.stats import t as t_distribution
 
 from study_app.analysis.statistics import friedman as module
-from study_app.analysis.statistics.families import holm
 from study_app.analysis.statistics.friedman import friedman
+from study_app.analysis.statistics.multiple_comparisons import holm
 from study_app.errors import AnalysisError
 
 # Times to first base of 22 players by three methods (Hollander & Wolfe 1973; R, friedman.test).

@@ -7,15 +7,15 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
-from study_app.analysis.statistics.equivalence import tost
+from study_app.analysis.statistics.equivalence.tost import tost
 from study_app.analysis.statistics.friedman import friedman
 from study_app.analysis.statistics.global_permutation import global_permutation
-from study_app.analysis.statistics.missing import skillings_mack
 from study_app.analysis.statistics.ordinal import ordinal
 from study_app.analysis.statistics.outcome import Outcome
 from study_app.analysis.statistics.paired import paired
+from study_app.analysis.statistics.psychometrics.threshold import noticed
 from study_app.analysis.statistics.recognition import named, recognition
-from study_app.analysis.statistics.threshold import noticed
+from study_app.analysis.statistics.skillings_mack import skillings_mack
 from study_app.analysis.statistics.trend import page, step_down
 
 RNG = np.random.default_rng(11)

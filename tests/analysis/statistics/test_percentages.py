@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from study_app.analysis import measures
+from study_app.analysis.tables import measures
 
 # Twenty students, 1 to 5; low, neutral and high percentages.
 GENDER = "FFMFFFFFFFFFMFMFMMFM"

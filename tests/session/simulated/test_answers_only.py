@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from study_app.analysis.export import export
-from study_app.analysis.figures import plot
-from study_app.analysis.tables import load_study
+from study_app.analysis.export.export import export
+from study_app.analysis.figures.answer_figures import plot
+from study_app.analysis.tables.study import load_study
 from study_app.cli import commands
 from study_app.errors import StoreError
 from study_app.protocol.load import load

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from study_app.analysis.block_tests import of_tables
+from study_app.analysis.designs.block_tests import of_tables
 from study_app.analysis.evaluate import found_in
-from study_app.analysis.power.planned import plan
-from study_app.analysis.statistics.threshold import noticed
+from study_app.analysis.power.plan import plan
+from study_app.analysis.statistics.psychometrics.threshold import noticed
 from study_app.cli import commands
 from study_app.protocol.load import load
 from study_app.protocol.questions.simulated_answers import Felt
@@ -159,7 +159,7 @@ def test_the_command_tells_rates_that_are_undecided_from_rates_that_hold(
     rates = tuple(Rate("cell", 5, f"what {at}", "at most 5 %", hit, 1000) for at, hit in enumerate(hits))
     rates += (Rate("cell", 5, "size", "counted", 7, 1000),) if rates else ()
     monkeypatch.setattr("study_app.session.simulated.trial_features.feelings", lambda *_args, **_named: None)
-    monkeypatch.setattr("study_app.analysis.power.planned.plan", lambda *_args: None)
+    monkeypatch.setattr("study_app.analysis.power.plan.plan", lambda *_args: None)
     monkeypatch.setattr("study_app.validation.report_rates.simulated_studies.simulated", lambda *_args: None)
     monkeypatch.setattr(
         "study_app.validation.report_rates.simulation.validate", lambda *_args, **_named: [(1000, rates)]

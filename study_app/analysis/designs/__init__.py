@@ -1,0 +1,1 @@
+"""What the blocks of a study compare: liquids, delays, factorials, and their tests."""

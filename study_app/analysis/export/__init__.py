@@ -1,0 +1,1 @@
+"""Tables for other programs: CSV, Parquet, SPSS, Psych-DS, and the codebook."""

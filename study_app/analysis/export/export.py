@@ -1,0 +1,80 @@
+"""Tidy tables of all participants in files, with a codebook that explains every column, statement and level."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from pathlib import Path
+from typing import Final, Literal, TypeAlias
+
+from study_app.analysis.export import psychds_dataset, spss
+from study_app.analysis.export.codebook import codebook_bytes
+from study_app.analysis.export.frame_csv import table_bytes
+from study_app.analysis.export.typed_tables import Delivered, deliver
+from study_app.analysis.export.wide_table import wide
+from study_app.analysis.output import write_files
+from study_app.analysis.tables.study import Study, load_study
+
+Extra: TypeAlias = Literal["wide", "parquet", "sav", "psych-ds"]
+NOTHING_ELSE: Final[frozenset[Extra]] = frozenset()
+
+
+def export(
+    folder: Path,
+    to: Path,
+    *,
+    extras: Collection[Extra] = NOTHING_ELSE,
+    warn: Callable[[str], object] | None = None,
+) -> tuple[Path, ...]:
+    """Write responses, trials, aggregate and codebook of a study into the folder ``to``; return the files.
+
+    Files that are not as they were recorded are used as they are: ``warn`` is told of each, and the codebook names it.
+
+    Parameters
+    ----------
+    extras : what is written beside
+        "wide": the answers, a row a participant; "parquet": the tables as Parquet; "sav": the answers, long and wide,
+        for SPSS; "psych-ds": a folder of all tables that keeps the rules of Psych-DS.
+
+    Raises
+    ------
+    AnalysisError
+        The results cannot be evaluated, the library for .sav is missing, or ``to`` cannot be written; nothing was.
+    StoreError
+        The key was opened, and is now missing or changed; or ``exclusions.csv`` cannot be read.
+    """
+    if "sav" in extras:
+        spss.require()
+    study = load_study(folder)
+    written = write_files(Path(to), export_files(study, extras))
+    study.tell_doubts(warn)
+    return written
+
+
+def export_files(study: Study, extras: Collection[Extra] = NOTHING_ELSE) -> dict[str, bytes]:
+    """Return responses, trials, aggregate and codebook of a study, and the ``extras``, by the names of their files."""
+    tables = list(deliver(study))
+    responses = tables[0]
+    across, cells = wide(study) if extras else (None, {})
+    if across is not None and "wide" in extras:
+        tables.append(across)
+    files = {_name(study, table, "csv"): table_bytes(table) for table in tables}
+    columns = {_name(study, table, "csv"): table.columns for table in tables}
+    files["codebook.json"] = codebook_bytes(study, columns)
+    if "parquet" in extras:
+        from study_app.analysis.export.parquet import (  # noqa: PLC0415 - loads its library where it is asked for
+            parquet_bytes,
+        )
+
+        files |= {_name(study, table, "parquet"): parquet_bytes(table) for table in tables}
+    if across is not None and "sav" in extras:
+        files[_name(study, responses, "sav")] = spss.long_sav(study, responses)
+        files[_name(study, across, "sav")] = spss.wide_sav(study, across, cells)
+    if across is not None and "psych-ds" in extras:
+        held = {_name(study, table, "csv"): table for table in dict.fromkeys((*tables, across))}
+        contents = {name: files.get(name) or table_bytes(table) for name, table in held.items()}
+        files |= psychds_dataset.dataset_files(study, contents, {name: table.columns for name, table in held.items()})
+    return files
+
+
+def _name(study: Study, table: Delivered, ending: str) -> str:
+    return f"study-{study.name}_description-{table.name}_data.{ending}"

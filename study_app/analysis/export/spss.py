@@ -1,0 +1,154 @@
+"""Tables as SPSS files (.sav), which jamovi, JASP and R read too: labels, levels and codes of missing answers included.
+
+Answers are numbers with labels and an ordinal measure. An answer off the scale is 98 and one that was not given is 99,
+both declared as missing; of any other number what is missing is SPSS's own. SPSS has no missing text: it is empty.
+"""
+
+from __future__ import annotations
+
+import importlib
+import re
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import pandas as pd
+
+from study_app.analysis.export.typed_tables import Delivered
+from study_app.analysis.export.wide_table import Cells
+from study_app.analysis.tables.measures import LEVELS
+from study_app.analysis.tables.study import Study
+from study_app.errors import AnalysisError
+from study_app.store.tables.columns import Column
+
+CANNOT_JUDGE: Final = 98
+NOT_ANSWERED: Final = 99
+NAME_BYTES: Final = 64
+LABEL_BYTES: Final = 255
+FILE_LABEL_BYTES: Final = 64
+TEXT_BYTES: Final = 32_767
+_RESERVED: Final = frozenset(("ALL", "AND", "BY", "EQ", "GE", "GT", "LE", "LT", "NE", "NOT", "OR", "TO", "WITH"))
+
+
+def require() -> None:
+    """Refuse to begin where the library is missing.
+
+    Raises
+    ------
+    AnalysisError
+        It is not installed.
+    """
+    try:
+        importlib.import_module("pyreadstat")
+    except ImportError as error:
+        raise AnalysisError(
+            "--sav needs the package 'pyreadstat', which is not installed: pip install pyreadstat"
+        ) from error
+
+
+def long_sav(study: Study, table: Delivered) -> bytes:
+    """Return the long table of responses as a .sav file."""
+    frame = table.frame
+    answers = frame["response"].astype("Float64").fillna(NOT_ANSWERED).mask(frame["cannot_judge"], CANNOT_JUDGE)
+    labels = {block.labels for block in study.blocks}
+    levels = dict(zip(LEVELS, next(iter(labels)), strict=True)) if len(labels) == 1 else {}
+    words = {block.cannot_judge for block in study.blocks if block.cannot_judge}
+    coded = {"response": _levels(levels, " / ".join(sorted(words)))}
+    return _sav(study, Delivered(table.name, table.columns, frame.assign(response=answers)), coded)
+
+
+def wide_sav(study: Study, table: Delivered, cells: Mapping[str, Cells]) -> bytes:
+    """Return the wide table as a .sav file."""
+    answers = study.responses[study.responses["counted"]]
+    off = answers[answers["cannot_judge"]].groupby(["block", "code", "item"])["participant"].agg(set).to_dict()
+    frame = table.frame.copy()
+    coded = {}
+    for name, one in cells.items():
+        values = frame[name].astype("Float64")
+        judged = frame["participant"].isin(off.get((one.block.id, one.setting.code, one.item.id), set()))
+        frame[name] = values.mask(values.isna() & judged, CANNOT_JUDGE).fillna(NOT_ANSWERED)
+        coded[name] = _levels(dict(zip(LEVELS, one.block.labels, strict=True)), one.block.cannot_judge or "")
+    return _sav(study, Delivered(table.name, table.columns, frame), coded)
+
+
+def _levels(levels: Mapping[int, str], cannot_judge: str) -> dict[int, str]:
+    return {**levels, CANNOT_JUDGE: cannot_judge or "Cannot judge", NOT_ANSWERED: "No answer"}
+
+
+def _sav(study: Study, table: Delivered, coded: Mapping[str, dict[int, str]]) -> bytes:
+    """Write the table; ``coded`` has the levels of columns whose missing answers have codes."""
+    names = names_of([column.name for column in table.columns])
+    columns = {names[column.name]: column for column in table.columns}
+    levels = {names[name]: found for name, found in coded.items()}
+    flags = {name: {0: "false", 1: "true"} for name, column in columns.items() if column.kind == "flag"}
+    frame = pd.DataFrame({names[column.name]: _plain(column, table.frame[column.name]) for column in table.columns})
+    with tempfile.TemporaryDirectory() as scratch:
+        path = Path(scratch) / "table.sav"
+        importlib.import_module("pyreadstat").write_sav(
+            frame,
+            str(path),
+            file_label=_cut(f"{study.title} ({study.name} {study.version})", FILE_LABEL_BYTES),
+            column_labels={name: _cut(_label(name, column), LABEL_BYTES) for name, column in columns.items()},
+            variable_value_labels={
+                name: {value: _cut(label, LABEL_BYTES // 2) for value, label in found.items()}
+                for name, found in (levels | flags).items()
+            },
+            missing_ranges={name: [CANNOT_JUDGE, NOT_ANSWERED] for name in levels},
+            variable_measure={name: _measure(column, name in levels) for name, column in columns.items()},
+            variable_format={
+                name: form for name, column in columns.items() if (form := _format(column, table.frame[column.name]))
+            },
+        )
+        return path.read_bytes()
+
+
+def names_of(names: list[str]) -> dict[str, str]:
+    """Return names that SPSS takes: letters first, at most 64 bytes, no reserved word, different in any case."""
+    found: dict[str, str] = {}
+    taken: set[str] = set()
+    for name in names:
+        plain = re.sub(r"[^A-Za-z0-9_]", "_", name).rstrip("_") or "v"
+        if not plain[0].isalpha() or plain.upper() in _RESERVED:
+            plain = f"v_{plain}"
+        short, number = plain[:NAME_BYTES], 1
+        while short.upper() in taken:
+            number += 1
+            short = f"{plain[: NAME_BYTES - len(str(number)) - 1]}_{number}"
+        taken.add(short.upper())
+        found[name] = short
+    return found
+
+
+def _plain(column: Column, values: pd.Series[Any]) -> pd.Series[Any]:
+    """Return values as the library takes them: floats with NaN, or texts, empty where there is none."""
+    if column.kind in {"text", "time"}:
+        texts = ["" if value is pd.NA else _cut(str(value), TEXT_BYTES) for value in values.tolist()]
+        return pd.Series(texts, dtype=object)
+    return pd.Series(values.astype("Float64").to_numpy(dtype=np.float64, na_value=np.nan))
+
+
+def _label(name: str, column: Column) -> str:
+    unit = f" [{column.unit}]" if column.unit else ""
+    return f"{column.description}{unit}" if name == column.name else f"{column.name}: {column.description}{unit}"
+
+
+def _measure(column: Column, coded: bool) -> str:
+    if coded:
+        return "ordinal"
+    return "nominal" if column.kind in {"text", "time", "flag"} else "scale"
+
+
+def _format(column: Column, values: pd.Series[Any]) -> str | None:
+    """Return how numbers are shown: whole ones without a point."""
+    if column.kind == "flag":
+        return "F1.0"
+    whole = column.kind == "integer"
+    return f"F{max(2, len(str(values.max()).partition('.')[0]))}.0" if whole and values.notna().any() else None
+
+
+def _cut(text: str, most: int) -> str:
+    """Return as much of a text as fits into ``most`` bytes, never half a letter."""
+    content = text.encode("utf-8", "replace")
+    return text if len(content) <= most else content[: most - 3].decode("utf-8", "ignore") + "…"

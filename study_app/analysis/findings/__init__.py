@@ -1,0 +1,1 @@
+"""Results of the analysis as typed values, with the words for them."""

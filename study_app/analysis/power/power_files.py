@@ -1,0 +1,28 @@
+"""The power of a study written out: tables and figures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from study_app.analysis import style
+from study_app.analysis.output import write_files
+from study_app.analysis.power import figure
+from study_app.analysis.power.power_curves import Powers
+from study_app.analysis.power.power_tables import power_csv, power_markdown
+
+
+def write(found: Powers, to: Path) -> tuple[Path, ...]:
+    """Write tables (CSV, Markdown) and a figure a block (PNG, SVG, PDF) into ``to``; return the files.
+
+    Raises
+    ------
+    AnalysisError
+        ``to`` cannot be written; nothing was.
+    """
+    files = {"power.md": power_markdown(found).encode(), "power.csv": power_csv(found)}
+    for block in found.plan.blocks:
+        title = f"{found.plan.name}: power of {block.title}"
+        for form in style.FORMATS:
+            drawn = figure.draw(found, block, style.fonts_for(form)).figure
+            files[f"power-{block.id}.{form}"] = style.file_bytes(drawn, form, title)
+    return write_files(Path(to), files)

@@ -1,0 +1,1 @@
+"""The report's first page: three answers, each with direction, size and interval."""

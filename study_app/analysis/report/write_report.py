@@ -1,0 +1,248 @@
+"""The report of a study, written whole or not at all: the page, every number, figures, tables, and how to repeat it."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
+from html import escape, unescape
+from pathlib import Path
+from typing import Any
+
+from study_app import __version__
+from study_app.analysis.evaluate import Progress, evaluate
+from study_app.analysis.export.export import export_files
+from study_app.analysis.figures.report_figures import Picture, pictures
+from study_app.analysis.findings.block_results import Results
+from study_app.analysis.findings.words import counted
+from study_app.analysis.output import write_files
+from study_app.analysis.report import block_section, conduct_section, number_files, summary
+from study_app.analysis.report.first_page.page import first_page
+from study_app.analysis.report.html_page import (
+    box,
+    bullets,
+    contents,
+    folded,
+    heading,
+    not_there,
+    page,
+    paragraph,
+    table,
+)
+from study_app.analysis.report.methods_paragraph import methods, told_versions
+from study_app.analysis.report.r_script import r_script
+from study_app.analysis.report.section_failures import Failure, Failures
+from study_app.analysis.report.typeface import font_faces
+from study_app.analysis.tables.study import Study, load_study
+from study_app.errors import AnalysisError
+from study_app.store.blinded import blinding
+
+HASHES_SHOWN = 12
+"""Of so few files the page shows the hashes one by one; of more, one over all of them."""
+
+
+def report(
+    folder: Path,
+    to: Path,
+    *,
+    progress: Callable[[str, float], object] | None = None,
+    cancelled: Callable[[], bool] | None = None,
+    warn: Callable[[str], object] | None = None,
+    failed: Callable[[str], object] | None = None,
+) -> tuple[Path, ...]:
+    """Write the report of a study's results into the folder ``to``; return the files, ``report.html`` first.
+
+    The same results give the same bytes. While the key is sealed the report is by code, and says what waits for it.
+
+    Parameters
+    ----------
+    progress : callable, optional
+        Is called with what is being done and which share of all is done (0 to 1).
+    cancelled : callable, optional
+        Is asked again and again whether to give up.
+    warn : callable, optional
+        Is called with a line for every file that is not as it was recorded, and is used as it is.
+    failed : callable, optional
+        Is called with a line for every section that could not be computed: the report says so in its place, and holds
+        everything else.
+
+    Raises
+    ------
+    AnalysisError
+        The results cannot be evaluated, ``to`` cannot be written, or it was cancelled; nothing was written.
+    StoreError
+        The key was opened, and is now missing or changed; or ``exclusions.csv`` cannot be read.
+    """
+    going = partial(_going, progress, cancelled)
+    going("reading", 0.0)
+    study = load_study(folder)
+    if not study.blocks:
+        raise AnalysisError(f"{folder}: the study {study.name!r} asks no statements, so there is nothing to report")
+    results = evaluate(study, progress=lambda what, share: going(what, 0.1 + 0.6 * share))
+    failures = Failures(results.failures)
+    drawn = list(_drawn(study, results, going, failures))
+    going("writing", 0.95)
+    written = write_files(Path(to), _files(study, results, drawn, failures))
+    study.tell_doubts(warn)
+    if failed is not None:
+        for failure in failures.found:
+            failed(f"error: {failure}")
+    return written
+
+
+def _going(
+    progress: Callable[[str, float], object] | None, cancelled: Callable[[], bool] | None, what: str, share: float
+) -> None:
+    """Tell what is being done, unless it is to be given up."""
+    if cancelled is not None and cancelled():
+        raise AnalysisError("the report was cancelled; nothing was written")
+    if progress is not None:
+        progress(what, share)
+
+
+def _drawn(study: Study, results: Results, going: Progress, failures: Failures) -> Iterator[Picture]:
+    for number, picture in enumerate(pictures(study, results, failures=failures), start=1):
+        going(f"drawing: {picture.name}", 0.7 + 0.2 * min(1.0, number / 4))
+        yield picture
+
+
+def _files(study: Study, results: Results, drawn: Sequence[Picture], failures: Failures) -> dict[str, bytes]:
+    """Return every file that can be made; report.json comes last, since it holds the failures of the others."""
+    told = {
+        what: _or_why(failures, f"texts: {what}", make, one_line=what == "methods")
+        for what, make in (
+            ("findings", lambda: summary.findings(results)),
+            ("limits", lambda: summary.limits(study, results)),
+            ("methods", lambda: methods(study, results)),
+        )
+    }
+    files: dict[str, bytes] = {}
+    for name, make in (
+        ("report.R", lambda: r_script(study, results).encode()),
+        ("methods.txt", f"{told['methods']}\n".encode),
+        ("tests.csv", lambda: number_files.tests_csv(results)),
+        ("motion.csv", lambda: number_files.motion_csv(results)),
+    ):
+        content = failures.attempt(name, make)
+        files |= {} if isinstance(content, Failure) else {name: content}
+    for one in drawn:
+        files |= {f"{one.name}.{form}": content for form, content in one.files.items()}
+        files[f"{one.name}.txt"] = f"{one.caption}\n".encode()
+    exported = failures.attempt("exported tables", lambda: export_files(study))
+    files |= {} if isinstance(exported, Failure) else exported
+    page_ = _page(study, results, drawn, told, failures).encode()
+    return {"report.html": page_, "report.json": number_files.document(study, results, told, failures), **files}
+
+
+def _or_why(failures: Failures, what: str, make: Callable[[], Any], *, one_line: bool) -> Any:
+    """Return what ``make`` returns, or why it is not there: a sentence, or a tuple of one."""
+    found = failures.attempt(what, make)
+    if not isinstance(found, Failure):
+        return found
+    return f"Not there: {found.why}." if one_line else (f"Not there: {found.why}.",)
+
+
+def _page(study: Study, results: Results, drawn: Sequence[Picture], told: Mapping[str, Any], failures: Failures) -> str:
+    sections_: list[tuple[str, Callable[[], Iterable[str]]]] = [
+        ("In short", lambda: _short(told)),
+        *((found.title, partial(block_section.block, found, results, drawn, failures)) for found in results.blocks),
+        ("What the words mean", lambda: block_section.verdicts_mean(results)),
+        ("Motion and force", lambda: conduct_section.motion(results)),
+        ("How it was run", lambda: conduct_section.conduct(study, results)),
+        ("Methods, to paste", lambda: (heading(2, "Methods, to paste"), box([paragraph(str(told["methods"]))]))),
+        ("Reproducing this report", lambda: _again(study, results)),
+        ("Answers, counted", lambda: block_section.answers(results)),
+    ]
+    first = failures.attempt("first page", lambda: first_page(results, told["limits"], failures))
+    parts: list[tuple[str, list[str]]] = []
+    for title, make in sections_:
+        found = failures.attempt(f"section “{title}”", partial(_made, make))
+        part = [heading(2, title), not_there(found.why)] if isinstance(found, Failure) else found
+        parts += [(title, part)] if part else []
+    body = [not_there(first.why) if isinstance(first, Failure) else first]
+    for number, (_, part) in enumerate(parts, start=1):
+        body += folded(part, number)
+    html = "\n".join([*_head(study), contents(title for title, _ in parts), *_failed(failures), *body])
+    faces = failures.attempt("typeface", lambda: font_faces("".join(sorted(set(unescape(html))))))
+    return page(f"{study.title}: report", html, "" if isinstance(faces, Failure) else faces)
+
+
+def _made(make: Callable[[], Iterable[str]]) -> list[str]:
+    return list(make())
+
+
+def _failed(failures: Failures) -> Iterator[str]:
+    """Say above everything else what is missing."""
+    if failures.found:
+        yield box(
+            [
+                paragraph("Parts of this report could not be computed; everything else is there:"),
+                bullets(map(str, failures.found)),
+            ],
+            "care",
+        )
+
+
+def _head(study: Study) -> Iterator[str]:
+    yield heading(1, study.title)
+    people = counted(study.n, "participant")
+    marks = []
+    if study.simulated:
+        marks.append('<span class="mark">SIMULATED participants, no people</span>')
+    if study.pilot:
+        marks.append('<span class="mark">PILOT</span>')
+    if not study.revealed:
+        marks.append('<span class="sealed">Blinded: by code</span>')
+    facts = f"Study {study.name}, {told_versions(study)}. {people[:1].upper()}{people[1:]}. {_days(study)}"
+    yield f'<p class="soft facts">{escape(facts)} {" ".join(marks)}</p>'
+
+
+def _days(study: Study) -> str:
+    """Say on which days the sessions that count began."""
+    here = study.participants
+    days = sorted({str(at)[:10] for at in here.loc[here["counted"], "started_at"]})
+    if not days:
+        return ""
+    return f"Sessions on {days[0]}." if len(days) == 1 else f"Sessions from {days[0]} to {days[-1]}."
+
+
+def _short(told: Mapping[str, Any]) -> Iterator[str]:
+    """Yield every finding in a sentence, with its p."""
+    yield heading(2, "In short: every finding in a sentence")
+    found = told["findings"]
+    yield bullets(found) if found else paragraph("No answers count yet: there are no findings.")
+
+
+def _again(study: Study, results: Results) -> Iterator[str]:
+    """Yield what it takes to get the same numbers again."""
+    yield heading(2, "Reproducing this report")
+    decided = results.decided
+    bound = decided.equivalence_bound
+    rows = [
+        ("Decided before the first session", "yes" if decided.binding else "no: everything is exploratory"),
+        ("Alpha", f"{decided.alpha:g}"),
+        ("Bound of equivalence", "none" if bound is None else f"±{bound:g}"),
+        ("Primary statements", (", ".join(decided.primary) or "all") if decided.binding else "none"),
+        ("Seed of the analysis", str(results.seed)),
+        *((f"Version of {library}", version) for library, version in number_files.versions().items()),
+        ("Key opened", "; ".join(f"{one['at']} by {one['by']}: {one['reason']}" for one in _reveals(study)) or "no"),
+    ]
+    yield table(("Setting", "Value"), rows, words=2)
+    hashes = number_files.files(study)
+    together = hashlib.sha256("".join(f"{digest}  {name}\n" for name, digest in sorted(hashes.items())).encode())
+    if len(hashes) <= HASHES_SHOWN:
+        yield table(("File", "SHA-256"), list(hashes.items()), words=2)
+    yield paragraph(
+        f"The numbers come from {counted(len(hashes), 'file')}; SHA-256 over their hashes and names: "
+        f"{together.hexdigest()}. Each one's hash, and every session's seed, stands in report.json."
+    )
+    yield paragraph(
+        "Beside this page: report.json (every number), tests.csv (a row a test), motion.csv, the tables of responses, "
+        "trials and aggregates with their codebook, every figure as PNG, SVG and PDF with its caption, methods.txt, "
+        f"and report.R, which computes the main numbers again in base R. Made by liquid-study {__version__}.",
+        "soft",
+    )
+
+
+def _reveals(study: Study) -> tuple[dict[str, str], ...]:
+    return blinding.reveals(study.folder)

@@ -1,0 +1,1 @@
+"""Equivalence: two one-sided tests, without normality too, and their power."""

@@ -1,0 +1,1 @@
+"""Psychometric functions of pooled answers: fit, test for a rise, detection threshold."""

@@ -1,0 +1,1 @@
+"""Results folders read into tables, and measures of trials."""

@@ -1,0 +1,244 @@
+"""A study as tables: every session of a results folder, read from its tables and receipts.
+
+Everything recorded is kept; the column ``counted`` says what enters measures and figures: main trials of completed
+sessions, of a repeated trial the last attempt, without what ``exclusions.csv`` leaves out. Practice and baseline stay
+apart by their ``phase``.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+import pandas as pd
+
+from study_app.analysis.tables import measures
+from study_app.analysis.tables import planned_analysis as decided
+from study_app.analysis.tables.compared_blocks import Block, Kind, Setting, settings_of
+from study_app.analysis.tables.excluded_rows import check_there, with_excluded
+from study_app.analysis.tables.planned_analysis import Decided
+from study_app.analysis.tables.session_files import Session, read_session, read_tables
+from study_app.errors import AnalysisError, StoreError
+from study_app.store.blinded import blinding
+from study_app.store.blinded.blinding import Key
+from study_app.store.exclusions import Exclusion, exclusions
+from study_app.store.folders import SessionFolder, StudyFolder
+from study_app.store.sessions.open_session import Place
+from study_app.store.sessions.unstarted_sessions import never_begun
+from study_app.store.tables.columns import SEALED
+from study_app.store.verification.integrity import Doubt, doubts
+
+COMPLETED: Final = "completed"
+_TRIAL: Final = ["participant", "session", "trial"]
+
+
+@dataclass(frozen=True)
+class Study:
+    """All sessions of one study.
+
+    ``responses`` and ``trials`` have the columns of ``store.tables.columns``, with ``session_status``, ``excluded``,
+    ``exclusion_reason`` and ``counted`` added; ``participants`` has a row a session, with the last three. ``blocks``
+    are the main blocks that ask something; ``settings`` says what every (block, code) stands for, and is empty while
+    the key is sealed; ``exclusions`` is what was decided to leave out; ``doubts`` are files that are not as they were
+    recorded, and are used as they are. ``decided`` is what the protocol decided about the analysis, ``protocol`` the
+    first session's, as its receipt holds it.
+    """
+
+    folder: Path
+    name: str
+    title: str
+    version: str
+    blocks: tuple[Block, ...]
+    settings: Mapping[tuple[str, str], Setting]
+    responses: pd.DataFrame
+    trials: pd.DataFrame
+    participants: pd.DataFrame
+    exclusions: tuple[Exclusion, ...]
+    doubts: tuple[Doubt, ...] = ()
+    decided: Decided = decided.NOTHING
+    protocol: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def people(self) -> tuple[str, ...]:
+        """The participants of sessions that count, in the order of their ids."""
+        return tuple(sorted(self.participants.loc[self.participants["counted"], "participant"].unique()))
+
+    @property
+    def n(self) -> int:
+        """How many participants are in the measures."""
+        return len(self.people)
+
+    @property
+    def left_out(self) -> int:
+        """How many sessions are not, since they were not completed."""
+        return int((~self.participants["counted"] & ~self.participants["excluded"]).sum())
+
+    @property
+    def excluded_sessions(self) -> pd.DataFrame:
+        """The rows of ``participants`` that were decided to be left out, completed or not."""
+        return self.participants[self.participants["excluded"]]
+
+    @property
+    def versions(self) -> tuple[str, ...]:
+        """The versions of the protocol under which the sessions that count were run; of none, the first session's."""
+        counted = self.participants.loc[self.participants["counted"], "protocol_version"]
+        return tuple(sorted(set(map(str, counted)))) or (self.version,)
+
+    @property
+    def simulated(self) -> bool:
+        """Whether any participant was simulated."""
+        return bool(self.participants["simulated"].any())
+
+    @property
+    def pilot(self) -> bool:
+        """Whether these are pilot sessions."""
+        return bool(self.participants["pilot"].any())
+
+    @property
+    def revealed(self) -> bool:
+        """Whether the key was opened, so that settings have names."""
+        return bool(self.settings)
+
+    def tell_doubts(self, warn: Callable[[str], object] | None) -> None:
+        """Say a line of every file that is not as it was recorded."""
+        if warn is None:
+            return
+        for doubt in self.doubts:
+            warn(f"warning: {doubt}; used here as it is")
+
+    def blocks_of(self, kind: Kind) -> tuple[Block, ...]:
+        """Return the blocks that compare liquids, or delays."""
+        return tuple(block for block in self.blocks if block.kind == kind)
+
+    def answers(self, block: Block) -> pd.DataFrame:
+        """Return the rows of ``responses`` that count, of one block."""
+        return self.responses[self.responses["counted"] & (self.responses["block"] == block.id)]
+
+    def presented(self, block: Block) -> dict[str, int]:
+        """Return how often each setting of a block was presented in trials that count."""
+        rows = self.trials[self.trials["counted"] & (self.trials["block"] == block.id)]
+        return {code: int((rows["code"] == code).sum()) for code in block.codes}
+
+    def excluded_trials(self, block: Block) -> pd.DataFrame:
+        """Return the trials of a block that are left out one by one: last attempts, in sessions that count."""
+        rows = self.trials[self.trials["excluded"] & (self.trials["block"] == block.id)]
+        here = self.participants.loc[self.participants["counted"], ["participant", "session"]]
+        return (
+            rows.sort_values("attempt").drop_duplicates(_TRIAL, keep="last").merge(here, on=["participant", "session"])
+        )
+
+    def aggregate(self, block: Block) -> pd.DataFrame:
+        """Return the measures of a block: see ``measures.aggregate``."""
+        items = [item.id for item in block.items]
+        excluded = Counter(map(str, self.excluded_trials(block)["code"]))
+        return measures.aggregate(self.answers(block), self.presented(block), block.codes, items, excluded)
+
+
+def load_study(folder: Path) -> Study:
+    """Read the results of a study.
+
+    Raises
+    ------
+    AnalysisError
+        The folder holds no sessions, a file in it is missing, damaged or of another study, or what is excluded is not
+        there: says which, where in it, and what to do.
+    StoreError
+        The key was opened, and is now missing or changed; or ``exclusions.csv`` cannot be read.
+    """
+    place = StudyFolder(Path(folder))
+    sessions = [session for session in place.sessions() if not never_begun(session.path)]
+    if not sessions:
+        raise AnalysisError(_no_sessions(place.path))
+    key = _key(place, sessions)
+    listed = exclusions(place.path)
+    records = [read_session(sessions[0], key)]
+    records += [read_session(session, key, like=records[0]) for session in sessions[1:]]
+    for session in records[1:]:
+        _check_alike(records[0], session)
+    responses, trials = read_tables(records, "responses"), read_tables(records, "trials")
+    if key is None:  # tables of earlier versions have these columns
+        trials = trials.assign(**{name: trials[name].mask(trials[name].notna()) for name in SEALED})
+    check_there(place, trials, listed)
+    last = pd.concat([responses, trials])[[*_TRIAL, "attempt"]].groupby(_TRIAL)["attempt"].max().rename("last_attempt")
+    return Study(
+        folder=place.path,
+        name=records[0].study,
+        title=records[0].title,
+        version=records[0].version,
+        blocks=records[0].blocks,
+        settings={} if key is None else settings_of(key),
+        responses=_with_counted(with_excluded(responses, listed), last),
+        trials=_with_counted(with_excluded(trials, listed), last),
+        participants=_sessions(with_excluded(pd.DataFrame([session.facts for session in records]), listed)),
+        exclusions=listed,
+        doubts=tuple(doubt for one in records for doubt in doubts(Place(place, one.folder, one.study))),
+        decided=decided.read([session.protocol.get("analysis") for session in records]),
+        protocol=records[0].protocol,
+    )
+
+
+def _key(place: StudyFolder, sessions: Sequence[SessionFolder]) -> Key | None:
+    """Return the opened key; a session of another study is named as such, and not as one under another key."""
+    try:
+        return blinding.revealed_key(place.path)
+    except StoreError:
+        first, *others = [read_session(session, None) for session in sessions]
+        for other in others:
+            if other.study != first.study:
+                raise AnalysisError(_other_study(other, first)) from None
+        raise
+
+
+def _no_sessions(path: Path) -> str:
+    if not path.is_dir():
+        return f"{path} is no folder: give a study's folder, such as results/rek2024"
+    inside = sorted(found.name for found in path.iterdir() if found.is_dir() and StudyFolder(found).sessions())
+    if inside:
+        return f"{path} holds no sessions itself, but studies that do ({', '.join(inside)}): give {path / inside[0]}"
+    return (
+        f"{path} holds no sessions (data/sub-…/ses-…): give a study's folder, such as results/rek2024, in which at "
+        "least one session was begun"
+    )
+
+
+def _other_study(other: Session, first: Session) -> str:
+    return (
+        f"{other.folder.path} is of the study {other.study!r}, {first.folder.path} of {first.study!r}: keep each study "
+        "in a folder of its own"
+    )
+
+
+def _check_alike(first: Session, other: Session) -> None:
+    """Refuse to pool what was not asked alike, or not under one key."""
+    if other.study != first.study:
+        raise AnalysisError(_other_study(other, first))
+    if other.facts["key_hash"] != first.facts["key_hash"]:
+        raise AnalysisError(
+            f"{other.folder.path} and {first.folder.path} ran under different sealed keys, so that one code does not "
+            "mean one thing: keep them in folders of their own"
+        )
+    if other.asked != first.asked:
+        raise AnalysisError(
+            f"{other.folder.path} (version {other.version}) was asked other statements than {first.folder.path} "
+            f"(version {first.version}): keep the versions of a study in folders of their own"
+        )
+
+
+def _with_counted(table: pd.DataFrame, last: pd.Series[int]) -> pd.DataFrame:
+    """Add what counts: main trials of completed sessions, of each trial the last attempt, unless it is excluded."""
+    joined = table.join(last, on=_TRIAL)
+    counted = (
+        (joined["phase"] == "main")
+        & (joined["session_status"] == COMPLETED)
+        & (joined["attempt"] == joined["last_attempt"])
+        & ~joined["excluded"]
+    )
+    return table.assign(counted=counted.astype(bool))
+
+
+def _sessions(table: pd.DataFrame) -> pd.DataFrame:
+    """Add which sessions count: the completed ones that are not excluded."""
+    return table.assign(counted=(table["status"] == COMPLETED) & ~table["excluded"])

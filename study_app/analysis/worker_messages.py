@@ -1,0 +1,164 @@
+"""What the analyst's process is asked, and what it tells: orders and answers, as frozen values."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TypeAlias
+
+from study_app.errors import StudyError
+from study_app.store.exclusions import Exclusion
+
+
+@dataclass(frozen=True, slots=True)
+class FindStudies:
+    """Look which studies there are; told as `StudiesFound`."""
+
+    results: Path
+
+
+@dataclass(frozen=True, slots=True)
+class ReadStudy:
+    """Read a study and draw its figures; told as `SessionsFound`, `StudyFound`, `FigureDrawn`, and what is going on."""
+
+    folder: Path
+
+
+@dataclass(frozen=True, slots=True)
+class LeaveOut:
+    """Leave a session or a trial out (see ``store.exclusions.exclude``)."""
+
+    folder: Path
+    participant: str
+    session: int
+    trial: int | None
+    by: str
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class TakeBack:
+    """Take back that a session or a trial is left out (see ``store.exclusions.include``)."""
+
+    folder: Path
+    participant: str
+    session: int
+    trial: int | None
+    by: str
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class OpenKey:
+    """Open the sealed key (see ``store.blinded.blinding.reveal``)."""
+
+    folder: Path
+    by: str
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class WriteTables:
+    """Write the tables that ``analysis.export.export`` writes, with its ``extras``."""
+
+    folder: Path
+    to: Path
+    extras: tuple[Any, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class WriteReport:
+    """Write the report (see ``analysis.report.write_report``)."""
+
+    folder: Path
+    to: Path
+
+
+Order: TypeAlias = FindStudies | ReadStudy | LeaveOut | TakeBack | OpenKey | WriteTables | WriteReport
+
+
+@dataclass(frozen=True, slots=True)
+class StudyAt:
+    """A study's folder, what its first session is, and when the last one was begun [s since the epoch]."""
+
+    folder: Path
+    simulated: bool
+    pilot: bool
+    newest_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class StudiesFound:
+    """The studies under a results folder, in the order of their names."""
+
+    studies: tuple[StudyAt, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class SessionsFound:
+    """The sessions of a study as rows of ``store.tables.participants``, what is left out, and how the key was last opened."""
+
+    folder: Path
+    rows: tuple[dict[str, Any], ...]
+    exclusions: tuple[Exclusion, ...]
+    reveal: Mapping[str, str] | None
+
+
+@dataclass(frozen=True, slots=True)
+class StudyFound:
+    """A study that could be read.
+
+    ``trials`` are the main trials of each session (participant, number): number and the words for it, by code while
+    the key is sealed. ``doubts`` are files not as recorded. ``colours`` are those of figures by what they are for.
+    """
+
+    name: str
+    title: str
+    n: int
+    blocks: int
+    revealed: bool
+    trials: Mapping[tuple[str, int], tuple[tuple[int, str], ...]]
+    doubts: tuple[str, ...]
+    colours: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class FigureDrawn:
+    """A figure as SVG; one of an earlier ``name`` gives way. Without ``svg``, ``caption`` says why there is none."""
+
+    name: str
+    title: str
+    caption: str
+    svg: bytes = b""
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """What is being done, and which share of all is done (0 to 1)."""
+
+    what: str
+    share: float
+
+
+@dataclass(frozen=True, slots=True)
+class Done:
+    """An order was carried out: the files written, and what to be warned of."""
+
+    files: tuple[Path, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Refused:
+    """An order could not be carried out, and why; nothing was half-done. ``stopped`` where that was asked for."""
+
+    sentence: str
+    stopped: bool = False
+
+
+Answer: TypeAlias = StudiesFound | SessionsFound | StudyFound | FigureDrawn | Progress | Done | Refused
+
+
+class Stopped(StudyError):
+    """An order was given up because that was asked for, or another order came."""

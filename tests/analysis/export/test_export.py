@@ -1,0 +1,275 @@
+import csv
+import json
+import os
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from study_app.analysis.export.export import export
+from study_app.analysis.export.frame_csv import table_bytes
+from study_app.analysis.export.typed_tables import Delivered
+from study_app.analysis.output import write_files
+from study_app.errors import AnalysisError
+from study_app.store.tables.columns import RESPONSES, SEALED, TRIALS, Column, header, unsealed
+from study_app.store.tables.formulas import unguarded
+from tests.analysis.conftest import CANNOT_JUDGE, DELAY_ERROR_MS, HIDDEN, Results
+
+NAMES = {
+    "study-rek2024_description-responses_data.csv",
+    "study-rek2024_description-trials_data.csv",
+    "study-rek2024_description-aggregate_data.csv",
+    "codebook.json",
+}
+
+
+JUDGED = ("session_status", "excluded", "exclusion_reason", "counted")
+
+
+def rows(to: Path, name: str, study: str = "rek2024") -> list[dict[str, str]]:
+    with (to / f"study-{study}_description-{name}_data.csv").open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file, strict=True))
+
+
+@pytest.fixture
+def to(tmp_path: Path) -> Path:
+    return tmp_path / "deep" / "out"
+
+
+def test_every_row_of_every_participant_is_there_with_its_values(rek: Results, to: Path) -> None:
+    rek.add("P001", lambda condition, item: 2 if condition == "honey" else 6)
+    rek.add("P002", lambda *_: 7, status="withdrawn", trials=4)
+    assert {path.name for path in export(rek.folder, to)} == NAMES == {path.name for path in to.iterdir()}
+    found = rows(to, "responses")
+    assert len(found) == 62 + 27
+    assert list(found[0]) == [*header(RESPONSES), *JUDGED]
+    honey = rek.code("honey", "liquids")
+    for row in found:
+        expected = "7" if row["participant"] == "P002" else "2" if row["code"] == honey else "6"
+        assert row["response"] == expected
+        assert row["counted"] == ("true" if row["participant"] == "P001" else "false")
+    assert [row["session_status"] for row in found[-2:]] == ["withdrawn", "withdrawn"]
+    assert len(rows(to, "trials")) == 12 + 4
+    assert list(rows(to, "trials")[0]) == [*header(unsealed(TRIALS)), *JUDGED]
+
+
+def test_cells_are_those_of_the_sessions_own_tables(rek: Results, to: Path) -> None:
+    rek.add(
+        "P001", lambda *_: 6, changes={"force_mean_n": 0.1 + 0.2, "notes": '=1+1, "so"\nnew line π 😀', "targets": None}
+    )
+    rek.open()
+    export(rek.folder, to)
+    with rek.trials("P001").open(encoding="utf-8", newline="") as file:
+        own = list(csv.DictReader(file, strict=True))
+    exported = rows(to, "trials")
+    assert [{name: row[name] for name in header(TRIALS)} for row in exported] == own
+    assert unguarded(own[0]["notes"]).startswith("=1+1")
+    assert exported[0]["force_mean_n"] == "0.30000000000000004"
+    assert exported[0]["notes"] == "'" + '=1+1, "so"\nnew line π 😀'
+
+
+def test_what_earlier_versions_wrote_in_clear_is_not_handed_out_sealed(rek: Results, to: Path) -> None:
+    """Their tables have the columns that tell a condition: files that are handed out have them after unblinding."""
+    rek.add("P001", lambda *_: 6, changes={"force_mean_n": 4.8151623})
+    export(rek.folder, to, extras=("psych-ds", "wide"))
+    held = {path: path.read_text(encoding="utf-8") for path in to.rglob("*") if path.is_file()}
+    assert not [path for path, text in held.items() if "4.8151623" in text]
+    assert set(json.loads((to / "codebook.json").read_text())["sealed_columns"]) == SEALED
+    described = json.loads((to / "psych-ds" / "dataset_description.json").read_text())["variableMeasured"]
+    assert not SEALED & {one["name"] for one in described}
+    rek.open()
+    export(rek.folder, to)
+    assert {row["force_mean_n"] for row in rows(to, "trials")} == {"4.8151623"}
+
+
+def test_the_aggregate_counts_all_levels_and_what_is_missing(small: Results, to: Path) -> None:
+    small.add("A", lambda condition, item: {"smooth": 7, "warm": None}[item])
+    small.add("B", lambda condition, item: {"smooth": CANNOT_JUDGE, "warm": 4}[item])
+    export(small.folder, to)
+    found = rows(to, "aggregate", "small")
+    assert [(row["code"], row["item"]) for row in found] == [
+        (code, item) for code in ("L1", "L2") for item in ("smooth", "warm")
+    ]
+    smooth = found[0]
+    assert [smooth[f"count_{level}"] for level in range(1, 8)] == ["0", "0", "0", "0", "0", "0", "2"]
+    assert {
+        name: smooth[name] for name in ("n", "presented", "cannot_judge", "missing", "median", "agree_percent")
+    } == {
+        "n": "2",
+        "presented": "4",
+        "cannot_judge": "2",
+        "missing": "0",
+        "median": "7.0",
+        "agree_percent": "100.0",
+    }
+    assert found[1]["missing"] == "2"
+
+
+def test_of_a_repeated_trial_both_attempts_are_exported_and_one_counted(rek: Results, to: Path) -> None:
+    rek.add("P001", lambda *_: 6, repeated={"L3": lambda *_: 1})
+    export(rek.folder, to)
+    found = [row for row in rows(to, "responses") if row["code"] == "L3" and row["item"] == "immersive"]
+    assert [(row["attempt"], row["response"], row["counted"]) for row in found] == [
+        ("1", "1", "false"),
+        ("2", "6", "true"),
+    ]
+
+
+def test_what_is_excluded_is_exported_with_its_reason_and_not_counted(rek: Results, to: Path) -> None:
+    for participant in ("P001", "P002", "P003"):
+        rek.add(participant, lambda *_: 6)
+    trial = rek.trial("P002", "honey")
+    rek.exclude("P001", reason='the phone rang, "twice"\nand 🌊')
+    rek.exclude("P002", trial=trial, reason="spilled tea")
+    export(rek.folder, to)
+    for name in ("responses", "trials"):
+        found = rows(to, name)
+        assert {row["participant"] for row in found} == {"P001", "P002", "P003"}
+        for row in found:
+            excluded = row["participant"] == "P001" or (row["participant"], row["trial"]) == ("P002", str(trial))
+            reason = {"P001": 'the phone rang, "twice"\nand 🌊', "P002": "spilled tea"}.get(row["participant"], "")
+            assert (row["excluded"], row["exclusion_reason"]) == (("true", reason) if excluded else ("false", "n/a"))
+            assert row["counted"] == ("true" if row["phase"] == "main" and not excluded else "false")
+    honey = rek.code("honey", "liquids")
+    for row in rows(to, "aggregate"):
+        expected = ("1", "1", "1") if row["code"] == honey else ("2", "0", "2")
+        assert (row["n"], row["presented_excluded"], row["presented"]) == expected
+        assert row["missing"] == "0"
+    codebook = json.loads((to / "codebook.json").read_text())
+    assert (codebook["study"]["participants"], codebook["study"]["sessions"]) == (2, 3)
+    assert (codebook["study"]["sessions_excluded"], codebook["study"]["sessions_left_out"]) == (1, 0)
+    assert codebook["exclusions"][1] == {
+        "participant": "P002",
+        "session": 1,
+        "trial": trial,
+        "rule_or_person": "AB",
+        "reason": "spilled tea",
+        "excluded_at": "2026-01-06T10:00:00.000+01:00",
+    }
+
+
+def test_a_text_is_no_formula_in_a_spreadsheet_and_a_negative_number_a_number(rek: Results, to: Path) -> None:
+    rek.add("P001", lambda *_: 6)
+    rek.exclude("P001", reason="=1+1")
+    export(rek.folder, to)
+    found = rows(to, "trials")
+    assert {row["exclusion_reason"] for row in found} == {"'=1+1"}
+    assert {unguarded(row["exclusion_reason"]) for row in found} == {"=1+1"}
+    frame = pd.DataFrame({"text": ["-1"], "number": [-1.5]})
+    columns = (Column("text", "text", ""), Column("number", "number", ""))
+    assert table_bytes(Delivered("numbers", columns, frame)) == b"text,number\n'-1,-1.5\n"
+
+
+def test_nothing_hidden_is_in_any_blinded_file(small: Results, to: Path) -> None:
+    small.add("A", lambda *_: 3)
+    for path in export(small.folder, to):
+        content = path.read_text().lower()
+        for word in HIDDEN:
+            assert word not in content, path.name
+    codebook = json.loads((to / "codebook.json").read_text())
+    assert codebook["blinded"] is True
+    assert codebook["key_opened"] == []
+
+
+def test_opened_rows_say_condition_liquid_and_delay_asked_for_and_achieved(rek: Results, to: Path) -> None:
+    rek.add("P001", lambda *_: 6)
+    rek.open()
+    export(rek.folder, to)
+    for name in ("responses", "trials"):
+        for row in rows(to, name):
+            condition = rek.key.condition(row["block"], row["code"])
+            assert row["condition"] == condition
+            requested = float(condition.removeprefix("delay_")) if condition.startswith("delay_") else 0.0
+            assert float(row["delay_ms"]) == requested
+            assert float(row["delay_achieved_ms"]) == requested + DELAY_ERROR_MS
+            assert row["liquid"] == {"honey": "honey", "light_oil": "light_oil", "practice": "syrup"}.get(
+                condition, "water"
+            )
+    aggregate = rows(to, "aggregate")
+    assert [row["condition"] for row in aggregate[::9][:3]] == ["water", "honey", "light_oil"]
+    assert [float(row["delay_ms"]) for row in aggregate[27::5]] == [0, 50, 75, 100, 125, 150, 200]
+    assert json.loads((to / "codebook.json").read_text())["key_opened"][0]["by"] == "AB"
+
+
+def test_a_delay_that_was_not_measured_is_not_claimed(rek: Results, to: Path) -> None:
+    rek.add("P001", lambda *_: 6, changes={"delay_error_mean_ms": None})
+    rek.open()
+    export(rek.folder, to)
+    assert {row["delay_achieved_ms"] for row in rows(to, "responses")} == {"n/a"}
+
+
+@pytest.mark.parametrize("opened", [False, True])
+def test_the_codebook_describes_every_column_of_every_file(rek: Results, to: Path, opened: bool) -> None:
+    rek.add("P001", lambda *_: 6)
+    if opened:
+        rek.open()
+    export(rek.folder, to)
+    codebook = json.loads((to / "codebook.json").read_text())
+    for name in ("responses", "trials", "aggregate"):
+        described = codebook["files"][f"study-rek2024_description-{name}_data.csv"]
+        assert [column["name"] for column in described] == list(rows(to, name)[0])
+        assert all(column["description"] and column["type"] for column in described)
+    liquids = codebook["blocks"][0]
+    assert liquids["items"][0]["text"] == "I think this feels like interacting with a liquid."
+    assert liquids["levels"]["7"] == "Completely agree"
+
+
+def test_the_same_results_give_the_same_bytes(rek: Results, to: Path, tmp_path: Path) -> None:
+    rek.add("P001", lambda *_: 6)
+    first = [path.read_bytes() for path in export(rek.folder, to)]
+    assert [path.read_bytes() for path in export(rek.folder, tmp_path / "again")] == first
+
+
+def test_an_export_replaces_the_one_before_it_and_leaves_other_files(rek: Results, to: Path) -> None:
+    rek.add("P001", lambda *_: 6)
+    export(rek.folder, to)
+    (to / "mine.txt").write_text("kept")
+    rek.add("P002", lambda *_: 6)
+    export(rek.folder, to)
+    assert len(rows(to, "responses")) == 124
+    assert (to / "mine.txt").read_text() == "kept"
+
+
+def test_results_without_a_completed_session_are_exported_and_count_nothing(rek: Results, to: Path) -> None:
+    rek.add("P001", lambda *_: 6, status="unfinished", trials=2)
+    export(rek.folder, to)
+    assert len(rows(to, "responses")) == 9
+    assert {row["n"] for row in rows(to, "aggregate")} == {"0"}
+    assert {row["median"] for row in rows(to, "aggregate")} == {"n/a"}
+
+
+def test_a_broken_folder_leaves_no_export(rek: Results, to: Path) -> None:
+    rek.add("P001", lambda *_: 6)
+    rek.responses("P001").write_text("x")
+    with pytest.raises(AnalysisError):
+        export(rek.folder, to)
+    assert not to.exists()
+
+
+def test_a_file_in_the_place_of_the_folder_is_refused(rek: Results, tmp_path: Path) -> None:
+    rek.add("P001", lambda *_: 6)
+    (tmp_path / "taken").write_text("x")
+    with pytest.raises(AnalysisError, match=r"taken cannot be written .*--to"):
+        export(rek.folder, tmp_path / "taken")
+    assert (tmp_path / "taken").read_text() == "x"
+
+
+def test_halves_of_a_killed_export_go_with_the_next_one(rek: Results, to: Path) -> None:
+    rek.add("P001", lambda *_: 6)
+    to.mkdir(parents=True)
+    half = to / ".codebook.json.0123abcd.tmp"
+    half.touch()
+    os.utime(half, (0, 0))
+    export(rek.folder, to)
+    assert {path.name for path in to.iterdir()} == NAMES
+
+
+def test_where_one_file_cannot_be_written_the_others_stay_as_they_were(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("old")
+    with pytest.raises(AnalysisError, match="cannot be written"):
+        write_files(tmp_path, {"a.csv": b"new", "x" * 300: b"too long a name"})
+    assert [path.name for path in tmp_path.iterdir()] == ["a.csv"]
+    assert (tmp_path / "a.csv").read_text() == "old"
+    with pytest.raises(AnalysisError):
+        write_files(tmp_path / "made", {"x" * 300: b""})
+    assert not (tmp_path / "made").exists()

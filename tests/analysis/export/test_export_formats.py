@@ -1,0 +1,277 @@
+"""Exports for other programs: what is written comes back, with every trap that such formats have."""
+
+from __future__ import annotations
+
+import csv
+import importlib
+import io
+import types
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from click.testing import CliRunner
+from pyarrow import parquet
+
+from study_app.analysis.export import spss
+from study_app.analysis.export.export import Extra, export
+from study_app.analysis.export.psychds_dataset import FOLDER
+from study_app.analysis.export.spss import CANNOT_JUDGE, NOT_ANSWERED, names_of
+from study_app.cli import commands
+from study_app.errors import AnalysisError
+from study_app.protocol.load import parse
+from study_app.store.verification.psychds import validate
+from tests.analysis.conftest import HIDDEN, SMALL, Results, make_results
+
+pyreadstat = pytest.importorskip("pyreadstat", reason="the extra spss is not installed")
+
+NOTE = '=1+1, "so" — naïve 😀\nnew line'
+ALL: tuple[Extra, ...] = ("wide", "parquet", "sav", "psych-ds")
+
+
+@pytest.fixture
+def to(tmp_path: Path) -> Path:
+    return tmp_path / "out"
+
+
+def table(to: Path, study: str, name: str, ending: str) -> Path:
+    return to / f"study-{study}_description-{name}_data.{ending}"
+
+
+def cells(path: Path) -> list[dict[str, str]]:
+    return list(csv.DictReader(io.StringIO(path.read_text(encoding="utf-8")), strict=True))
+
+
+def sav(path: Path, *, missing: bool = False) -> tuple[pd.DataFrame, Any]:
+    found: tuple[pd.DataFrame, Any] = pyreadstat.read_sav(str(path), user_missing=missing)
+    return found
+
+
+def half_answered(small: Results) -> Results:
+    """Fill the small study with an answer of every kind: given, off the scale, not given, in every setting twice."""
+    small.add("A", lambda condition, item: {"smooth": 7, "warm": None}[item], changes={"notes": NOTE})
+    small.add("B", lambda condition, item: {"smooth": "cannot judge", "warm": 4}[item], changes={"notes": None})
+    small.add("C", lambda condition, item: 3 if condition == "heavyzembla" else 6)
+    return small
+
+
+def test_without_being_asked_nothing_else_is_written(rek: Results, to: Path) -> None:
+    rek.add("P001", lambda *_: 6)
+    assert {path.suffix for path in export(rek.folder, to)} == {".csv", ".json"}
+
+
+def test_wide_has_a_row_a_participant_and_a_column_an_item_and_setting(small: Results, to: Path) -> None:
+    export(half_answered(small).folder, to, extras=["wide"])
+    rows = cells(table(to, "small", "wide", "csv"))
+    assert list(rows[0]) == [
+        "participant",
+        "simulated",
+        *(f"{item}__{code}" for code in ("L1", "L2") for item in ("smooth", "warm")),
+    ]
+    assert [row["participant"] for row in rows] == ["A", "B", "C"]
+    assert [row["smooth__L1"] for row in rows[:2]] == ["7", "n/a"]
+    assert [row["warm__L1"] for row in rows[:2]] == ["n/a", "4"]
+    assert rows[2][f"smooth__{small.code('heavyzembla', 'feel')}"] == "3"
+    small.open()
+    export(small.folder, to, extras=["wide"])
+    assert {"smooth__heavyzembla", "warm__lightquorn"} < set(cells(table(to, "small", "wide", "csv"))[0])
+
+
+def test_wide_gives_the_median_of_repetitions_and_leaves_out_what_does_not_count(small: Results, to: Path) -> None:
+    answers = iter([1, 1, 2, 2, 4, 4, 5, 5] + [7] * 99)
+    small.add("A", lambda *_: next(answers))
+    small.add("B", lambda *_: 7, status="withdrawn")
+    export(small.folder, to, extras=["wide"])
+    (row,) = cells(table(to, "small", "wide", "csv"))
+    long = cells(table(to, "small", "responses", "csv"))
+    for code in ("L1", "L2"):
+        own = [
+            int(one["response"]) for one in long if (one["code"], one["item"], one["counted"]) == (code, "warm", "true")
+        ]
+        assert float(row[f"warm__{code}"]) == np.median(own)
+
+
+def test_blocks_that_ask_the_same_keep_their_columns_apart(tmp_path: Path, to: Path) -> None:
+    twice = SMALL.replace('sequence = ["try", "feel"]', 'sequence = ["try", "feel", "again"]') + SMALL[
+        SMALL.index("[blocks.feel]") :
+    ].replace("[blocks.feel]", "[blocks.again]").replace("part = 1", "part = 2").replace('"L"', '"M"')
+    results = make_results(tmp_path / "small", parse(twice.encode(), "small.toml"))
+    results.add("A", lambda *_: 5)
+    results.open()
+    export(results.folder, to, extras=["wide"])
+    names = list(cells(table(to, "small", "wide", "csv"))[0])[2:]
+    assert "feel__smooth__heavyzembla" in names
+    assert "again__smooth__heavyzembla" in names
+    assert len(set(names)) == 8
+
+
+def test_parquet_keeps_whole_numbers_flags_and_texts_where_some_are_missing(small: Results, to: Path) -> None:
+    export(half_answered(small).folder, to, extras=["parquet", "wide"])
+    for name in ("responses", "trials", "aggregate", "wide"):
+        held = pd.read_parquet(table(to, "small", name, "parquet"), dtype_backend="numpy_nullable")
+        rows = cells(table(to, "small", name, "csv"))
+        assert list(held) == list(rows[0])
+        assert len(held) == len(rows)
+    responses = pd.read_parquet(table(to, "small", "responses", "parquet"), dtype_backend="numpy_nullable")
+    assert str(responses["response"].dtype) == "Int8"
+    assert str(responses["cannot_judge"].dtype) == "boolean"
+    written = [row["response"] for row in cells(table(to, "small", "responses", "csv"))]
+    assert ["n/a" if pd.isna(value) else str(value) for value in responses["response"]] == written
+    trials = pd.read_parquet(table(to, "small", "trials", "parquet"), dtype_backend="numpy_nullable")
+    assert set(trials.loc[trials["participant"] == "A", "notes"]) == {NOTE}
+    assert trials.loc[trials["participant"] == "B", "notes"].isna().all()
+    field = parquet.read_schema(table(to, "small", "responses", "parquet")).field("onset_s")
+    assert field.metadata == {b"description": b"When the statement was shown, on the session's clock.", b"unit": b"s"}
+
+
+def test_sav_has_labels_levels_measures_and_codes_of_missing_answers(small: Results, to: Path) -> None:
+    export(half_answered(small).folder, to, extras=["sav"])
+    path = table(to, "small", "responses", "sav")
+    plain, about = sav(path)
+    rows = cells(table(to, "small", "responses", "csv"))
+    expected = [None if row["response"] == "n/a" else float(row["response"]) for row in rows]
+    assert [None if np.isnan(value) else value for value in plain["response"]] == expected
+    coded, coded_about = sav(path, missing=True)
+    codes = [
+        float(row["response"])
+        if row["response"] != "n/a"
+        else float(CANNOT_JUDGE if row["cannot_judge"] == "true" else NOT_ANSWERED)
+        for row in rows
+    ]
+    assert coded["response"].tolist() == codes
+    assert {CANNOT_JUDGE, NOT_ANSWERED} < set(codes)
+    assert [one["lo"] for one in coded_about.missing_ranges["response"]] == [CANNOT_JUDGE, NOT_ANSWERED]
+    levels = about.variable_value_labels["response"]
+    assert (levels[1], levels[7], levels[98], levels[99]) == ("a", "g", "Cannot judge", "No answer")
+    assert about.variable_measure["response"] == "ordinal"
+    assert about.variable_measure["item"] == "nominal"
+    assert about.column_names_to_labels["onset_s"] == "When the statement was shown, on the session's clock. [s]"
+    assert about.file_label == "A small study (small 2)"
+    assert about.file_encoding == "UTF-8"
+
+
+def test_whole_numbers_are_shown_whole_in_sav_and_missing_ones_are_spss_own(small: Results, to: Path) -> None:
+    small.add("A", lambda *_: 5)
+    path = small.responses("A")
+    path.write_text(path.read_text(encoding="utf-8").replace(",practice,1,", ",practice,n/a,"), encoding="utf-8")
+    export(small.folder, to, extras=["sav"])
+    found, about = sav(table(to, "small", "responses", "sav"), missing=True)
+    parts = [row["part"] for row in cells(table(to, "small", "responses", "csv"))]
+    assert "n/a" in parts
+    assert ["n/a" if np.isnan(value) else f"{value:.0f}" for value in found["part"]] == parts
+    assert about.original_variable_types["part"] == "F2.0"
+    assert about.variable_value_labels["cannot_judge"] == {0.0: "false", 1.0: "true"}
+
+
+def test_texts_of_any_script_and_length_survive_in_sav(small: Results, to: Path) -> None:
+    long = "πρόβλημα 😀 " * 900  # over 255 bytes, where SPSS begins to cut texts into pieces; ends in a space
+    small.add("A", lambda *_: 5)
+    small.exclude("A", trial=1, reason=long.strip())
+    small.exclude("A", trial=2, reason="kürzer")
+    export(small.folder, to, extras=["sav"])
+    found, _ = sav(table(to, "small", "responses", "sav"))
+    assert set(found["exclusion_reason"]) == {long.strip(), "kürzer", ""}
+    assert set(found["participant"]) == {"A"}
+
+
+def test_a_text_that_sav_cannot_hold_is_cut_at_a_letter(small: Results, to: Path) -> None:
+    small.add("A", lambda *_: 5)
+    small.exclude("A", reason="é" * 20_000)
+    export(small.folder, to, extras=["sav"])
+    found, _ = sav(table(to, "small", "responses", "sav"))
+    (reason,) = set(found["exclusion_reason"])
+    assert reason == "é" * 16_382 + "…"
+
+
+def test_wide_sav_labels_every_answer_by_its_own_scale_and_tells_why_one_is_missing(small: Results, to: Path) -> None:
+    half_answered(small).open()
+    export(small.folder, to, extras=["sav"])
+    assert not table(to, "small", "wide", "csv").exists()
+    found, about = sav(table(to, "small", "wide", "sav"), missing=True)
+    assert found.set_index("participant").loc["B"].tolist()[1:] == [CANNOT_JUDGE, 4, CANNOT_JUDGE, 4]
+    assert found.set_index("participant").loc["A"].tolist()[1:] == [7, NOT_ANSWERED, 7, NOT_ANSWERED]
+    assert about.variable_value_labels["smooth__heavyzembla"][7] == "g"
+    assert "It feels warm. About Zembla" in about.column_names_to_labels["warm__heavyzembla"]
+
+
+def test_names_are_ones_that_spss_takes_and_stay_apart() -> None:
+    long = "item" * 20
+    names = names_of(["to", "With", "1st", "ends_", "é", "Same", "same", f"{long}a", f"{long}b"])
+    assert names["to"] == "v_to"
+    assert names["1st"] == "v_1st"
+    assert names["ends_"] == "ends"
+    assert len({name.upper() for name in names.values()}) == len(names)
+    assert all(len(name.encode()) <= 64 and name[0].isalpha() for name in names.values())
+
+
+def test_without_its_library_sav_is_refused_in_one_line_before_anything_is_read(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    def missing(name: str) -> types.ModuleType:
+        if name == "pyreadstat":
+            raise ModuleNotFoundError(name)
+        return importlib.import_module(name)
+
+    monkeypatch.setattr(spss.importlib, "import_module", missing)
+    with pytest.raises(AnalysisError, match=r"--sav needs the package 'pyreadstat'.*pip install pyreadstat"):
+        export(tmp_path / "nothing", tmp_path / "out", extras=["sav"])
+
+
+@pytest.mark.parametrize("opened", [False, True])
+def test_the_psych_ds_folder_keeps_the_rules(small: Results, to: Path, opened: bool) -> None:
+    half_answered(small)
+    if opened:
+        small.open()
+    export(small.folder, to, extras=["psych-ds"])
+    assert validate(to / FOLDER).errors == ()
+    responses = to / FOLDER / "data" / table(to, "small", "responses", "csv").name
+    assert responses.read_bytes() == table(to, "small", "responses", "csv").read_bytes()
+    assert b"All participants are simulated" in (to / FOLDER / "README.md").read_bytes()
+    responses.write_text(responses.read_text(encoding="utf-8").replace("study,", "renamed,", 1), encoding="utf-8")
+    assert "CSV_COLUMN_MISSING_FROM_METADATA" in {issue.code for issue in validate(to / FOLDER).errors}
+
+
+def test_nothing_hidden_is_in_any_format_while_the_key_is_sealed(small: Results, to: Path) -> None:
+    half_answered(small)
+    written = export(small.folder, to, extras=ALL)
+    assert len(written) == len(set(written)) == len([path for path in to.rglob("*") if path.is_file()])
+    for path in written:
+        content = path.read_bytes().lower()
+        if path.suffix == ".parquet":
+            content = str(pd.read_parquet(path).to_dict()).lower().encode()
+        for word in HIDDEN:
+            assert word.encode() not in content, path.name
+
+
+def test_the_same_results_give_the_same_tables_again(small: Results, to: Path, tmp_path: Path) -> None:
+    half_answered(small)
+    first, again = (export(small.folder, folder, extras=ALL) for folder in (to, tmp_path / "again"))
+    for one, other in zip(first, again, strict=True):
+        if one.suffix != ".sav":  # holds the time of its making
+            assert one.read_bytes() == other.read_bytes(), one.name
+
+
+def test_a_study_without_anybody_who_counts_is_exported_too(small: Results, to: Path) -> None:
+    small.add("A", lambda *_: 5, status="unfinished", trials=2)
+    export(small.folder, to, extras=ALL)
+    assert cells(table(to, "small", "wide", "csv")) == []
+    assert len(sav(table(to, "small", "wide", "sav"))[0]) == 0
+
+
+def test_the_command_takes_every_format(small: Results, to: Path) -> None:
+    half_answered(small)
+    asked = ["export", str(small.folder), "--to", str(to), "--wide", "--parquet", "--sav", "--psych-ds"]
+    result = CliRunner().invoke(commands, asked)
+    assert result.exit_code == 0, result.output
+    assert {path.suffix for path in to.iterdir()} == {".csv", ".json", ".parquet", ".sav", ""}
+
+
+def test_a_folder_that_cannot_be_written_leaves_nothing_of_any_format(small: Results, to: Path) -> None:
+    half_answered(small)
+    to.mkdir()
+    (to / FOLDER).write_text("in the way")
+    with pytest.raises(AnalysisError, match="cannot be written"):
+        export(small.folder, to, extras=["psych-ds"])
+    assert [path.name for path in to.iterdir()] == [FOLDER]

@@ -1,0 +1,411 @@
+import logging
+import re
+import subprocess
+import sys
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+
+from study_app.analysis import style
+from study_app.analysis.figures import answer_figures, captions, diverging_bars
+from study_app.analysis.tables.study import load_study
+from study_app.errors import AnalysisError
+from tests.analysis.conftest import CANNOT_JUDGE, HIDDEN, Answer, Results, twelve
+
+
+def words(figure: Figure) -> list[str]:
+    return [text.get_text() for text in shown(figure)]
+
+
+def shown(figure: Figure) -> list[Text]:
+    return [text for text in figure.findobj(Text) if text.get_text().strip() and text.get_visible()]
+
+
+def panel(figure: Figure, name: str) -> Axes:
+    return next(axes for axes in figure.axes if axes.get_label() == name)
+
+
+def segments(axes: Axes, row: int) -> dict[int, tuple[float, float, str]]:
+    """Level → left edge, width, colour of the bars of a row (from 1)."""
+    found = {}
+    for patch in axes.patches:
+        match = re.fullmatch(rf".*-row{row}-level(\d)", patch.get_gid() or "")
+        if match:
+            found[int(match[1])] = (patch.get_x(), patch.get_width(), to_hex(patch.get_facecolor()))
+    return found
+
+
+def gids(axes: Axes, ending: str) -> list:
+    return [artist for artist in axes.get_children() if re.fullmatch(rf".*-{ending}", artist.get_gid() or "")]
+
+
+def by_person(results: Results, levels: list[int]) -> None:
+    for number, level in enumerate(levels, start=1):
+        results.add(f"P{number:03d}", lambda condition, item, level=level: level)
+
+
+def test_disagreement_ends_and_agreement_begins_at_the_line_and_neutral_stands_apart(rek: Results) -> None:
+    by_person(rek, [1, 2, 2, 3, 4, 4, 5, 6, 6, 6, 7])
+    axes = panel(answer_figures.liquids(load_study(rek.folder)), "L1")
+    found = segments(axes, 1)
+    assert {level: width for level, (_, width, _) in found.items()} == {1: 1, 2: 2, 3: 1, 4: 2, 5: 1, 6: 3, 7: 1}
+    assert [found[level][0] for level in (1, 2, 3)] == [-4, -3, -1]
+    assert [found[level][0] for level in (5, 6, 7)] == [0, 1, 4]
+    assert found[4][0] > 5
+    assert {level: colour for level, (_, _, colour) in found.items()} == dict(
+        zip(range(1, 8), style.LEVEL_COLOURS, strict=True)
+    )
+
+
+def test_levels_that_never_occur_are_not_drawn_and_do_not_shift_colours(rek: Results) -> None:
+    by_person(rek, [4, 5, 6, 7])
+    found = segments(panel(answer_figures.liquids(load_study(rek.folder)), "L2"), 9)
+    assert sorted(found) == [4, 5, 6, 7]
+    assert [found[level][2] for level in (4, 5, 6, 7)] == list(style.LEVEL_COLOURS[3:])
+
+
+def test_counts_stand_in_the_segments_in_a_colour_that_can_be_read(rek: Results) -> None:
+    by_person(rek, [1, 1, 5])
+    axes = panel(answer_figures.liquids(load_study(rek.folder)), "L1")
+    first = [text for text in axes.texts if text.get_position()[1] == 0]
+    assert [(text.get_text(), text.get_color()) for text in first] == [("2", "#ffffff"), ("1", "#000000")]
+    assert [text.get_position()[0] for text in first] == [-1, 0.5]
+
+
+def test_rows_follow_the_questionnaire_and_use_the_short_texts(rek: Results) -> None:
+    by_person(rek, [4])
+    figure = answer_figures.liquids(load_study(rek.folder))
+    items = [item.short for item in load_study(rek.folder).blocks[0].items]
+    height = {text.get_text(): text.get_position()[1] for text in shown(figure)}
+    assert [height[item] for item in items] == sorted((height[item] for item in items), reverse=True)
+
+
+def test_blinded_panels_are_titled_by_code_and_opened_ones_by_name(rek: Results) -> None:
+    by_person(rek, [4, 5])
+    blinded = words(answer_figures.liquids(load_study(rek.folder)))
+    assert [word for word in blinded if word in ("L1", "L2", "L3", "Water", "Honey", "Light oil")] == ["L1", "L2", "L3"]
+    assert "Blinded: by code" in blinded
+    rek.open()
+    opened = words(answer_figures.liquids(load_study(rek.folder)))
+    assert [word for word in opened if word in ("L1", "L2", "L3", "Water", "Honey", "Light oil")] == [
+        "Water",
+        "Honey",
+        "Light oil",
+    ]
+    assert "Blinded: by code" not in opened
+
+
+@pytest.mark.parametrize("draw", [answer_figures.liquids, answer_figures.delays])
+def test_simulated_participants_are_called_so_in_the_heading_and_real_ones_are_not(
+    rek: Results, small: Results, draw, tmp_path: Path
+) -> None:
+    by_person(rek, [4])
+    assert "SIMULATED participants" in words(draw(load_study(rek.folder)))
+
+
+def test_real_participants_are_not_called_simulated(real: Results) -> None:
+    by_person(real, [4])
+    for draw in (answer_figures.liquids, answer_figures.delays):
+        assert not any("SIMULATED" in word for word in words(draw(load_study(real.folder))))
+
+
+def test_n_is_on_the_figure(rek: Results) -> None:
+    by_person(rek, [4, 5, 6])
+    for draw in (answer_figures.liquids, answer_figures.delays):
+        assert any(word.startswith("n = 3 participants") for word in words(draw(load_study(rek.folder))))
+
+
+def test_one_participant_is_one_participant(rek: Results) -> None:
+    by_person(rek, [6])
+    study = load_study(rek.folder)
+    assert "n = 1 participant" in words(answer_figures.liquids(study))
+    assert "n = 1 participant" in words(answer_figures.delays(study))
+
+
+def test_a_row_with_missing_answers_tells_its_own_n(small: Results) -> None:
+    small.add("A", lambda condition, item: 3 if item == "smooth" else CANNOT_JUDGE)
+    small.add("B", lambda condition, item: 5)
+    study = load_study(small.folder)
+    figure = answer_figures.liquids(study)
+    assert words(figure).count("n 2") == 2
+    assert "n = 2 participants, 4 missing" in words(figure)
+    told = captions.caption(study, study.blocks[0])
+    assert "n = 2 participants, 4 presentations of a setting, 4 of 16 ratings missing" in told
+    assert "Cannot judge: 4; not answered: 0." in told
+
+
+def test_delays_lie_on_a_true_scale_with_a_line_per_participant_and_the_median(rek: Results) -> None:
+    levels = {0: 1, 50: 2, 75: 2, 100: 3, 125: 5, 150: 6, 200: 7}
+
+    def answer(shift: int):
+        def given(condition: str, item: str) -> Answer:
+            delay = int(condition.removeprefix("delay_")) if condition.startswith("delay_") else 0
+            return min(7, levels[delay] + shift)
+
+        return given
+
+    for number, shift in enumerate((0, 0, 1), start=1):
+        rek.add(f"P{number}", answer(shift))
+    rek.open()
+    axes = panel(answer_figures.delays(load_study(rek.folder)), "item1")
+    lines = gids(axes, r"participant\d+")
+    assert len(lines) == 3
+    for line in lines:
+        assert list(line.get_xdata()) == list(levels)
+    assert np.abs(lines[0].get_ydata() - list(levels.values())).max() < 0.2
+    (median,) = gids(axes, "median")
+    assert list(median.get_xdata()) == list(levels)
+    assert list(median.get_ydata()) == list(levels.values())
+    (band,) = gids(axes, "quartiles")
+    corners = {tuple(corner) for path in band.get_paths() for corner in path.vertices.tolist()}
+    assert {(0.0, 1.0), (0.0, 1.5), (125.0, 5.0), (125.0, 5.5), (200.0, 7.0)} <= corners
+    labels = [label.get_text() for label in axes.get_xticklabels()]
+    assert labels == ["0", "50", "100", "150", "200"]
+    assert axes.transData.transform((100, 0))[0] - axes.transData.transform((0, 0))[0] == pytest.approx(
+        axes.transData.transform((200, 0))[0] - axes.transData.transform((100, 0))[0]
+    )
+
+
+def test_blinded_delays_are_dots_by_code_in_code_order_without_lines(rek: Results) -> None:
+    by_person(rek, [2, 2, 2, 5])
+    axes = panel(answer_figures.delays(load_study(rek.folder)), "item1")
+    codes = [f"D{number}" for number in range(1, 8)]
+    assert [label.get_text() for label in axes.get_xticklabels()] == codes
+    for place, code in enumerate(codes):
+        (dots,) = gids(axes, code)
+        assert dots.get_linestyle() == "None"
+        assert len(dots.get_xdata()) == 4
+        assert np.abs(np.asarray(dots.get_xdata()) - place).max() < 0.5
+        assert sorted(np.round(dots.get_ydata())) == [2, 2, 2, 5]
+    grid = [line for line in axes.lines if len(line.get_xdata()) == 2 and list(line.get_xdata()) == [0, 1]]
+    assert [
+        line for line in axes.lines if line not in grid and line.get_linestyle() != "None" and len(line.get_xdata()) > 1
+    ] == []
+
+
+def test_a_missing_answer_breaks_a_line_and_shows_in_n(rek: Results) -> None:
+    by_person(rek, [3, 4])
+    code = rek.code("delay_75", "delays")
+    path = rek.responses("P002")
+    lines = path.read_text().splitlines(keepends=True)
+    path.write_text("".join(line for line in lines if f",{code},harder," not in line))
+    rek.open()
+    axes = panel(answer_figures.delays(load_study(rek.folder)), "item2")
+    assert [np.isnan(line.get_ydata()).sum() for line in gids(axes, r"participant\d+")] == [0, 1]
+    assert "n 1–2" in [text.get_text() for text in axes.texts]
+
+
+@pytest.mark.parametrize("fonts", [style.screen_fonts(), style.PRINT_FONTS], ids=["screen", "print"])
+@pytest.mark.parametrize("opened", [False, True], ids=["blinded", "opened"])
+@pytest.mark.parametrize("people", [1, 30])
+def test_no_text_leaves_the_figure_or_touches_another(rek: Results, fonts, opened: bool, people: int) -> None:
+    twelve(rek, people=people)
+    if opened:
+        rek.open()
+    study = load_study(rek.folder)
+    for figure in (answer_figures.liquids(study, fonts=fonts), answer_figures.delays(study, fonts=fonts)):
+        figure.canvas.draw()  # tick labels have their places only then
+        boxes = [(text.get_text(), text.get_window_extent().padded(-1)) for text in shown(figure)]
+        width, height = figure.bbox.size
+        for word, box in boxes:
+            assert box.x0 >= 0, word
+            assert box.y0 >= 0, word
+            assert box.x1 <= width, word
+            assert box.y1 <= height, word
+        for (word, box), (other, beside) in combinations(boxes, 2):
+            assert not box.overlaps(beside), (word, other)
+        for text in figure.texts:
+            if not text.get_text().startswith("n "):
+                assert not any(text.get_window_extent().overlaps(axes.bbox) for axes in figure.axes), text.get_text()
+
+
+def test_labels_are_at_least_as_large_as_a_journal_asks(rek: Results) -> None:
+    by_person(rek, [4, 5])
+    for draw in (answer_figures.liquids, answer_figures.delays):
+        figure = draw(load_study(rek.folder))
+        assert min(text.get_fontsize() for text in shown(figure)) >= 5.5
+        assert figure.get_size_inches()[0] == pytest.approx(7.16)
+
+
+def test_the_legend_shortens_what_the_labels_share() -> None:
+    english = (
+        "Completely disagree,Mostly disagree,Somewhat disagree,Neutral,Somewhat agree,Mostly agree,Completely agree"
+    )
+    assert diverging_bars.legend_labels(english.split(",")) == [
+        "Completely disagree",
+        "Mostly",
+        "Somewhat",
+        "Neutral",
+        "Somewhat",
+        "Mostly",
+        "Completely agree",
+    ]
+    disagree = "Helemaal mee oneens,Grotendeels mee oneens,Enigszins mee oneens"
+    dutch = f"{disagree},Neutraal,Enigszins mee eens,Grotendeels mee eens,Helemaal mee eens"
+    assert diverging_bars.legend_labels(dutch.split(","))[1:6] == [
+        "Grotendeels",
+        "Enigszins",
+        "Neutraal",
+        "Enigszins",
+        "Grotendeels",
+    ]
+    assert diverging_bars.legend_labels(list("abcdefg")) == list("abcdefg")
+
+
+def test_many_settings_go_on_in_another_row(rek: Results) -> None:
+    by_person(rek, [2, 6])
+    study = load_study(rek.folder)
+    figure = answer_figures.liquids(study, study.blocks[1])
+    tops = [round(axes.get_position().y1, 3) for axes in figure.axes]
+    assert len(tops) == 7
+    assert len(set(tops)) == 3
+
+
+def test_plot_writes_both_figures_in_three_forms_with_captions(rek: Results, tmp_path: Path) -> None:
+    twelve(rek, people=3)
+    written = answer_figures.plot(rek.folder, tmp_path / "new" / "out")
+    assert sorted(path.name for path in written) == sorted(
+        f"{name}.{kind}" for name in ("liquids", "delays") for kind in ("png", "svg", "pdf", "txt")
+    )
+    assert all(path.stat().st_size > 200 for path in written)
+    caption = (tmp_path / "new" / "out" / "liquids.txt").read_text()
+    assert "nine statements on three settings" in caption
+    assert "SIMULATED" in caption
+    assert "n = 3 participants" in caption
+    assert {path.name for path in (tmp_path / "new" / "out").iterdir()} == {path.name for path in written}
+
+
+def test_captions_say_what_is_missing_left_out_and_beyond_limits(rek: Results, tmp_path: Path) -> None:
+    rek.add("P001", lambda *_: 6, changes={"valid": False})
+    rek.add("P002", lambda *_: 6, status="withdrawn", trials=3)
+    path = rek.responses("P001")
+    lines = path.read_text().splitlines(keepends=True)
+    path.write_text("".join(line for line in lines if ",immersive," not in line))
+    answer_figures.plot(rek.folder, tmp_path / "out")
+    caption = (tmp_path / "out" / "liquids.txt").read_text()
+    assert "not answered: 3" in caption
+    assert "1 session is left out" in caption
+    assert "3 of 3 trials exceeded the protocol's limits" in caption
+
+
+def test_captions_say_how_many_are_excluded_and_why(rek: Results) -> None:
+    for number in range(1, 6):
+        rek.add(f"P{number:03d}", lambda *_: 6)
+    rek.exclude("P001", reason="tired")
+    rek.exclude("P002", reason="held the\nwrong  handle, " + "very " * 40)
+    rek.exclude("P003", reason="tired")
+    rek.exclude("P004", trial=rek.trial("P004", "honey"), reason="the phone rang")
+    study = load_study(rek.folder)
+    liquids, delays = (captions.caption(study, block) for block in study.blocks)
+    for caption in (liquids, delays):
+        assert "3 sessions are excluded (2 × tired; 1 × held the wrong handle, very very" in caption
+        assert " v…)." in caption
+        assert "left out, not having been completed" not in caption
+    assert "1 trial is excluded, its answers missing here (the phone rang)." in liquids
+    assert "n = 1 to 2 of 2 participants in a setting" in liquids
+    assert "trial is excluded" not in delays
+    assert "n = 2 participants, every setting rated by all" in delays
+
+
+def test_of_many_reasons_a_caption_tells_the_most_frequent(rek: Results) -> None:
+    reasons = [*"abcdefg", "g"]
+    for number, reason in enumerate(reasons, start=1):
+        rek.add(f"P{number:03d}", lambda *_: 6)
+        rek.exclude(f"P{number:03d}", reason=reason)
+    rek.add("P009", lambda *_: 6)
+    study = load_study(rek.folder)
+    expected = "8 sessions are excluded (2 × g; 1 × a; 1 × b; 1 × c; 1 × d; 2 × other)."
+    assert expected in captions.caption(study, study.blocks[0])
+
+
+def test_an_excluded_session_is_in_no_figure(rek: Results) -> None:
+    by_person(rek, [1, 6, 7])
+    rek.exclude("P001")
+    study = load_study(rek.folder)
+    found = segments(panel(answer_figures.liquids(study), "L1"), 1)
+    assert {level: width for level, (_, width, _) in found.items()} == {6: 1, 7: 1}
+    (dots,) = gids(panel(answer_figures.delays(study), "item1"), "D1")
+    assert sorted(np.round(dots.get_ydata())) == [6, 7]
+
+
+def test_an_excluded_trial_is_an_empty_cell_and_shows_in_n(rek: Results) -> None:
+    by_person(rek, [3, 4])
+    rek.exclude("P002", trial=rek.trial("P002", "delay_75"))
+    rek.exclude("P002", trial=rek.trial("P002", "water"))
+    rek.open()
+    study = load_study(rek.folder)
+    axes = panel(answer_figures.delays(study), "item2")
+    assert [list(np.isnan(line.get_ydata())) for line in gids(axes, r"participant\d+")] == [
+        [False] * 7,
+        [delay == 75 for delay in (0, 50, 75, 100, 125, 150, 200)],
+    ]
+    assert "n 1–2" in [text.get_text() for text in axes.texts]
+    figure = answer_figures.liquids(study)
+    water = rek.code("water", "liquids")
+    assert sorted(segments(panel(figure, water), 1)) == [3]
+    assert words(figure).count("n 1") == len(study.blocks[0].items)
+
+
+def test_where_everybody_is_excluded_plot_says_so(rek: Results, tmp_path: Path) -> None:
+    by_person(rek, [4])
+    rek.exclude("P001")
+    with pytest.raises(AnalysisError, match="P001 session 1 excluded"):
+        answer_figures.plot(rek.folder, tmp_path / "out")
+
+
+def test_the_caption_of_opened_delays_says_how_late_they_really_were(rek: Results) -> None:
+    rek.add("P001", lambda *_: 4, changes={"delay_error_mean_ms": -2.25})
+    rek.add("P002", lambda *_: 4, changes={"delay_error_mean_ms": 4.25})
+    study = load_study(rek.folder)
+    assert "achieved" not in captions.caption(study, study.blocks[1])
+    rek.open()
+    study = load_study(rek.folder)
+    assert "by +1.0 ms on average (trials: −2.2 to +4.2 ms)" in captions.caption(study, study.blocks[1])
+
+
+def test_the_same_results_give_the_same_bytes_in_another_process_too(rek: Results, tmp_path: Path) -> None:
+    twelve(rek, people=2)
+    first = {path.name: path.read_bytes() for path in answer_figures.plot(rek.folder, tmp_path / "first")}
+    code = f"from study_app.analysis.figures.answer_figures import plot; plot({str(rek.folder)!r}, {str(tmp_path / 'second')!r})"
+    subprocess.run(
+        [sys.executable, "-W", "error", "-c", code], check=True, env={"PYTHONHASHSEED": "7", "HOME": str(tmp_path)}
+    )
+    assert {path.name: path.read_bytes() for path in (tmp_path / "second").iterdir()} == first
+
+
+def test_plotting_logs_nothing(rek: Results, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    by_person(rek, [4])
+    with caplog.at_level(logging.WARNING):
+        answer_figures.plot(rek.folder, tmp_path / "out")
+    assert caplog.records == []
+
+
+def test_nothing_hidden_is_in_any_blinded_file(small: Results, tmp_path: Path) -> None:
+    small.add("A", lambda *_: 3)
+    for path in answer_figures.plot(small.folder, tmp_path / "out"):
+        content = path.read_bytes().lower()
+        for word in HIDDEN:
+            assert word.encode() not in content, path.name
+    small.open()
+    answer_figures.plot(small.folder, tmp_path / "out")
+    assert b"Lightquorn" not in (tmp_path / "out" / "liquids.svg").read_bytes()
+    assert b">Quorn<" in (tmp_path / "out" / "liquids.svg").read_bytes()
+
+
+def test_without_a_completed_session_plot_says_so_and_writes_nothing(rek: Results, tmp_path: Path) -> None:
+    rek.add("P001", lambda *_: 4, status="unfinished", trials=3)
+    with pytest.raises(AnalysisError, match="P001 session 1 unfinished"):
+        answer_figures.plot(rek.folder, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_study_without_delays_says_so(small: Results) -> None:
+    small.add("A", lambda *_: 3)
+    with pytest.raises(AnalysisError, match="no part that compares delays"):
+        answer_figures.delays(load_study(small.folder))

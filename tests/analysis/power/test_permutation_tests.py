@@ -1,0 +1,110 @@
+"""The sweep's tests over many studies at once, against the report's one by one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
+
+from study_app.analysis.power import permutation_tests
+from study_app.analysis.statistics import multiple_comparisons
+from study_app.analysis.statistics.equivalence.tost import tost
+from study_app.analysis.statistics.exact_distributions import doubled_ranks
+from study_app.analysis.statistics.friedman import friedman
+from study_app.analysis.statistics.global_permutation import global_permutation
+from study_app.analysis.statistics.paired import paired
+from study_app.analysis.statistics.trend import page
+
+CLOSE = 5 * np.sqrt(0.25 / permutation_tests.DRAWS)
+"""Five standard errors of a drawn p, at most."""
+
+
+def answered(seed: int, shape: tuple[int, ...], rise: float = 0.0) -> np.ndarray:
+    """Answers (studies, participants, settings, items) that rise with the setting."""
+    rng = np.random.default_rng(seed)
+    points = 4 + rng.normal(size=shape) * 1.5 + rise * np.arange(shape[-2])[:, None]
+    return np.clip(np.round(points), 1, 7)
+
+
+def rng() -> np.random.Generator:
+    return np.random.default_rng(7)
+
+
+def test_ranks_are_doubled_mid_ranks() -> None:
+    answers = answered(1, (3, 6, 4, 5))
+    flat = answers.transpose(0, 1, 3, 2).reshape(-1, 4)
+    expected = doubled_ranks(flat).reshape(3, 6, 5, 4).transpose(0, 1, 3, 2)
+    assert np.array_equal(permutation_tests.ranks(answers), expected)
+
+
+@pytest.mark.parametrize(("n", "k"), [(5, 3), (9, 3), (6, 4)])
+def test_friedman_is_the_reports(n: int, k: int) -> None:
+    answers = answered(2, (20, n, k, 2), rise=0.5)
+    ps, of_all = permutation_tests.friedman(permutation_tests.ranks(answers), rng())
+    expected = [[friedman(study[:, :, item]).p for item in range(2)] for study in answers]
+    assert np.abs(ps - np.array(expected)).max() < CLOSE
+    together = [global_permutation(study.transpose(2, 0, 1)).p for study in answers]
+    assert np.abs(of_all - np.array(together)).max() < 2 * CLOSE  # that one is drawn, too
+
+
+@pytest.mark.parametrize("n", [5, 14])
+def test_page_is_the_reports(n: int) -> None:
+    answers = answered(3, (20, n, 7, 2), rise=0.15)
+    ps = permutation_tests.trend(permutation_tests.ranks(answers), rng())
+    expected = [[page(study[:, :, item], seed=None).p for item in range(2)] for study in answers]
+    assert np.abs(ps - np.array(expected)).max() < CLOSE
+
+
+def test_signed_ranks_are_the_reports() -> None:
+    answers = answered(4, (20, 9, 2, 3), rise=0.6)
+    ps = permutation_tests.signed(answers, rng())
+    expected = [[paired(study[:, 0, item], study[:, 1, item]).p or 1.0 for item in range(3)] for study in answers]
+    assert np.abs(ps - np.array(expected)).max() < CLOSE
+
+
+def test_where_everybody_answers_alike_nothing_is_found() -> None:
+    same = np.full((2, 11, 3, 2), 4.0)
+    ps, of_all = permutation_tests.friedman(permutation_tests.ranks(same), rng())
+    assert (ps == 1).all()
+    assert (of_all == 1).all()
+    assert (permutation_tests.trend(permutation_tests.ranks(same), rng()) == 1).all()
+    assert (permutation_tests.signed(same[:, :, :2], rng()) == 1).all()
+    assert permutation_tests.equivalent(same[:, :, 0] - same[:, :, 1], 1.0, 0.05, rng()).all()  # eleven zeros
+    assert not permutation_tests.equivalent((same[:, :, 0] - same[:, :, 1])[:, :10], 1.0, 0.05, rng()).any()
+
+
+@pytest.mark.parametrize(("n", "bound"), [(14, 1.5), (16, 1.5), (20, 1.5)])
+def test_equivalence_is_the_reports(n: int, bound: float) -> None:
+    answers = answered(5, (200, n, 2, 2), rise=0.4)
+    differences = answers[:, :, 1] - answers[:, :, 0]
+    found = permutation_tests.equivalent(differences, bound, 0.05, rng()).ravel()
+    by_t = 0
+    for one, shown in zip(differences.transpose(0, 2, 1).reshape(-1, n), found, strict=True):
+        whole = tost(one, bound)
+        by_t += whole.p is not None and whole.p <= 0.05
+        checks = [p for p in (whole.p_permutation, whole.p_ranks, whole.p_bootstrap) if p is not None]
+        if not any(abs(p - 0.05) < CLOSE for p in checks):  # near alpha the draws decide
+            assert shown == (whole.verdict == "equivalent")
+    assert 0 < found.sum() < len(found)
+    assert found.sum() < by_t or n == 20  # with few people t alone shows it more often than the report does
+
+
+@settings(deadline=None)
+@given(arrays.arrays(np.float64, (4, 6), elements=st.sampled_from([0.0005, 0.004, 0.009, 0.02, 0.049, 0.05, 0.3, 1.0])))
+def test_families_are_the_reports(ps: np.ndarray) -> None:
+    for alpha in (0.05, 0.1):
+        for ours, theirs in (
+            (permutation_tests.holm, multiple_comparisons.holm),
+            (permutation_tests.false_discovery, multiple_comparisons.false_discovery),
+        ):
+            expected = [[p is not None and p <= alpha + 1e-9 for p in theirs(family.tolist())] for family in ps]
+            assert ours(ps, alpha).tolist() == expected
+
+
+def test_false_alarms_are_as_rare_as_they_should_be() -> None:
+    answers = answered(6, (600, 8, 3, 4))
+    ps, of_all = permutation_tests.friedman(permutation_tests.ranks(answers), rng())
+    assert permutation_tests.holm(ps, 0.05).any(axis=1).mean() < 0.05 + 3 * np.sqrt(0.05 * 0.95 / 600)
+    assert abs((of_all <= 0.05).mean() - 0.05) < 3 * np.sqrt(0.05 * 0.95 / 600)

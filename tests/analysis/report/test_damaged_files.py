@@ -1,0 +1,140 @@
+"""Files that are not as they were recorded: an analysis goes on, and says so wherever it speaks."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from study_app.analysis.tables.study import load_study
+from study_app.cli import commands
+from study_app.store.folders import SessionFolder, StudyFolder
+from study_app.store.sessions.rebuild import rebuild
+from tests.analysis.test_sample import SAMPLE
+
+
+@pytest.fixture
+def copy(tmp_path: Path) -> StudyFolder:
+    """Three sessions of the sample."""
+    folder = Path(shutil.copytree(SAMPLE.path, tmp_path / "copy"))
+    for session in StudyFolder(folder).sessions()[3:]:
+        shutil.rmtree(session.path.parent)
+    return StudyFolder(folder)
+
+
+def told(folder: StudyFolder) -> list[str]:
+    return [str(doubt) for doubt in load_study(folder.path).doubts]
+
+
+def change(path: Path, old: bytes, new: bytes) -> None:
+    content = path.read_bytes()
+    assert old in content
+    path.write_bytes(content.replace(old, new, 1))
+
+
+def cut_last_line(path: Path) -> None:
+    path.write_bytes(b"".join(path.read_bytes().splitlines(keepends=True)[:-1]))
+
+
+def another_answer(session: SessionFolder) -> Path:
+    """Change the first answer of the table by hand."""
+    path = session.table("rek2024", "responses")
+    head, first, *rest = path.read_text(encoding="utf-8").split("\n")
+    cells = first.split(",")
+    place = head.split(",").index("response")
+    cells[place] = "1" if cells[place] != "1" else "2"
+    path.write_text("\n".join((head, ",".join(cells), *rest)), encoding="utf-8")
+    return path
+
+
+def test_what_nobody_touched_is_not_doubted(copy: StudyFolder) -> None:
+    assert told(copy) == []
+
+
+def test_a_table_changed_by_hand_is_named_with_what_mends_it(copy: StudyFolder) -> None:
+    session = copy.sessions()[1]
+    path = another_answer(session)
+    (line,) = told(copy)
+    assert line.startswith(f"{path} is not what the journal gives, from line 2 on: liquid-study rebuild {session.path}")
+    rebuild(session.path)
+    assert told(copy) == []
+
+
+def test_a_changed_journal_is_not_to_be_rebuilt_from(copy: StudyFolder) -> None:
+    session = copy.sessions()[0]
+    change(session.journal, b'"operator":"', b'"operator":"X')
+    (line,) = told(copy)
+    assert line.startswith(f"{session.journal} is damaged")
+    assert "restore it from a copy" in line
+    assert "rebuild" not in line
+
+
+@pytest.mark.parametrize(
+    ("harm", "says"),
+    [
+        (lambda session: session.journal.unlink(), "is missing, and nothing else proves the tables"),
+        (lambda session: change(session.journal, b"\n", b"garbage\n"), "is damaged (line 1"),
+        (lambda session: change(session.journal, b'"n":2,', b'"n":3,'), "is damaged (line 2"),
+        (lambda session: session.journal.write_bytes(b""), "has changed since the session ended"),
+        (lambda session: cut_last_line(session.journal), "has changed since the session ended"),
+        (lambda session: change(session.receipt, b'"version"', b'"version" '), "has changed since the session ended"),
+        (lambda session: session.checksums.unlink(), "is missing or no list of checksums"),
+    ],
+)
+def test_every_damage_behind_the_numbers_is_one_line(
+    copy: StudyFolder, harm: Callable[[SessionFolder], object], says: str
+) -> None:
+    harm(copy.sessions()[2])
+    (line,) = told(copy)
+    assert says in line
+    assert "liquid-study" in line
+
+
+@pytest.mark.parametrize("command", ["export", "plot"])
+def test_the_commands_go_on_and_say_so_in_a_line_and_beside_what_they_write(
+    copy: StudyFolder, tmp_path: Path, command: str
+) -> None:
+    path = another_answer(copy.sessions()[0])
+    finished = CliRunner().invoke(commands, [command, str(copy.path), "--to", str(tmp_path / "out")])
+    assert finished.exit_code == 0
+    (line,) = finished.stderr.splitlines()
+    assert line.startswith(f"warning: {path} is not what the journal gives")
+    name = path.relative_to(copy.path).as_posix()
+    if command == "export":
+        codebook = json.loads((tmp_path / "out" / "codebook.json").read_text(encoding="utf-8"))
+        assert codebook["doubts"] == [{"file": name, "what": "is not what the journal gives, from line 2 on"}]
+    else:
+        caption = (tmp_path / "out" / "liquids.txt").read_text(encoding="utf-8")
+        assert f"1 file is not as recorded, and used as found: {name}." in caption
+
+
+@pytest.mark.parametrize("command", ["export", "plot"])
+def test_the_commands_say_nothing_where_there_is_nothing_to_say(
+    copy: StudyFolder, tmp_path: Path, command: str
+) -> None:
+    finished = CliRunner().invoke(commands, [command, str(copy.path), "--to", str(tmp_path / "out")])
+    assert (finished.exit_code, finished.stderr) == (0, "")
+
+
+def test_one_file_that_was_changed_brings_all_of_its_session_under_suspicion(copy: StudyFolder) -> None:
+    """The other tables are then compared with the journal, and not only with their checksums."""
+    session = copy.sessions()[0]
+    table = another_answer(session)
+    name = table.name
+    listed = session.checksums.read_text(encoding="utf-8")
+    forged = hashlib.sha256(table.read_bytes()).hexdigest()
+    session.checksums.write_text(re.sub(rf"[0-9a-f]{{64}}  {name}", f"{forged}  {name}", listed), encoding="utf-8")
+    trials = session.table("rek2024", "trials")
+    change(trials, b",complete,", b",timeout,")
+    assert {line.split()[0] for line in told(copy)} == {str(trials), str(table)}
+
+
+def test_a_session_that_was_never_begun_stops_no_analysis(copy: StudyFolder, tmp_path: Path) -> None:
+    copy.session("P099", 1).path.mkdir(parents=True)
+    assert len(load_study(copy.path).participants) == 3

@@ -1,0 +1,260 @@
+"""The first page: three answers with direction, size and interval, pictures, limits, and how often it is wrong."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from study_app.analysis.evaluate import evaluate
+from study_app.analysis.findings.block_results import Named, Results
+from study_app.analysis.report.first_page.answer import Answer
+from study_app.analysis.report.first_page.answers_of_delays import common_ms
+from study_app.analysis.report.first_page.answers_of_liquids import given, recognised
+from study_app.analysis.report.first_page.claims import answers
+from study_app.analysis.report.first_page.page import first_page
+from study_app.analysis.report.measured import CLAIMS, STUDIES, empty_studies
+from study_app.analysis.report.section_failures import Failures
+from study_app.analysis.statistics.recognition import recognition
+from study_app.analysis.tables.planned_analysis import Decided
+from tests.analysis.made_up import DECIDED, ITEMS, delays, everybody, liquids, study
+
+DELAYS = (0.0, 50.0, 100.0, 150.0)
+
+
+NOTICED = {(0, "D3"), (1, "D3"), (2, "D3"), (3, "D2"), (3, "D3"), (0, "D2")}
+
+
+def of_delays(answer: object, people: int = 16) -> Results:
+    settings = delays(DELAYS)
+    return evaluate(study(settings, list(everybody(settings, people, answer))), planning=False)
+
+
+def rising(from_code: int) -> Results:
+    """Return a study in which one statement rises and the other falls by 4 points from a setting (D1 …) on."""
+    rng = np.random.default_rng(2)
+
+    def answer(_person: int, _session: int, code: str, item: str) -> int:
+        up = 4 * (int(code[1:]) >= from_code)
+        return int(np.clip((2 + up if item == ITEMS[0] else 6 - up) + rng.integers(-1, 2), 1, 7))
+
+    return of_delays(answer)
+
+
+def flat() -> Results:
+    return of_delays(lambda person, *_: 3 + person % 2)
+
+
+def named(results: Results, question: str) -> Answer:
+    return next(one for one in answers(results) if one.question == question)
+
+
+def test_a_delay_that_is_noticed_is_told_with_direction_size_and_interval() -> None:
+    found = named(rising(3), "noticed from")
+    assert found.claims
+    assert not found.exploratory
+    assert found.told.startswith("From 100 ms on at the latest")
+    assert any("“Different” from 100 ms on at the latest: +" in line and "[" in line for line in found.sizes)
+    assert any("“Harder” from 100 ms on at the latest: −" in line for line in found.sizes)
+    assert not any("p =" in line or "p <" in line for line in (found.told, *found.sizes))
+
+
+def test_up_to_which_delay_nothing_changes_needs_every_statement() -> None:
+    results = rising(3)
+    found = named(results, "unchanged up to")
+    assert common_ms(results.blocks[0]) == 50.0
+    assert found.told.startswith("Up to 50 ms: mean answers to both statements stay within ±1 point of those at 0 ms")
+    block = replace(results.blocks[0], equivalent_up_to={ITEMS[0]: 50.0, ITEMS[1]: None})
+    assert common_ms(block) is None
+    assert (
+        "For no delay is it shown in all statements" in named(replace(results, blocks=(block,)), "unchanged up to").told
+    )
+
+
+def test_where_nothing_is_shown_it_says_that_this_is_no_evidence() -> None:
+    found = named(flat(), "noticed from")
+    assert not found.claims
+    assert "No delay was shown to be noticed. That is not evidence" in found.told
+
+
+def test_liquids_are_recognised_by_name_and_the_wrong_name_is_told() -> None:
+    settings = liquids(3)
+
+    def answer(_person: int, _session: int, code: str, item: str) -> int:
+        """Everybody names the first liquid right, and the second and third as the first."""
+        return {("L1", ITEMS[0]): 7, ("L2", ITEMS[1]): 2, ("L3", ITEMS[1]): 2}.get((code, item), 4 + (item == ITEMS[0]))
+
+    right = study(
+        settings,
+        list(
+            everybody(
+                settings, 12, lambda p, s, code, item: 7 if (code, item) in {("L1", ITEMS[0]), ("L2", ITEMS[1])} else 2
+            )
+        ),
+    )
+    told = named(evaluate(right, planning=False), "distinguished")
+    assert told.claims
+    assert told.told == "Liquid1 and liquid2 were recognised above chance."
+    assert "liquid1 12 of 12 (74 to 100 %), 33 % by chance" in told.sizes[0]
+    wrong = named(evaluate(study(settings, list(everybody(settings, 12, answer))), planning=False), "distinguished")
+    assert "liquid2 was called liquid1 by 12 of 12" in wrong.told
+
+
+def test_decisions_that_came_later_are_marked_as_exploratory() -> None:
+    results = rising(3)
+    made = study(delays(DELAYS), list(everybody(delays(DELAYS), 12, lambda p, s, code, i: 1 + int(code[1:]))))
+    later = evaluate(replace(made, decided=replace(DECIDED, changed=True)), planning=False)
+    assert named(later, "noticed from").exploratory
+    assert "exploratory" in first_page(later, (), Failures())
+    assert "exploratory" not in first_page(results, (), Failures())
+
+
+def test_the_page_holds_pictures_limits_and_how_often_it_is_wrong() -> None:
+    failures = Failures()
+    page = first_page(rising(3), ("<nothing> beyond 150 ms",), failures)
+    assert failures.found == []
+    assert page.count('src="data:image/png;base64,') == 2
+    assert page.index("Up to which delay") < page.index("What this study cannot show")
+    assert "&lt;nothing&gt;" in page
+    assert "In how many of a hundred empty studies would this page say something?" in page
+
+
+def ordered(people: int, decided: Decided = DECIDED) -> Results:
+    """Return a study of three liquids that everybody puts in the same order in the second statement."""
+    settings = liquids(3)
+    trials = list(everybody(settings, people, lambda _p, _s, code, i: 2 * int(code[1:]) if i == ITEMS[1] else 4))
+    results = evaluate(study(settings, trials, decided), planning=False)
+    return replace(results, blocks=(replace(results.blocks[0], named=None),))
+
+
+def test_liquids_that_differ_are_told_where_too_few_people_can_show_no_pair() -> None:
+    told = named(ordered(5), "distinguished")
+    assert told.told == (
+        "The liquids were rated differently in “Harder”; which ones cannot be shown with five participants."
+    )
+    assert told.claims
+    assert not told.exploratory
+    assert any("“Harder”: Kendall's W 1.00" in line for line in told.sizes)
+    assert named(ordered(5, replace(DECIDED, primary=ITEMS[:1])), "distinguished").exploratory
+    results = ordered(7)
+    assert named(results, "distinguished").told.startswith("Rated differently: liquid1 – liquid2")
+    unclear = replace(
+        results.blocks[0],
+        pairs=tuple(replace(one, tested=replace(one.tested, verdict="not shown")) for one in results.blocks[0].pairs),
+    )
+    assert named(replace(results, blocks=(unclear,)), "distinguished").told == (
+        "The liquids were rated differently in “Harder”; which ones is not shown."
+    )
+
+
+def test_pairs_that_only_exploratory_statements_tell_apart_are_marked() -> None:
+    results = ordered(8)
+    block = results.blocks[0]
+    first = replace(block.pairs[0], tested=replace(block.pairs[0].tested, verdict="suggested"))
+    marked = named(replace(results, blocks=(replace(block, pairs=(first, *block.pairs[1:])),)), "distinguished")
+    assert marked.told.startswith("Rated differently: liquid1 – liquid2 (exploratory), liquid1 – liquid3 and")
+    assert not marked.exploratory
+    assert "exploratory" not in named(results, "distinguished").told
+
+
+def test_the_headline_is_of_primary_statements_and_exploratory_ones_follow_it_marked() -> None:
+    """The primary statement changes from 150 ms on, the exploratory one from 50 ms on."""
+    settings = delays(DELAYS)
+    high = {("D4", "harder"), ("D2", "different"), ("D3", "different"), ("D4", "different")}
+    noise = np.random.default_rng(1).integers(0, 2, (16, 4, 2))
+
+    def answer(person: int, _session: int, code: str, item: str) -> int:
+        up = 4 * ((code, item) in high)
+        wobble = int(noise[person, int(code[1:]) - 1, ITEMS.index(item)])
+        return (6 - up if item == "harder" else 1 + up) + wobble
+
+    made = study(settings, list(everybody(settings, 16, answer)), replace(DECIDED, primary=ITEMS[1:]))
+    results = evaluate(made, planning=False)
+    found = named(results, "noticed from")
+    assert found.told == (
+        "From 150 ms on at the latest: “Harder” changes with the delay up to there. Shorter delays may be noticed too. "
+        "In exploratory statements, from 50 ms on at the latest: “Different” changes with the delay up to there. "
+        "Shorter delays may be noticed too."
+    )
+    assert not found.exploratory
+    assert found.at_ms == 150
+    assert [line.startswith("Exploratory: ") for line in found.sizes] == [True, False, True]
+    block = replace(results.blocks[0], lowest=tuple(one for one in results.blocks[0].lowest if one.item != "harder"))
+    block = replace(block, against=tuple(one for one in block.against if one.item != "harder"))
+    alone = named(replace(results, blocks=(block,)), "noticed from")
+    assert alone.exploratory
+    assert alone.told.startswith("From 50 ms on at the latest: “Different”")
+    assert not any(line.startswith("Exploratory") for line in alone.sizes)
+
+
+@pytest.mark.parametrize(
+    ("decided", "exploratory"),
+    [({}, False), ({"changed": True}, True), ({"primary": ITEMS[1:]}, True), ({"primary": ITEMS[:1]}, False)],
+)
+def test_a_threshold_alone_is_exploratory_unless_its_statement_is_primary(
+    decided: dict[str, Any], exploratory: bool
+) -> None:
+    results = rising(3)
+    block = replace(results.blocks[0], lowest=(), against=())
+    assert block.threshold is not None
+    assert block.threshold.effect is not None
+    found = named(replace(results, blocks=(block,), decided=replace(results.decided, **decided)), "noticed from")
+    assert (found.claims, found.exploratory) == (True, exploratory)
+
+
+def test_a_threshold_is_no_claim_at_a_smaller_alpha_that_was_decided() -> None:
+    settings = delays(DELAYS)
+    trials = list(everybody(settings, 4, lambda p, _s, code, _i: 6 if (p, code) in NOTICED or code == "D4" else 2))
+    usual, strict = (
+        evaluate(study(settings, trials, replace(DECIDED, alpha=alpha)), planning=False).blocks[0].threshold
+        for alpha in (0.05, 0.0001)
+    )
+    assert usual is not None
+    assert strict is not None
+    assert usual.effect is not None
+    assert strict.effect is None
+
+
+@pytest.mark.parametrize(("participants", "n"), [(1, 5), (10, 12), (200, 24)])
+def test_the_measured_rate_is_that_of_the_nearest_size(participants: int, n: int) -> None:
+    told = empty_studies(participants)
+    assert f"with {n} participants" in told
+    assert f"({CLAIMS[n]} of {STUDIES} studies, 95 % interval" in told
+
+
+def test_a_claim_needs_the_test_over_all_statements_corrected_over_the_blocks() -> None:
+    results = rising(3)
+    assert results.blocks[0].overall is not None
+
+    def with_p(*ps: float) -> list[bool]:
+        blocks = tuple(
+            replace(results.blocks[0], overall=replace(results.blocks[0].overall, p=p))  # type: ignore[type-var]
+            for p in ps
+        )
+        return [one.claims for one in answers(replace(results, blocks=blocks)) if one.question == "noticed from"]
+
+    assert with_p(0.05) == [True]
+    assert with_p(0.051) == [False]
+    assert with_p(0.03, 0.9) == [False, False]
+    assert with_p(0.02, 0.04) == [True, True]
+    none = replace(results, blocks=(replace(results.blocks[0], overall=None),))
+    assert named(none, "noticed from").told.startswith("Nothing is claimed here")
+    assert named(none, "noticed from").sizes == ()
+
+
+def test_a_liquid_is_recognised_where_its_interval_lies_above_the_share_of_its_name() -> None:
+    # Water 10 of 12, but 19 of all 36 names are water; honey 3 of 12, more than its share of names, but not surely so.
+    names = np.column_stack([[0] * 10 + [1] * 2, [1] * 3 + [0] * 9, [2] * 12])
+    named = Named(
+        ("water", "honey", "oil"),
+        ("L1", "L2", "L3"),
+        ("water", "honey", "oil"),
+        recognition(names, [0, 1, 2], 3),
+        "shown",
+    )
+    assert [given(named, label) for label in named.labels] == [19 / 36, 5 / 36, 12 / 36]
+    assert recognised(named) == (2,)
+    assert recognised(replace(named, verdict="suggested")) == (2,)
+    assert recognised(replace(named, verdict="not shown")) == ()

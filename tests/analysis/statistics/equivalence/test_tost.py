@@ -1,0 +1,194 @@
+import math
+from itertools import product
+
+import numpy as np
+import pytest
+from scipy.stats import binom, wilcoxon
+
+from study_app.analysis.statistics.equivalence.power import participants_needed
+from study_app.analysis.statistics.equivalence.tost import fewest, tost
+from study_app.errors import AnalysisError
+
+# Hours of sleep gained by ten patients with two drugs (Student 1908; R, sleep).
+FIRST = np.array([0.7, -1.6, -0.2, -1.2, -0.1, 3.4, 3.7, 0.8, 0, 2.0])
+SECOND = np.array([1.9, 0.8, 1.1, 0.1, -0.1, 4.4, 5.5, 1.6, 4.6, 3.4])
+
+
+def test_published_sleep_data() -> None:
+    result = tost(FIRST - SECOND, 0.5)
+    assert result.t == pytest.approx(-4.0621, abs=1e-4)
+    assert result.p_different == pytest.approx(0.002833, abs=1e-6)
+    assert (result.t_lower, result.p_lower) == pytest.approx((-2.7766, 0.98924), abs=5e-5)
+    assert result.t_upper == pytest.approx(-5.3476, abs=5e-5)
+    assert result.p_upper == pytest.approx(0.00023190, abs=5e-9)
+    assert result.p == pytest.approx(0.98924, abs=5e-6)
+    assert result.interval is not None
+    assert (result.interval.low, result.interval.high) == pytest.approx((-2.2930, -0.8670), abs=5e-5)
+    assert result.interval.level == pytest.approx(0.9)
+    assert result.verdict == "different"
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_verdict_is_that_of_the_interval(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    differences = rng.normal(rng.choice([0, 0.6]), 0.7, 20)
+    result = tost(differences, 0.5)
+    assert result.interval is not None
+    inside = result.interval.low > -0.5 and result.interval.high < 0.5
+    assert (result.p is not None and result.p <= 0.05) == inside
+    assert result.interval.low + result.interval.high == pytest.approx(2 * differences.mean())
+
+
+def test_few_people_who_differ_little_are_inconclusive() -> None:
+    result = tost([1, -1, 0, 2, -1], 1.0)
+    assert result.verdict == "out of reach"
+    assert tost([1, -1, 0, 2, -1] * 3, 0.5).verdict == "inconclusive"
+    assert result.note == "neither a difference nor equivalence is shown"
+
+
+@pytest.mark.parametrize(
+    ("differences", "verdict"),
+    [
+        ([2.0] * 12, "different"),
+        ([0.0] * 12, "equivalent"),
+        ([1.0] * 12, "different"),  # on the bound: not within it
+        ([0.0] * 11, "equivalent"),
+        ([0.0] * 10, "inconclusive"),
+        ([0.0] * 5, "out of reach"),
+        ([-2.0] * 6, "different"),
+        ([2.0] * 5, "out of reach"),
+        ([0.0] * 4, "out of reach"),
+        ([2.0], "out of reach"),
+    ],
+)
+def test_equal_differences_are_judged_by_the_tests_that_need_no_spread(differences: list[float], verdict: str) -> None:
+    assert tost(differences, 1.0).verdict == verdict
+
+
+def test_equivalence_needs_so_many_participants_that_one_in_five_would_be_seen() -> None:
+    spread = [0.0, 1.0, 0.0, -1.0] * 6
+    assert tost(spread[:13], 1.0).verdict == "inconclusive"
+    assert tost(spread[:13], 1.0).note == "too few participants to call it equivalent: 14 are needed"
+    assert tost(spread[:14], 1.0).verdict == "equivalent"
+    assert 0.8**14 <= 0.05 < 0.8**13
+    assert 0.75**11 <= 0.05 < 0.75**10
+    assert (fewest(0.05), fewest(0.05, equal=True), fewest(0.01)) == (14, 11, 21)
+
+
+@pytest.mark.parametrize(("n", "others"), [(5, (0,)), (5, (-1, 0, 1)), (12, (-1, 0, 1)), (24, (0,)), (24, (-1, 0, 1))])
+def test_where_a_few_notice_strongly_equivalence_is_seldom_shown(n: int, others: tuple[int, ...]) -> None:
+    # One in five answers five points higher: the mean lies on the bound.
+    rng = np.random.default_rng(n)
+    shown = 0
+    for _ in range(400):
+        strong = rng.random(n) < 0.2
+        found = tost(np.where(strong, 5.0, rng.choice(others, n)), 1.0)
+        shown += found.verdict == "equivalent"
+        assert found.beyond is not None
+        assert found.beyond.count == strong.sum()
+    assert shown <= binom.ppf(0.999, 400, 0.05)
+
+
+def test_people_beyond_the_bound_are_counted_whatever_the_mean() -> None:
+    found = tost([0.0] * 22 + [5.0, -5.0], 2.0)
+    assert found.beyond is not None
+    assert (found.beyond.count, found.beyond.n) == (2, 24)
+    assert (found.beyond.interval.low, found.beyond.interval.high) == pytest.approx((0.0103, 0.2700), abs=1e-4)
+
+
+@pytest.mark.parametrize(("spread", "step"), [(0.5, 1.0), (1.0, 1.0), (1.5, 0.5), (0.7, 0.0)])
+def test_so_many_participants_as_are_told_give_the_verdict_in_80_percent(spread: float, step: float) -> None:
+    rng = np.random.default_rng(8)
+    seen = spread * rng.normal(size=60)
+    seen = np.rint(seen / step) * step if step else seen
+    needed = participants_needed(seen, 1.0, 0.05)
+    assert needed is not None
+
+    def power_of(n: int) -> float:
+        """Return how often studies of n, drawn as the differences spread, are called equivalent by ``tost``."""
+        drawn = rng.normal(size=(300, n))
+        drawn *= normal_before_rounding(float(seen.std(ddof=1)), step)
+        drawn = np.rint(drawn / step) * step if step else drawn
+        return float(np.mean([tost(one, 1.0).verdict == "equivalent" for one in drawn]))
+
+    assert power_of(needed) > 0.8 - 0.03 - 3 * math.sqrt(0.8 * 0.2 / 300)
+    assert needed <= 14 or power_of(needed - 1) < 0.8 + 0.03 + 3 * math.sqrt(0.8 * 0.2 / 300)
+
+
+def normal_before_rounding(sd: float, step: float) -> float:
+    """Return the spread of the normal numbers whose multiples of ``step`` spread by ``sd``, by trying."""
+    numbers = np.random.default_rng(0).normal(size=20_000)
+    tried = np.linspace(0.05, 2 * sd + step, 400)
+    spreads = [np.std(np.rint(one * numbers / step) * step if step else one * numbers) for one in tried]
+    return float(tried[np.searchsorted(spreads, sd)])
+
+
+def test_a_small_alpha_can_be_reached() -> None:
+    differences = np.random.default_rng(2).integers(-1, 2, 40)
+    assert tost(differences, 1.0, alpha=0.0002).verdict == "equivalent"
+
+
+def test_more_participants_than_are_looked_for_are_not_told() -> None:
+    assert participants_needed(np.array([5.0, -5.0] * 10), 0.5, 0.05) is None
+
+
+def test_a_small_but_certain_difference_can_be_equivalent() -> None:
+    result = tost(np.tile([0.2, 0.3], 10), 0.5)
+    assert result.verdict == "equivalent"
+    assert result.note == "different from 0, but within the bound"
+    assert result.checks_agree
+
+
+def test_the_permutation_check_goes_through_all_signs() -> None:
+    differences = np.array([0.5, -0.5, 0.0, 1.0, 0.5, 0.0])
+    result = tost(differences, 1.0)
+
+    def p(shifted: np.ndarray) -> float:
+        every = [np.dot(signs, shifted) for signs in product((1, -1), repeat=len(shifted))]
+        return float(np.mean(np.array(every) >= shifted.sum() - 1e-9))
+
+    assert result.p_permutation == pytest.approx(max(p(differences + 1), p(1 - differences)))
+
+
+def test_the_rank_check_shifts_by_the_bound_to_both_sides() -> None:
+    differences = FIRST - SECOND + 0.01 * np.arange(10)
+    below = wilcoxon(differences + 2, alternative="greater", method="exact").pvalue
+    above = wilcoxon(differences - 2, alternative="less", method="exact").pvalue
+    assert tost(differences, 2.0).p_ranks == pytest.approx(max(below, above))
+    # One of three lies on the bound and two about it.
+    assert tost([0.0, 1.0, 2.0], 1.0).p_ranks == pytest.approx(0.75)
+
+
+def test_many_people_have_drawn_signs_that_can_be_repeated() -> None:
+    rng = np.random.default_rng(1)
+    differences = rng.normal(0.1, 0.6, 30)
+    result = tost(differences, 0.5, seed=2)
+    assert result == tost(differences, 0.5, seed=2)
+    assert result.p is not None
+    assert result.p_permutation == pytest.approx(result.p, abs=0.004)
+
+
+def test_without_differences_nothing_is_tested() -> None:
+    nobody = tost([np.nan, np.nan], 1.0)
+    assert (nobody.n, nobody.dropped, nobody.effect, nobody.p) == (0, 2, None, None)
+    assert nobody.note == "0 participants: no spread"
+
+
+def test_missing_differences_are_dropped() -> None:
+    result = tost([*(FIRST - SECOND), np.nan], 0.5)
+    assert (result.n, result.dropped) == (10, 1)
+    assert result.p == pytest.approx(0.98924, abs=5e-6)
+
+
+@pytest.mark.parametrize("bound", [0, -1, np.nan, np.inf])
+def test_a_bound_that_means_nothing_is_refused(bound: float) -> None:
+    with pytest.raises(AnalysisError, match="bound of equivalence"):
+        tost([1.0, 2.0], bound)
+
+
+@pytest.mark.parametrize(("n", "power"), [(5, 0.02), (20, 0.17), (30, 0.47)])
+def test_published_power_at_no_difference(n: int, power: float) -> None:
+    # Paired differences of whole answers whose spread is 2.36 points; the bound is 1.
+    rng = np.random.default_rng(n)
+    shown = [tost(rng.normal(0, 2.36, n), 1.0, checks=False).verdict == "equivalent" for _ in range(1000)]
+    assert np.mean(shown) == pytest.approx(power, abs=0.05)

@@ -1,0 +1,410 @@
+import json
+from pathlib import Path
+
+import pytest
+
+from study_app.analysis.tables import typed_files
+from study_app.analysis.tables.study import Study, load_study
+from study_app.errors import AnalysisError, StoreError
+from study_app.protocol.load import parse, source_bytes
+from study_app.store.tables.columns import RESPONSES, TRIALS, header
+from study_app.store.tables.session_tables import csv_bytes, read_table
+from tests.analysis.conftest import CANNOT_JUDGE, Answer, Results, make_results
+from tests.store.earlier import TRIALS_HEADER
+
+
+def by_condition(condition: str, item: str) -> Answer:
+    return {"water": 2, "honey": 5, "light_oil": 7}.get(condition, 4)
+
+
+def cell(study: Study, code: str, item: str) -> dict:
+    for block in study.blocks:
+        if code in block.codes:
+            table = study.aggregate(block)
+            return table[(table["code"] == code) & (table["item"] == item)].iloc[0].to_dict()
+    raise LookupError(code)
+
+
+def test_answers_come_back_by_code_with_all_statements_and_settings(rek: Results) -> None:
+    rek.add("P001", by_condition)
+    rek.add("P002", by_condition)
+    study = load_study(rek.folder)
+    assert (study.name, study.n, study.simulated, study.revealed) == ("rek2024", 2, True, False)
+    assert [(block.id, block.kind) for block in study.blocks] == [("liquids", "liquids"), ("delays", "delays")]
+    assert [block.codes for block in study.blocks] == [("L1", "L2", "L3"), tuple(f"D{n}" for n in range(1, 8))]
+    assert [item.short for item in study.blocks[0].items][:2] == ["Feels like a liquid", "Immersive"]
+    assert len(study.responses) == 2 * 62
+    for condition, level in (("water", 2), ("honey", 5), ("light_oil", 7)):
+        row = cell(study, rek.code(condition, "liquids"), "like_tar")
+        assert (row["n"], row["median"], row[f"count_{level}"]) == (2, level, 2)
+
+
+def test_while_sealed_a_setting_is_its_code_and_nothing_else(rek: Results) -> None:
+    rek.add("P001", by_condition)
+    study = load_study(rek.folder)
+    assert not study.settings
+    assert all(
+        (setting.condition, setting.liquid, setting.delay_ms) == (None, None, None)
+        for block in study.blocks
+        for setting in block.settings
+    )
+
+
+def test_opened_settings_have_names_delays_ascending_and_liquids_as_in_the_protocol(rek: Results) -> None:
+    rek.add("P001", by_condition)
+    rek.open()
+    liquids, delays = load_study(rek.folder).blocks
+    assert [liquids.name(setting) for setting in liquids.settings] == ["Water", "Honey", "Light oil"]
+    assert [setting.delay_ms for setting in delays.settings] == [0, 50, 75, 100, 125, 150, 200]
+    assert {setting.liquid for setting in delays.settings} == {"water"}
+    assert [setting.code for setting in liquids.settings] == [
+        rek.code(condition, "liquids") for condition in ("water", "honey", "light_oil")
+    ]
+
+
+SWAPPED = {'"L"': '"X"', '"D"': '"L"', '"X"': '"D"'}
+
+
+def test_what_a_block_compares_is_told_by_its_receipt_and_not_by_the_letter_of_its_codes(tmp_path: Path) -> None:
+    text = source_bytes("rek2024").decode()
+    for old, new in SWAPPED.items():
+        text = text.replace(f"code_prefix = {old}", f"code_prefix = {new}")
+    results = make_results(tmp_path / "swapped", parse(text.encode(), "swapped.toml"))
+    results.add("P001", by_condition)
+    assert [(block.codes[0], block.kind) for block in load_study(results.folder).blocks] == [
+        ("D1", "liquids"),
+        ("L1", "delays"),
+    ]
+    results.open()
+    assert [block.kind for block in load_study(results.folder).blocks] == ["liquids", "delays"]
+
+
+def test_receipts_of_earlier_versions_do_not_say_what_a_block_compares(rek: Results) -> None:
+    path = rek.add("P001", by_condition).receipt
+    told = json.loads(path.read_bytes())
+    for block in told["protocol"]["blocks"].values():
+        del block["compares"]
+    path.write_text(json.dumps(told))
+    assert [block.kind for block in load_study(rek.folder).blocks] == ["liquids", "delays"]
+    rek.open()
+    assert [block.kind for block in load_study(rek.folder).blocks] == ["liquids", "delays"]
+
+
+def test_of_a_repeated_trial_the_last_attempt_counts_and_the_first_is_kept(rek: Results) -> None:
+    rek.add("P001", lambda *_: 6, repeated={"L2": lambda *_: 1})
+    study = load_study(rek.folder)
+    row = cell(study, "L2", "immersive")
+    assert (row["n"], row["count_1"], row["count_6"], row["presented"]) == (1, 0, 1, 1)
+    kept = study.responses[(study.responses["code"] == "L2") & (study.responses["item"] == "immersive")]
+    assert list(zip(kept["attempt"], kept["response"], kept["counted"], strict=True)) == [(1, 1, False), (2, 6, True)]
+
+
+def test_a_repeat_that_was_never_answered_leaves_the_answer_missing(rek: Results) -> None:
+    """The operator discarded the first attempt; its answers must not come back because the second has none."""
+    rek.add("P001", lambda *_: 6, repeated={"L2": lambda *_: 1})
+    path = rek.responses("P001")
+    lines = path.read_text().splitlines(keepends=True)
+    path.write_text("".join(line for line in lines if not (",2,liquids," in line and ",L2," in line)))
+    row = cell(load_study(rek.folder), "L2", "immersive")
+    assert (row["n"], row["missing"]) == (0, 1)
+
+
+def test_practice_stays_apart_even_where_it_is_asked_about(small: Results) -> None:
+    small.add("A", lambda *_: 3)
+    study = load_study(small.folder)
+    assert [block.id for block in study.blocks] == ["feel"]
+    practice = study.responses[study.responses["phase"] == "practice"]
+    assert len(practice) == 2
+    assert not practice["counted"].any()
+    assert cell(study, "L1", "smooth")["n"] == 2
+
+
+def test_repetitions_cannot_judge_and_unanswered_items_are_counted(small: Results) -> None:
+    small.add("A", lambda condition, item: {"smooth": 7, "warm": None}[item])
+    small.add("B", lambda condition, item: {"smooth": CANNOT_JUDGE, "warm": 1}[item])
+    study = load_study(small.folder)
+    smooth, warm = cell(study, "L1", "smooth"), cell(study, "L1", "warm")
+    assert (smooth["presented"], smooth["n"], smooth["participants"], smooth["cannot_judge"], smooth["missing"]) == (
+        4,
+        2,
+        1,
+        2,
+        0,
+    )
+    assert (warm["n"], warm["cannot_judge"], warm["missing"], warm["count_1"]) == (2, 0, 2, 2)
+
+
+def test_an_item_left_out_of_the_file_is_missing(rek: Results) -> None:
+    rek.add("P001", lambda *_: 6)
+    path = rek.responses("P001")
+    lines = path.read_text().splitlines(keepends=True)
+    path.write_text("".join(line for line in lines if ",immersive," not in line))
+    row = cell(load_study(rek.folder), "L1", "immersive")
+    assert (row["n"], row["missing"]) == (0, 1)
+
+
+@pytest.mark.parametrize("status", ["unfinished", "withdrawn", "aborted", "broken"])
+def test_sessions_that_were_not_completed_are_kept_and_do_not_count(rek: Results, status: str) -> None:
+    rek.add("P001", lambda *_: 6)
+    rek.add("P002", lambda *_: 1, status=status, trials=4)
+    study = load_study(rek.folder)
+    assert (study.n, study.people, study.left_out) == (1, ("P001",), 1)
+    assert len(study.responses) == 62 + 27 - 0
+    assert cell(study, "L1", "immersive")["n"] == 1
+
+
+def test_two_sessions_of_one_participant_are_one_participant(rek: Results) -> None:
+    rek.add("P001", lambda *_: 6)
+    rek.add("P001", lambda *_: 2, session=2)
+    study = load_study(rek.folder)
+    row = cell(study, "L1", "immersive")
+    assert (study.n, row["n"], row["participants"], row["presented"]) == (1, 2, 1, 2)
+
+
+def test_an_excluded_session_is_kept_and_does_not_count(rek: Results) -> None:
+    for participant, level in (("P001", 6), ("P002", 1), ("P003", 6)):
+        rek.add(participant, lambda *_, level=level: level)
+    rek.exclude("P002")
+    study = load_study(rek.folder)
+    assert (study.n, study.people, study.left_out) == (2, ("P001", "P003"), 0)
+    assert list(study.excluded_sessions["participant"]) == ["P002"]
+    assert len(study.responses) == 3 * 62
+    row = cell(study, "L1", "immersive")
+    assert (row["n"], row["count_1"], row["presented"], row["presented_excluded"], row["missing"]) == (2, 0, 2, 0, 0)
+
+
+def test_of_two_sessions_only_the_excluded_one_is_left_out(rek: Results) -> None:
+    rek.add("P001", lambda *_: 6)
+    rek.add("P001", lambda *_: 2, session=2)
+    rek.exclude("P001", session=2)
+    study = load_study(rek.folder)
+    assert (study.people, len(study.excluded_sessions)) == (("P001",), 1)
+    row = cell(study, "L1", "immersive")
+    assert (row["n"], row["median"], row["presented"]) == (1, 6, 1)
+
+
+def test_an_excluded_trial_takes_its_setting_from_that_participant_alone(rek: Results) -> None:
+    rek.add("P001", by_condition)
+    rek.add("P002", by_condition)
+    rek.exclude("P002", trial=rek.trial("P002", "honey"))
+    study = load_study(rek.folder)
+    assert study.n == 2
+    for condition, expected in (("honey", (1, 1, 1)), ("water", (2, 2, 0))):
+        row = cell(study, rek.code(condition, "liquids"), "immersive")
+        assert (row["n"], row["presented"], row["presented_excluded"]) == expected
+        assert row["missing"] == 0
+
+
+def test_an_excluded_trial_takes_all_its_attempts_and_is_one_presentation(rek: Results) -> None:
+    rek.add("P001", lambda *_: 6, repeated={"L2": lambda *_: 1})
+    (trial,) = {int(one) for one in load_study(rek.folder).trials.query("code == 'L2'")["trial"]}
+    rek.exclude("P001", trial=trial)
+    study = load_study(rek.folder)
+    row = cell(study, "L2", "immersive")
+    assert (row["n"], row["presented"], row["presented_excluded"], row["missing"]) == (0, 0, 1, 0)
+    assert list(study.trials.query("code == 'L2'")["excluded"]) == [True, True]
+
+
+def test_of_repetitions_only_the_excluded_one_is_left_out(small: Results) -> None:
+    small.add("A", lambda *_: 3)
+    small.exclude("A", trial=small.trial("A", "heavyzembla"))
+    row = cell(load_study(small.folder), small.code("heavyzembla", "feel"), "smooth")
+    assert (row["n"], row["presented"], row["presented_excluded"]) == (1, 1, 1)
+
+
+def test_an_unfinished_session_that_is_excluded_is_told_once(rek: Results) -> None:
+    rek.add("P001", lambda *_: 6)
+    rek.add("P002", lambda *_: 1, status="withdrawn", trials=4)
+    rek.exclude("P002")
+    study = load_study(rek.folder)
+    assert (study.left_out, len(study.excluded_sessions)) == (0, 1)
+
+
+def test_reasons_of_session_and_trial_stand_beside_each_other_and_none_excludes_too(rek: Results) -> None:
+    rek.add("P001", lambda *_: 6)
+    rek.exclude("P001", trial=3, reason="spilled tea")
+    rek.exclude("P001", reason="tired")
+    reasons = dict(load_study(rek.folder).trials[["trial", "exclusion_reason"]].itertuples(index=False))
+    assert (reasons[2], reasons[3]) == ("tired", "tired; spilled tea")
+    rek.add("P002", lambda *_: 6)
+    rek.exclude("P002", reason="")
+    assert load_study(rek.folder).n == 0
+
+
+@pytest.mark.parametrize(
+    ("excluded", "says"),
+    [
+        ({"participant": "P010"}, "participant P010, session 1, which is not there"),
+        ({"participant": "P001", "session": 2}, "participant P001, session 2, which is not there"),
+        ({"participant": "P001", "trial": 99}, "participant P001, session 1, trial 99, which is not there"),
+    ],
+)
+def test_excluding_what_is_not_there_is_refused(rek: Results, excluded: dict, says: str) -> None:
+    rek.add("P001", lambda *_: 6)
+    rek.exclude(**excluded)
+    message = refusal(rek.folder)
+    assert says in message
+    assert "exclusions.csv" in message
+
+
+def test_a_list_of_exclusions_that_makes_no_sense_is_refused(rek: Results) -> None:
+    rek.add("P001", lambda *_: 6)
+    (rek.folder / "exclusions.csv").write_text("who,why\n")
+    with pytest.raises(StoreError, match=r"exclusions\.csv"):
+        load_study(rek.folder)
+
+
+def test_texts_are_english_where_the_study_has_it(small: Results) -> None:
+    small.add("A", lambda *_: 3)
+    block = load_study(small.folder).blocks[0]
+    assert block.items[0].short == "Smooth"
+    assert block.cannot_judge == "Cannot judge"
+    assert block.labels[0] == "a"
+
+
+def refusal(folder: Path) -> str:
+    with pytest.raises(AnalysisError) as caught:
+        load_study(folder)
+    return str(caught.value)
+
+
+def test_a_folder_that_is_not_there_is_refused(tmp_path: Path) -> None:
+    assert "nowhere is no folder" in refusal(tmp_path / "nowhere")
+
+
+def test_an_empty_or_foreign_folder_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "holiday.txt").write_text("x")
+    assert "holds no sessions" in refusal(tmp_path)
+
+
+def test_the_folder_above_the_studies_names_them(rek: Results) -> None:
+    rek.add("P001", lambda *_: 4)
+    message = refusal(rek.folder.parent)
+    assert f"give {rek.folder}" in message
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        (",immersive,2,4,", ",immersive,2,8,", "column response: '8' is not a whole number from 1 to 7 or n/a"),
+        (",immersive,2,4,", ",immersive,2,good,", "column response: 'good'"),
+        (",immersive,2,4,", ",immersive,", "cells instead of"),
+        (",immersive,2,4,", ",imersive,2,4,", "knows no statement 'imersive'"),
+        (",L1,immersive,", ",L9,immersive,", "setting 'L9'"),
+        (",L1,immersive,", ",L1,feels_liquid,", "stands there twice"),
+        ("study,participant", "study,person", "does not begin with the columns"),
+        ("rek2024,P001,1,", "rek2024,P007,1,", "column participant: 'P007' instead of 'P001'"),
+        ("rek2024,P001,1,", "other,P001,1,", "column study: 'other' instead of 'rek2024'"),
+        (",false,false,2,", ",maybe,false,2,", "column simulated: 'maybe' is not true or false"),
+        (",main,", ",mian,", "column phase: 'mian' is not one of main, practice, baseline"),
+    ],
+)
+def test_a_changed_table_is_refused_with_file_row_and_value(real: Results, old: str, new: str, says: str) -> None:
+    real.add("P001", lambda *_: 4)
+    path = real.responses("P001")
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+    message = refusal(real.folder)
+    assert says in message
+    assert str(path) in message
+
+
+def test_a_table_of_an_earlier_version_is_read_as_if_its_later_columns_held_nothing(rek: Results) -> None:
+    rek.add("P001", by_condition)
+    before = load_study(rek.folder).trials
+    path = rek.trials("P001")
+    earlier = tuple(column for column in TRIALS if column.name in TRIALS_HEADER.split(","))
+    path.write_bytes(csv_bytes(earlier, read_table(path.read_bytes(), earlier)))
+    assert path.read_text(encoding="utf-8").startswith(TRIALS_HEADER + "\n")
+    trials = load_study(rek.folder).trials
+    assert trials[["withheld_share", "limiter_estimator"]].isna().all(axis=None)
+    assert trials["force_mean_n"].equals(before["force_mean_n"])
+    lacking = [column for column in earlier if column.name != "valid"]
+    path.write_bytes(csv_bytes(lacking, read_table(path.read_bytes(), lacking)))
+    assert "does not begin with the columns" in refusal(rek.folder)
+
+
+def test_a_torn_table_is_refused(rek: Results) -> None:
+    rek.add("P001", lambda *_: 4)
+    path = rek.trials("P001")
+    path.write_bytes(path.read_bytes()[:-40])
+    assert "cells instead of" in refusal(rek.folder)
+
+
+def test_bytes_that_are_no_text_are_refused(rek: Results) -> None:
+    rek.add("P001", lambda *_: 4)
+    rek.responses("P001").write_bytes(b"\xff\xfe\x00")
+    assert "is damaged" in refusal(rek.folder)
+
+
+def test_a_missing_table_is_refused(rek: Results) -> None:
+    rek.add("P001", lambda *_: 4)
+    rek.trials("P001").unlink()
+    assert "cannot be read (No such file" in refusal(rek.folder)
+
+
+@pytest.mark.parametrize("content", [b"", b"[1]", b"{}", b'{"protocol": {"study": 3}}'])
+def test_a_broken_receipt_is_refused(rek: Results, content: bytes) -> None:
+    session = rek.add("P001", lambda *_: 4)
+    session.receipt.write_bytes(content)
+    assert str(session.receipt) in refusal(rek.folder)
+
+
+def test_sessions_under_another_key_are_not_pooled(rek: Results, tmp_path: Path) -> None:
+    rek.add("P001", lambda *_: 4)
+    session = rek.add("P002", lambda *_: 4)
+    session.receipt.write_text(session.receipt.read_text().replace(rek.key.hash, "0" * 64))
+    assert "different sealed keys" in refusal(rek.folder)
+
+
+def test_sessions_that_were_asked_other_statements_are_not_pooled(rek: Results) -> None:
+    rek.add("P001", lambda *_: 4)
+    session = rek.add("P002", lambda *_: 4)
+    session.receipt.write_text(session.receipt.read_text().replace('"like_tar"', '"like_glue"'))
+    path = rek.responses("P002")
+    path.write_text(path.read_text().replace("like_tar", "like_glue"))
+    assert "other statements" in refusal(rek.folder)
+
+
+def test_another_study_in_the_folder_is_refused(rek: Results, small: Results) -> None:
+    rek.add("P001", lambda *_: 4)
+    other = small.add("Q001", lambda *_: 4)
+    other.path.parent.rename(rek.folder / "data" / "sub-Q001")
+    assert "of the study 'small'" in refusal(rek.folder)
+
+
+def test_an_opened_key_that_was_changed_is_refused(rek: Results) -> None:
+    rek.add("P001", lambda *_: 4)
+    rek.open()
+    make_results(rek.folder.parent / "other", rek.protocol)
+    (rek.folder / "blinding" / "key.sealed").write_bytes(b"e30=")
+    with pytest.raises(StoreError, match=r"key\.sealed"):
+        load_study(rek.folder)
+
+
+def test_a_bad_cell_is_found_in_whichever_file_and_row_it_stands(rek: Results, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Files are read some at a time, and the row is counted in its own file."""
+    monkeypatch.setattr(typed_files, "AT_ONCE", 2)
+    for number in range(1, 6):
+        rek.add(f"P{number:03d}", lambda *_: 4)
+    path = rek.responses("P004")
+    lines = path.read_text(encoding="utf-8").split("\n")
+    cells = lines[7].split(",")
+    cells[header(RESPONSES).index("changes")] = "99999999999999999999"
+    path.write_text("\n".join([*lines[:7], ",".join(cells), *lines[8:]]), encoding="utf-8")
+    with pytest.raises(
+        AnalysisError, match=r"subject-P004.*row 7, column changes: '99999999999999999999' is not a whole"
+    ):
+        load_study(rek.folder)
+
+
+def test_a_foreign_row_is_found_in_whichever_file_it_stands(rek: Results) -> None:
+    for number in range(1, 4):
+        rek.add(f"P{number:03d}", lambda *_: 4)
+    path = rek.trials("P003")
+    head, *rows, end = path.read_text(encoding="utf-8").split("\n")
+    rows[4] = rows[4].replace("P003", "P002", 1)
+    path.write_text("\n".join([head, *rows, end]), encoding="utf-8")
+    with pytest.raises(AnalysisError, match=r"subject-P003.*row 5, column participant: 'P002' instead of 'P003'"):
+        load_study(rek.folder)
