@@ -17,16 +17,16 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QWidget
 
 from study_app.app.visit import Visit
-from study_app.gui.home.cards import StudyCard
-from study_app.gui.home.place import HomePlace
-from study_app.gui.main_window import FULL as HOME
-from study_app.gui.new_session import NewSessionDialog
+from study_app.gui.home.main_window import FULL as HOME
+from study_app.gui.home.new_session_dialog import NewSessionDialog
+from study_app.gui.home.study_cards import StudyCard
+from study_app.gui.home.view import HomePlace
 from study_app.gui.operator import OperatorWindow
 from study_app.gui.operator.strip import Strip
-from study_app.gui.pages.questionnaire import QuestionnaireWidget
-from study_app.gui.pages.text import TextWidget
-from study_app.gui.participant import WINDOWED_SIZE, ParticipantWindow
-from study_app.gui.pointer import SHARE_OF_SCREEN
+from study_app.gui.participant.pages.questionnaire import QuestionnaireWidget
+from study_app.gui.participant.pages.text_page import TextWidget
+from study_app.gui.participant.pointer_capture import SHARE_OF_SCREEN
+from study_app.gui.participant.window import WINDOWED_SIZE, ParticipantWindow
 from study_app.gui.preflight import PreflightWindow
 from study_app.gui.preflight.window import FULL as PREFLIGHT
 from study_app.protocol.model import Reach

@@ -22,9 +22,6 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
 
-from study_app.gui.operator.health import ServoHealth
-from study_app.gui.operator.progress import SessionProgress, stages
-from study_app.gui.operator.view import OperatorView, Session, operator_view
 from study_app.protocol.load import parse
 from study_app.protocol.model import Explore, Protocol
 from study_app.protocol.orders.schedule import build_schedule, draw_key, stream
@@ -34,6 +31,9 @@ from study_app.session.transitions.commands import ShowPage
 from study_app.session.transitions.events import Begin, Chosen, Continue, ItemShown, LanguageChosen, Submitted, TaskDone
 from study_app.session.transitions.state import FINAL
 from study_app.session.transitions.table import advance, open_session
+from study_app.viewmodels.operator import OperatorView, Session, operator_view
+from study_app.viewmodels.servo_health import ServoHealth
+from study_app.viewmodels.session_stages import SessionProgress, stages
 from tests.real_windows import Program, wait_for
 
 SHORTER = {

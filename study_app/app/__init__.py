@@ -4,7 +4,7 @@
 on with one by command.
 """
 
-from study_app.gui.display import missing_library
+from study_app.gui.display.display_check import missing_library
 
 try:
     from study_app.app.entry import resume, run

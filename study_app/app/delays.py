@@ -16,16 +16,16 @@ from PySide6.QtCore import QEventLoop, QTimer
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QApplication
 
+from study_app.app.session.bridge import SessionBridge
+from study_app.app.session.garbage_collection import collecting_here
+from study_app.app.session.termination import ended_from_outside
+from study_app.app.session.windows import open_windows
 from study_app.devices.rig import open_machine
 from study_app.errors import SessionError, StudyError
 from study_app.gui.application import application_here
-from study_app.gui.bridge import SessionBridge
-from study_app.gui.collector import collecting_here
-from study_app.gui.ending import ended_from_outside
-from study_app.gui.graphics import WITHOUT_OPENGL
-from study_app.gui.screens import choose_screens
-from study_app.gui.session_windows import open_windows
-from study_app.gui.theme import LIGHT
+from study_app.gui.display.opengl import WITHOUT_OPENGL
+from study_app.gui.display.screens import choose_screens
+from study_app.gui.theme.theme import LIGHT
 from study_app.protocol.load import parse
 from study_app.protocol.orders.schedule import Schedule, Trial, build_schedule
 from study_app.session.request import NewSession

@@ -11,11 +11,11 @@ from PySide6.QtWidgets import QApplication, QWidget
 from study_app.app.machine import MachineDesk
 from study_app.devices import kind_of
 from study_app.devices.backends import Backend, backends
-from study_app.gui.devices.diagnosis import DiagnosisDialog
-from study_app.gui.devices.place import DevicesPlace
-from study_app.gui.devices.view import DeviceShown, device_named, devices_shown
-from study_app.gui.theme import Theme
+from study_app.gui.devices.diagnosis_dialog import DiagnosisDialog
+from study_app.gui.devices.view import DevicesPlace
+from study_app.gui.theme.theme import Theme
 from study_app.store.workstation import MachineSettings
+from study_app.viewmodels.device_list import DeviceShown, device_named, devices_shown
 
 PATIENCE_S = 5.0
 HELD = (

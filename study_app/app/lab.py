@@ -26,12 +26,12 @@ from study_app.app.lab_rows import cost_rows, device_choices, error_rows, title_
 from study_app.app.lab_saving import LabSaving
 from study_app.errors import StudyError
 from study_app.evaluation.appraisal_worker import Appraiser
-from study_app.gui.lab.place import LabPlace
-from study_app.gui.lab.view import DeviceShown, LabView, Now
-from study_app.gui.tank import caustics
+from study_app.gui.lab.view import LabPlace
+from study_app.gui.participant.tank import caustics
 from study_app.lab.ab_comparison import Chance, Setting, Side, Workbench
 from study_app.lab.presets import Choice, liquids_at_hand, spoken
 from study_app.lab.programmed_paths import TITLES
+from study_app.viewmodels.lab import DeviceShown, LabView, Now
 
 if TYPE_CHECKING:
     from study_app.lab.live import Live

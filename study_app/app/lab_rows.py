@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from study_app.devices import list_devices
 from study_app.evaluation.appraisal import Costs, Errors
-from study_app.gui.devices.view import TITLES
-from study_app.gui.lab.view import CostRow, ErrorRow
-from study_app.gui.new_session import DEVICE_WORDS
+from study_app.gui.home.new_session_dialog import DEVICE_WORDS
 from study_app.lab.parameters import EFFECT_WORDS
+from study_app.viewmodels.device_list import TITLES
+from study_app.viewmodels.lab import CostRow, ErrorRow
 
 SMALLEST_N = 0.001
 

@@ -21,16 +21,16 @@ from PySide6.QtWidgets import QApplication
 from study_app.app.crash_trace import CrashTrace
 from study_app.app.devices import diagnosis
 from study_app.app.machine import described, screen_number, settings_here, text_scale_on
+from study_app.app.session.garbage_collection import collecting_here
+from study_app.app.session.termination import ended_from_outside
 from study_app.devices import is_falcon, kind_of
 from study_app.devices.rig import Machine, open_machine
 from study_app.errors import SessionError, StudyError
 from study_app.gui.application import application_here
-from study_app.gui.collector import collecting_here
-from study_app.gui.dialogs import Notice
-from study_app.gui.ending import ended_from_outside
-from study_app.gui.opening import OpeningWindow
-from study_app.gui.screens import choose_screens, place
-from study_app.gui.theme import LIGHT, Theme
+from study_app.gui.display.screens import choose_screens, place
+from study_app.gui.preflight.startup_window import OpeningWindow
+from study_app.gui.theme.theme import LIGHT, Theme
+from study_app.gui.widgets.dialogs import Notice
 from study_app.protocol.load import parse
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.session.preflight import Check, checks, refused
@@ -40,7 +40,7 @@ from study_app.session.start import Ready, measured, open_store
 
 if TYPE_CHECKING:
     from study_app.app.preflight import Preflight
-    from study_app.gui.bridge import SessionBridge
+    from study_app.app.session.bridge import SessionBridge
     from study_app.store.sessions.open_session import SessionStore
 
 CANCELLED = 130
@@ -69,8 +69,6 @@ def hold(chosen: NewSession, tell: Callable[[str], object] | None) -> int:
 
 def load_windows() -> None:
     """Load what a session's windows are made of, beside the note: it takes a third of a second, and makes no object."""
-    import study_app.app.preflight  # noqa: PLC0415
-    import study_app.gui.session_windows  # noqa: F401, PLC0415
 
 
 class LiveSession(QObject):
@@ -215,7 +213,7 @@ class LiveSession(QObject):
         """Go on with what the thread made ready, or raise what it met."""
         if not isinstance(made, Ready):
             raise made if isinstance(made, Exception) else TypeError(made)
-        from study_app.gui.session_windows import open_windows  # noqa: PLC0415 - pyqtgraph: only once it is needed
+        from study_app.app.session.windows import open_windows  # noqa: PLC0415 - pyqtgraph: only once it is needed
 
         chosen, machine = self.chosen, made.machine
         source = chosen.read_source()

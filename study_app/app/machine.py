@@ -11,11 +11,11 @@ from PySide6.QtGui import QScreen
 
 from study_app.devices import kind_of
 from study_app.errors import DeviceError, StoreError
-from study_app.gui.frames import BY_CLOCK, LOCKED
-from study_app.gui.graphics import has_card
-from study_app.gui.screens import describe_screen, screen_shown, screens_shown
-from study_app.gui.settings.place import MachinePlace
-from study_app.gui.theme import DARK, LIGHT, Theme
+from study_app.gui.display.frame_clock import BY_CLOCK, LOCKED
+from study_app.gui.display.opengl import has_card
+from study_app.gui.display.screens import describe_screen, screen_shown, screens_shown
+from study_app.gui.settings.view import MachinePlace
+from study_app.gui.theme.theme import DARK, LIGHT, Theme
 from study_app.store import workstation
 from study_app.store.workstation import DEFAULTS, DisplayOffset, MachineSettings
 from study_app.user_folder import settings_file

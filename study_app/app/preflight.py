@@ -14,10 +14,9 @@ from PySide6.QtGui import QScreen
 from study_app.errors import StudyError
 from study_app.evaluation.appraisal import Costs, Errors
 from study_app.evaluation.appraisal_worker import Appraiser
-from study_app.gui.preflight.view import preflight_view, resumed_rows
+from study_app.gui.display.screens import place
 from study_app.gui.preflight.window import PreflightWindow
-from study_app.gui.screens import place
-from study_app.gui.theme import Theme
+from study_app.gui.theme.theme import Theme
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.scene import Scene
 from study_app.protocol.model import Protocol
@@ -28,6 +27,7 @@ from study_app.session.request import NewSession
 from study_app.session.start import Ready, measured
 from study_app.store.folders import locate
 from study_app.store.journals import journal
+from study_app.viewmodels.preflight import preflight_view, resumed_rows
 
 LOOK_MS = 100
 PATIENCE_S = 10.0

@@ -36,16 +36,10 @@ from study_app.analysis.worker_messages import (
 )
 from study_app.app.results_rows import left_out, opened
 from study_app.gui.application import open_here
-from study_app.gui.results.place import ResultsPlace
-from study_app.gui.results.view import (
-    FigureShown,
-    Going,
-    ResultsView,
-    StudyChoice,
-    Trouble,
-)
-from study_app.gui.sessions.facts import session_facts
+from study_app.gui.results.view import ResultsPlace
 from study_app.store.folders import StudyFolder
+from study_app.viewmodels.results import FigureShown, Going, ResultsView, StudyChoice, Trouble
+from study_app.viewmodels.sessions import session_facts
 
 LISTEN_MS: Final = 40
 PATIENCE_S: Final = 0.3

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from datetime import datetime
 
-from study_app.gui.results.view import LeftOut, Opened
 from study_app.store.exclusions import Exclusion
+from study_app.viewmodels.results import LeftOut, Opened
 
 
 def left_out(row: Exclusion) -> LeftOut:

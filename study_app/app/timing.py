@@ -11,13 +11,12 @@ from typing import TypeVar
 import numpy as np
 from PySide6.QtCore import QCoreApplication, QEventLoop, QObject, Qt, QTimer, Signal
 
+from study_app.app.session.garbage_collection import collecting_here
 from study_app.devices.scripted import ScriptedDevice
 from study_app.gui.application import application_here
-from study_app.gui.collector import collecting_here
+from study_app.gui.display.screens import choose_screens, place
 from study_app.gui.operator import OperatorWindow
-from study_app.gui.operator.health import ServoHealth
-from study_app.gui.participant import ParticipantWindow
-from study_app.gui.screens import choose_screens, place
+from study_app.gui.participant.window import ParticipantWindow
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.load import load, load_scene
@@ -27,6 +26,7 @@ from study_app.session.pages import TaskPage
 from study_app.session.tasks import TaskView
 from study_app.session.trial import TankView
 from study_app.validation.timing.machine_load import LoadName
+from study_app.viewmodels.servo_health import ServoHealth
 
 FRAME_MS, TRACE_MS, TILES_MS = 16, 33, 500
 HEARTBEAT_MS = 100  # Python hears Ctrl+C only while it runs; Qt waits outside it

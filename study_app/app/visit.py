@@ -10,15 +10,15 @@ from PySide6.QtCore import QEventLoop, QObject, QTimer
 from study_app.app.devices import DevicesDesk
 from study_app.app.live_session import BUG, LiveSession
 from study_app.app.machine import MachineDesk, theme_named
+from study_app.app.session.garbage_collection import collecting_here
+from study_app.app.session.termination import ended_from_outside
 from study_app.errors import StoreError
 from study_app.gui.application import application_here
-from study_app.gui.background import Background
-from study_app.gui.collector import collecting_here
-from study_app.gui.ending import ended_from_outside
-from study_app.gui.home.place import HomePlace
+from study_app.gui.display.screens import place
+from study_app.gui.home.main_window import MainWindow
+from study_app.gui.home.view import HomePlace
 from study_app.gui.home.workspace import WorkspaceDialog
-from study_app.gui.main_window import MainWindow
-from study_app.gui.screens import place
+from study_app.gui.widgets.background import Background
 from study_app.session.request import NewSession
 from study_app.store.workstation import MachineSettings, create_workspace
 from study_app.workspace import Workspace, chosen_workspace, offered_workspace, workspace
@@ -28,8 +28,8 @@ LOOK_AFTER_MS = 300  # the window stands by then
 if TYPE_CHECKING:
     from study_app.app.lab import First, LabVisit
     from study_app.app.results import ResultsDesk
-    from study_app.gui.lab.place import LabPlace
-    from study_app.gui.results.place import ResultsPlace
+    from study_app.gui.lab.view import LabPlace
+    from study_app.gui.results.view import ResultsPlace
 
 
 def home(results: Path | None = None) -> int:
@@ -179,7 +179,7 @@ class Visit(QObject):
 
     def _lab(self) -> LabPlace:
         from study_app.app.lab import compose_lab  # noqa: PLC0415 - pyqtgraph: only once it is needed
-        from study_app.gui.lab.place import LabPlace  # noqa: PLC0415
+        from study_app.gui.lab.view import LabPlace  # noqa: PLC0415
 
         made = LabPlace()
         settings = self.machine.settings

@@ -8,9 +8,9 @@ from PySide6.QtCore import Qt, QUrl
 from PySide6.QtGui import QDesktopServices, QGuiApplication
 from PySide6.QtWidgets import QApplication
 
-from study_app.gui.display import check_display
-from study_app.gui.icons import logo
-from study_app.gui.theme import LIGHT
+from study_app.gui.display.display_check import check_display
+from study_app.gui.theme.icons import logo
+from study_app.gui.theme.theme import LIGHT
 
 
 def application_here() -> QApplication:

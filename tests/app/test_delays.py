@@ -9,21 +9,21 @@ from PySide6.QtWidgets import QApplication
 from shiboken6 import isValid
 
 from study_app.app import delays as held
+from study_app.app.session.bridge import SessionBridge
+from study_app.app.session.parts import Parts
 from study_app.devices.scripted import ScriptedDevice
 from study_app.errors import StudyError
-from study_app.gui.bridge import SessionBridge
 from study_app.gui.operator import OperatorWindow
-from study_app.gui.operator.progress import SessionProgress, stages
-from study_app.gui.operator.view import Session
 from study_app.gui.operator.watch import WatchedJournal
-from study_app.gui.participant import ParticipantWindow
-from study_app.gui.session_parts import Parts
+from study_app.gui.participant.window import ParticipantWindow
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.load import parse
 from study_app.protocol.orders.schedule import Trial, build_schedule, draw_key, stream
 from study_app.protocol.wording.languages import words
 from study_app.session.trial import SETTLED_S
+from study_app.viewmodels.operator import Session
+from study_app.viewmodels.session_stages import SessionProgress, stages
 from tests.compiled import needs_servo
 from tests.session.fakes import FakeJournal
 

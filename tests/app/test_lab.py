@@ -19,7 +19,7 @@ from study_app.app.lab_opening import LabOpening
 from study_app.errors import DeviceNotFound, ServoFault
 from study_app.evaluation.appraisal import Costs, EffectCost, Errors
 from study_app.evaluation.appraisal_worker import Told
-from study_app.gui.lab.place import LabPlace
+from study_app.gui.lab.view import LabPlace
 from study_app.haptics.model.scene import Scene
 from study_app.lab.presets import Choice, save
 from study_app.protocol.load import load, load_scene, source_bytes

@@ -18,8 +18,8 @@ from study_app.app.live_session import LiveSession
 from study_app.app.machine import MachineDesk, described, settings_here, text_scale_on
 from study_app.app.visit import Visit
 from study_app.devices.backends import NONE, READY, Backend
-from study_app.gui.dialogs import Notice
-from study_app.gui.theme import DARK, LIGHT
+from study_app.gui.theme.theme import DARK, LIGHT
+from study_app.gui.widgets.dialogs import Notice
 from study_app.session.request import NewSession
 from study_app.store import workstation
 from study_app.store.workstation import DEFAULTS, DisplayOffset, MachineSettings, load, save
@@ -237,7 +237,7 @@ def test_a_diagnosis_ends_when_the_place_is_left(visit, qtbot, monkeypatch):
 
 
 def _with(begin):
-    from study_app.gui.devices.diagnosis import DiagnosisDialog
+    from study_app.gui.devices.diagnosis_dialog import DiagnosisDialog
 
     def made(*words, **options):
         return DiagnosisDialog(*words, **options, begin=begin)

@@ -16,7 +16,7 @@ from study_app.app import preflight
 from study_app.app.preflight import Appraisal, Preflight
 from study_app.errors import DeviceLost
 from study_app.evaluation.appraisal import Costs, Errors
-from study_app.gui.theme import LIGHT
+from study_app.gui.theme.theme import LIGHT
 from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
 from study_app.haptics.runtime.telemetry import Timing
 from study_app.protocol.load import load

@@ -17,9 +17,9 @@ from study_app.analysis.worker import carry_out
 from study_app.analysis.worker_messages import Answer, Order, Refused
 from study_app.app.results import ResultsDesk
 from study_app.errors import StudyError
-from study_app.gui.controls import ActionButton
-from study_app.gui.main_window import MainWindow
-from study_app.gui.place import Place
+from study_app.gui.home.main_window import MainWindow
+from study_app.gui.widgets.controls import ActionButton
+from study_app.gui.widgets.main_view import Place
 from study_app.store.blinded.blinding import reveals
 from study_app.store.exclusions import exclude, exclusions
 from study_app.store.folders import StudyFolder

@@ -31,7 +31,7 @@ from PySide6.QtWidgets import QApplication
 from study_app.app.live_session import LiveSession
 from study_app.gui.application import application_here
 from study_app.session.request import NewSession
-from study_app.gui.theme import LIGHT
+from study_app.gui.theme.theme import LIGHT
 
 class Idle:
     def __init__(self, **_named): pass

@@ -13,8 +13,8 @@ from PySide6.QtWidgets import QApplication
 from study_app.app import live_session
 from study_app.app.visit import Visit
 from study_app.errors import DeviceLost, DeviceNotFound
-from study_app.gui.main_window import FULL, LEAST
-from study_app.gui.theme import DARK
+from study_app.gui.home.main_window import FULL, LEAST
+from study_app.gui.theme.theme import DARK
 from study_app.session.request import NewSession
 
 CHOSEN = NewSession("demo", "P001", 1, 7, "AK", "en", "mouse", True, None, Path("nowhere"))

@@ -22,7 +22,7 @@ import numpy as np
 from PySide6.QtWidgets import QApplication
 
 from study_app.errors import SessionError
-from study_app.gui.participant import ParticipantWindow
+from study_app.gui.participant.window import ParticipantWindow
 from study_app.protocol.load import load, parse, source_bytes
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.protocol.wording.languages import words

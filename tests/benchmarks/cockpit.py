@@ -22,11 +22,11 @@ from PySide6.QtWidgets import QApplication, QWidget
 from study_app.devices.scripted import ScriptedDevice
 from study_app.gui.operator import OperatorWindow
 from study_app.gui.operator.force_plots import ForceCard
-from study_app.gui.operator.forces import Forces
-from study_app.gui.operator.health import ServoHealth
 from study_app.haptics.model.layout import SAMPLE, records
 from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.load import load
+from study_app.viewmodels.force_traces import Forces
+from study_app.viewmodels.servo_health import ServoHealth
 
 LIMIT_N = 8.0
 REFRESHES = 300

@@ -54,7 +54,7 @@ def run_one(folder: str) -> int:
     from study_app import app
     from study_app.gui.application import application_here
     from study_app.gui.operator import OperatorWindow
-    from study_app.gui.participant import ParticipantWindow
+    from study_app.gui.participant.window import ParticipantWindow
     from study_app.session.pages import EndPage
 
     application_here()

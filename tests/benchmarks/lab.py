@@ -18,9 +18,9 @@ os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
 from PySide6.QtWidgets import QApplication
 
-from study_app.gui.lab.place import LabPlace
-from study_app.gui.theme import LIGHT
-from study_app.gui.themed import wear
+from study_app.gui.lab.view import LabPlace
+from study_app.gui.theme.theme import LIGHT
+from study_app.gui.theme.themed import wear
 from tests.gui.lab.sample import lab_view, workbench
 
 SIZE = (1600 - 72, 900)  # the rail takes the rest

@@ -22,7 +22,7 @@ from PySide6.QtWidgets import QApplication
 
 from study_app import app
 from study_app.gui.operator import OperatorWindow
-from study_app.gui.participant import ParticipantWindow
+from study_app.gui.participant.window import ParticipantWindow
 from study_app.store.blinded.unblinding import unblind
 from study_app.store.folders import StudyFolder
 from tests.faults.windows import Person

@@ -16,7 +16,6 @@ import tempfile
 import time
 from pathlib import Path
 
-from study_app.gui.sessions.facts import sessions
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.checksums import write_checksums
 from study_app.store.folders import SessionFolder, StudyFolder
@@ -25,6 +24,7 @@ from study_app.store.journals.journal import Line, line_bytes
 from study_app.store.sessions.open_session import Place, table_files
 from study_app.store.tables.participants import write_participants
 from study_app.store.verification.fingerprints import fingerprint, note_fingerprint
+from study_app.viewmodels.sessions import sessions
 
 SESSIONS = 3000
 REHEARSED = 5

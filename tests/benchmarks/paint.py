@@ -17,8 +17,8 @@ os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
 from PySide6.QtWidgets import QApplication
 
-from study_app.gui.participant import ParticipantWindow
-from study_app.gui.scene_view import TankWidget
+from study_app.gui.participant.tank_widget import TankWidget
+from study_app.gui.participant.window import ParticipantWindow
 from study_app.protocol.load import load
 from study_app.protocol.model import Protocol
 from study_app.protocol.trials.task import Reach

@@ -16,10 +16,10 @@ os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
 from study_app.app.visit import Visit
 from study_app.gui.application import application_here
-from study_app.gui.home.facts import study_facts
-from study_app.gui.new_session import NewSessionDialog
+from study_app.gui.home.new_session_dialog import NewSessionDialog
 from study_app.protocol.load import load, source_bytes
 from study_app.store.sessions.begin import begin
+from study_app.viewmodels.home import study_facts
 
 SESSIONS = 300
 STANDS_S = 4.0

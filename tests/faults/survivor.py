@@ -21,11 +21,11 @@ from study_app import app
 from study_app.app import live_session
 from study_app.devices.rig import Machine
 from study_app.gui.application import application_here
-from study_app.gui.dialogs import Notice
 from study_app.gui.operator import OperatorWindow
-from study_app.gui.operator.rail import StepLine
-from study_app.gui.participant import ParticipantWindow
-from study_app.gui.plots import TracePlot
+from study_app.gui.operator.steps_card import StepLine
+from study_app.gui.participant.window import ParticipantWindow
+from study_app.gui.widgets.dialogs import Notice
+from study_app.gui.widgets.plots import TracePlot
 from study_app.session import start
 from study_app.session.pages import PausePage, TaskPage, TroublePage
 from study_app.store.recorder import Recorder

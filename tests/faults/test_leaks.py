@@ -13,8 +13,8 @@ from PySide6.QtWidgets import QApplication, QLabel, QWidget
 from study_app import app
 from study_app.gui.operator import OperatorWindow
 from study_app.gui.operator.force_plots import ForceCard
-from study_app.gui.operator.plots import HiddenForceCard
-from study_app.gui.participant import ParticipantWindow
+from study_app.gui.operator.plot_cards import HiddenForceCard
+from study_app.gui.participant.window import ParticipantWindow
 from study_app.protocol.load import load, source_bytes
 from study_app.session import start
 from study_app.session.pages import TaskPage

@@ -16,7 +16,7 @@ from study_app.app import live_session
 from study_app.devices.rig import Machine
 from study_app.errors import StudyError
 from study_app.gui.operator import OperatorWindow
-from study_app.gui.participant import ParticipantWindow
+from study_app.gui.participant.window import ParticipantWindow
 from study_app.session import start
 from study_app.session.pages import PausePage, TaskPage
 from study_app.store.folders import StudyFolder

@@ -10,8 +10,8 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.gui.operator import OperatorWindow
-from study_app.gui.pages.questionnaire import QuestionnaireWidget
-from study_app.gui.participant import ParticipantWindow
+from study_app.gui.participant.pages.questionnaire import QuestionnaireWidget
+from study_app.gui.participant.window import ParticipantWindow
 from study_app.session.pages import EndPage, QuestionnairePage, TextPage
 
 W = TypeVar("W", bound=QWidget)

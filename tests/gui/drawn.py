@@ -12,12 +12,12 @@ from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QPainter
 from PySide6.QtWidgets import QApplication, QLabel, QWidget
 
-from study_app.gui.pages import base
+from study_app.gui.participant.pages import page_widget
 
 MODULES = tuple(
     f"study_app.gui.{name}"
     for name in ("keys", "progress", "scene_view", "pages.cells", "pages.heading", "pages.languages")
-) + tuple(f"study_app.gui.pages.{name}" for name in ("notices", "questionnaire", "reading", "rows", "text"))
+) + tuple(f"study_app.gui.participant.pages.{name}" for name in ("notices", "questionnaire", "reading", "rows", "text"))
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ def recorded() -> Iterator[list[Drawn]]:
     for name in MODULES:
         module = sys.modules[name]
         if hasattr(module, "page_painter"):
-            before[name] = base.page_painter
+            before[name] = page_widget.page_painter
             module.page_painter = lambda widget: Recorder(widget, kept)  # type: ignore[attr-defined]
     try:
         yield kept

@@ -15,12 +15,12 @@ from PySide6.QtGui import QFontMetricsF, QImage
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QApplication, QLabel
 
-from study_app.gui.pages.cells import Cell
-from study_app.gui.pages.languages import LanguageButton
-from study_app.gui.pages.questionnaire import QuestionnaireWidget
-from study_app.gui.pages.rows import Row
-from study_app.gui.participant import ParticipantWindow
-from study_app.gui.theme import font
+from study_app.gui.participant.pages.answer_cell import Cell
+from study_app.gui.participant.pages.language_switch import LanguageButton
+from study_app.gui.participant.pages.questionnaire import QuestionnaireWidget
+from study_app.gui.participant.pages.statement_row import Row
+from study_app.gui.participant.window import ParticipantWindow
+from study_app.gui.theme.theme import font
 from study_app.protocol.wording.languages import Words, words
 from study_app.session.pages import EndPage, Page, PausePage, Progress, QuestionnairePage, TroublePage
 from tests.gui.drawn import Drawn, drawn_by

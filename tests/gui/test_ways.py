@@ -10,11 +10,11 @@ from PySide6.QtGui import QAccessible, QPointingDevice
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
 
-from study_app.gui.pages import questionnaire as page_module
-from study_app.gui.pages import rows as rows_module
-from study_app.gui.pages.questionnaire import QuestionnaireWidget
-from study_app.gui.pages.text import TextWidget
-from study_app.gui.participant import ParticipantWindow
+from study_app.gui.participant.pages import questionnaire as page_module
+from study_app.gui.participant.pages import statement_row as rows_module
+from study_app.gui.participant.pages.questionnaire import QuestionnaireWidget
+from study_app.gui.participant.pages.text_page import TextWidget
+from study_app.gui.participant.window import ParticipantWindow
 from study_app.protocol.wording.languages import words
 from study_app.session.pages import PausePage
 from study_app.session.transitions.events import Chosen, Continue, ItemShown, LanguageChosen, ResumeAsked, Submitted

@@ -93,7 +93,7 @@ def test_nothing_of_a_study_is_in_it(
     assert "test_support.py:" in found["last-error.txt"]
     assert "in fails" in found["last-error.txt"]
     assert found["diagnosis.txt"] == "1  FOUND  no reply\n"
-    assert "gui/bridge.py" in found["crash-1.txt"]
+    assert "app/session/bridge.py" in found["crash-1.txt"]
     settings = json.loads(found["settings.json"])
     private = [settings[name] for name in ("operator", "workspace", "firmware", "recent")]
     assert (private, settings["device"]) == ([True] * 4, "mouse")

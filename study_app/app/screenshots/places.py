@@ -10,9 +10,9 @@ from PySide6.QtWidgets import QDialog
 from study_app.app.screenshots.camera import Camera, shown
 from study_app.app.screenshots.stage import STUDY
 from study_app.app.visit import Visit
-from study_app.gui.home.facts import StudyFacts, study_facts
 from study_app.gui.settings.display_test import DisplayTest
-from study_app.gui.theme import Theme
+from study_app.gui.theme.theme import Theme
+from study_app.viewmodels.home import StudyFacts, study_facts
 
 HOME: Final = (1440, 900)
 WIDE: Final = (1600, 900)

@@ -16,9 +16,9 @@ from study_app.app.screenshots.camera import Camera
 from study_app.app.screenshots.places import take_places
 from study_app.app.screenshots.session import take_session, take_single_blind
 from study_app.app.screenshots.stage import STUDY, quick, rehearsed
+from study_app.app.session.garbage_collection import collecting_here
 from study_app.gui.application import application_here
-from study_app.gui.collector import collecting_here
-from study_app.gui.theme import DARK, LIGHT
+from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.user_folder import FOLDER_VARIABLE
 from study_app.workspace import FOLDER_NAME, WORKSPACE_VARIABLE
 

@@ -13,10 +13,10 @@ from PySide6.QtWidgets import QWidget
 from study_app.app.live_session import LiveSession
 from study_app.app.screenshots.camera import Camera, shown
 from study_app.app.screenshots.stage import SEED
-from study_app.gui.bridge import SessionBridge
+from study_app.app.session.bridge import SessionBridge
 from study_app.gui.preflight import PreflightWindow
-from study_app.gui.theme import DARK, LIGHT
-from study_app.gui.themed import wear
+from study_app.gui.theme.theme import DARK, LIGHT
+from study_app.gui.theme.themed import wear
 from study_app.protocol.model import Explore
 from study_app.session.pages import Page, QuestionnairePage, TaskPage, TextPage
 from study_app.session.request import NewSession

@@ -1,142 +1,192 @@
-"""What the devices' place and the home's card say of each device, as values. No Qt here."""
+"""The devices' place: what there is to feel with, which one sessions begin with, and what is wrong with a Falcon.
+
+It draws values and says what is asked for; it opens no device.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QBoxLayout, QButtonGroup, QFileDialog, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
 
-from study_app.devices import kind_of, list_devices
-from study_app.devices.backends import NONE, READY, Backend
-from study_app.errors import DeviceError
+from study_app.gui.devices.device_rows import LEAST_WORDS, DeviceList
+from study_app.gui.theme.theme import font
+from study_app.gui.theme.themed import dress
+from study_app.gui.widgets.cards import SHADOW, Card
+from study_app.gui.widgets.controls import ActionButton
+from study_app.gui.widgets.labels import Elided, label
+from study_app.gui.widgets.main_view import Place
+from study_app.viewmodels.device_list import DeviceShown
 
-if TYPE_CHECKING:
-    from study_app.gui.cards import Tone
-
-TITLES = {
-    "mouse": "Mouse",
-    "spacemouse": "SpaceMouse",
-    "falcon": "Novint Falcon",
-    "scripted": "Scripted hand",
-    "falcon-emulated": "Emulated Falcon",
-    "falcon-socket": "Falcon behind a socket",
-}
-ICONS = {"mouse": "mouse", "spacemouse": "mouse", "falcon": "device"}
-SIMULATED_ICON = "fast_forward"
-FELT_BY_PEOPLE = ("mouse", "spacemouse", "falcon")
+STACKED_BELOW = 1000
+BESIDE = 340
+NO_FILE = "No file chosen"
 
 
-@dataclass(frozen=True, slots=True)
-class Way:
-    """One library that a device is reached by: ``state`` is what it found, ``why`` why it cannot be used now."""
+class FirmwareCard(Card):
+    """The file of a Falcon's program; ``chosen`` carries its path, None to forget it."""
 
-    by: str
-    state: str
-    why: str
+    chosen = Signal(object)
+
+    def __init__(self) -> None:
+        super().__init__("Falcon's firmware", gap=8)
+        about = label(
+            "A Falcon has no program until one is loaded, and none may be given away with this software. Choose the "
+            "file you hold; it is loaded only where the Falcon needs it.",
+            "label",
+            "text2",
+            wraps=True,
+        )
+        about.setFont(font("label", weight=400))
+        about.setMinimumWidth(LEAST_WORDS)
+        self.file = Elided("label", "text")
+        self.choose = ActionButton("file", "Choose file …", height=38)
+        self.forget = ActionButton("", "Forget", height=38)
+        self.choose.clicked.connect(self._choose)
+        self.forget.clicked.connect(lambda: self.chosen.emit(None))
+        buttons = QHBoxLayout()
+        buttons.setSpacing(12)
+        buttons.addWidget(self.choose, 1)
+        buttons.addWidget(self.forget)
+        self.column.addWidget(about)
+        self.column.addWidget(self.file)
+        self.column.addLayout(buttons)
+        self._path = ""
+        self.show_file(None)
+
+    def show_file(self, path: str | None) -> None:
+        """Show which file was chosen."""
+        self._path = path or ""
+        self.file.show_text(path or NO_FILE)
+        self.forget.setEnabled(path is not None)
+
+    def _choose(self) -> None:
+        path, _ = QFileDialog.getOpenFileName(self, "Falcon's firmware", self._path, "Firmware (*.bin);;All files (*)")
+        if path:
+            self.chosen.emit(path)
 
 
-@dataclass(frozen=True, slots=True)
-class DeviceShown:
-    """A device: ``name`` is for ``--device``, ``can`` says what it can and cannot do.
+class HelpCard(Card):
+    """What to do next with a Falcon: the words that need no window."""
 
-    ``tone``, ``sign`` and ``word`` are its state; ``why`` says why it cannot be used now, "" where it can.
+    def __init__(self) -> None:
+        super().__init__("Before the first session", gap=8)
+        for words in (
+            "Plug in cable and mains adapter, then press “Refresh”.",
+            "“Diagnose …” finds, opens, loads, homes and turns it without force, and says what is wrong.",
+            "“liquid-study devices calibrate” measures how strong it is, with a known weight.",
+        ):
+            line = label(words, "label", "text2", wraps=True)
+            line.setFont(font("label", weight=400))
+            line.setMinimumWidth(LEAST_WORDS)
+            self.column.addWidget(line)
+
+
+class DevicesPlace(Place):
+    """Every device with its state.
+
+    ``look_asked`` where the machine is to be looked at again; ``chosen`` carries the name of the device that sessions
+    begin with; ``firmware_chosen`` a path or None; ``diagnose_asked`` a Falcon's name; ``left`` comes with `leave`.
     """
 
-    name: str
-    title: str
-    icon: str
-    tone: Tone
-    sign: str
-    word: str
-    can: str
-    why: str
-    ways: tuple[Way, ...] = ()
+    look_asked = Signal()
+    chosen = Signal(str)
+    firmware_chosen = Signal(object)
+    diagnose_asked = Signal(str)
+    left = Signal()
 
-    @property
-    def ready(self) -> bool:
-        """Whether it can be felt with now."""
-        return self.tone == "ok"
+    def __init__(self) -> None:
+        super().__init__()
+        self._group = QButtonGroup(self)
+        self.people = DeviceList("To feel with", self._group)
+        self.simulated = DeviceList("Moves by itself", self._group)
+        self.firmware = FirmwareCard()
+        self.help = HelpCard()
+        self.refresh = ActionButton("repeat", "Refresh", key="F5")
+        self.refresh.clicked.connect(self.look_asked)
+        for part in (self.people, self.simulated):
+            part.chosen.connect(self.chosen)
+            part.diagnose_asked.connect(self.diagnose_asked)
+        self.firmware.chosen.connect(self.firmware_chosen)
+        self._lay_out()
 
-    @property
-    def choosable(self) -> bool:
-        """Whether its name can be taken as it is."""
-        return self.name in list_devices()
+    def _lay_out(self) -> None:
+        titles = QVBoxLayout()
+        titles.setSpacing(4)
+        titles.addWidget(label("Devices", "title"))
+        titles.addWidget(
+            label("The one that is marked is what a new session begins with.", "body", "text2", wraps=True)
+        )
+        head = QHBoxLayout()
+        head.setContentsMargins(SHADOW, 0, SHADOW, 0)
+        head.addLayout(titles, 1)
+        head.addWidget(self.refresh)
+        lists = QVBoxLayout()
+        lists.setSpacing(18)
+        lists.addWidget(self.people)
+        lists.addWidget(self.simulated)
+        lists.addStretch()
+        beside = QVBoxLayout()
+        beside.setSpacing(18)
+        beside.addWidget(self.firmware)
+        beside.addWidget(self.help)
+        beside.addStretch()
+        self._body = QBoxLayout(QBoxLayout.Direction.LeftToRight)
+        self._body.setSpacing(18)
+        self._body.addLayout(lists, 1)
+        self._body.addLayout(beside)
+        inside = QWidget()
+        page = QVBoxLayout(inside)
+        page.setContentsMargins(30, 30, 30, 22)
+        page.setSpacing(20)
+        page.addLayout(head)
+        page.addLayout(self._body, 1)
+        self._area = QScrollArea()
+        self._area.setWidgetResizable(True)
+        self._area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self._area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self._area.setWidget(inside)
+        row = QVBoxLayout(self)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.addWidget(self._area)
 
-    @property
-    def diagnosable(self) -> bool:
-        """Whether an examination can look at it as it is."""
-        return self.choosable and self.name.startswith("falcon")
+    def enter(self) -> None:
+        """Look at the machine again: something may have been plugged in."""
+        self.look_asked.emit()
 
+    def leave(self) -> None:
+        """Say so: what examines a device must let go of it."""
+        self.left.emit()
 
-def devices_shown(backends: Sequence[Backend]) -> tuple[DeviceShown, ...]:
-    """Return what to show of each device, those that people feel with first; backends of one device are one."""
-    names = list(dict.fromkeys(backend.name for backend in backends))
-    shown = [_shown(name, [one for one in backends if one.name == name]) for name in names]
-    return tuple(sorted(shown, key=lambda device: device.name not in FELT_BY_PEOPLE))
+    def show_devices(self, shown: tuple[DeviceShown, ...], preferred: str) -> None:
+        """Show what was found, and which device sessions begin with."""
+        self.people.show_devices(tuple(one for one in shown if not _simulated(one)))
+        self.simulated.show_devices(tuple(one for one in shown if _simulated(one)))
+        self._group.setExclusive(False)  # or what is marked could not lose its mark
+        for part in (self.people, self.simulated):
+            part.mark(preferred.partition(":")[0])
+            dress(part, self.theme)
+        self._group.setExclusive(True)
 
+    def show_firmware(self, path: str | None) -> None:
+        """Show which file a Falcon's program is loaded from."""
+        self.firmware.show_file(path)
 
-def device_named(name: str, shown: Iterable[DeviceShown]) -> DeviceShown:
-    """Return what to show of the preferred device; of one that was not looked at, its name alone."""
-    try:
-        kind = kind_of(name)
-    except DeviceError as error:
-        return DeviceShown(name, name, "device", "bad", "warning", "Not known", "", _sentence(str(error)))
-    for device in shown:
-        if device.name.partition(":")[0] == kind:
-            return device
-    return looking(name)
+    def show_looking(self, looking: bool) -> None:
+        """Say that the machine is being looked at."""
+        self.refresh.setEnabled(not looking)
+        self.refresh.show_action("repeat", "Looking …" if looking else "Refresh")
 
-
-def looking(name: str) -> DeviceShown:
-    """Return what to show of a device before anybody looked."""
-    kind = name.partition(":")[0]
-    return DeviceShown(name, TITLES.get(kind, name), _icon(kind), "neutral", "clock", "Looking …", "", "")
-
-
-def _shown(name: str, ways: Sequence[Backend]) -> DeviceShown:
-    kind = name.partition(":")[0]
-    best = min(ways, key=_rank)
-    tone, sign, word = _state(best)
-    return DeviceShown(
-        name=name,
-        title=TITLES.get(kind, name),
-        icon=_icon(kind),
-        tone=tone,
-        sign=sign,
-        word=word,
-        can=_sentence(ways[0].can),
-        why="" if tone == "ok" and not best.why else _sentence(best.why),
-        ways=tuple(Way(way.by, way.state, way.why) for way in ways),
-    )
-
-
-def _rank(backend: Backend) -> int:
-    """Return how far a backend is from being felt with; a driver that is ready has not found a device yet."""
-    if _connected(backend):
-        return 0
-    return {READY: 1, NONE: 2}.get(backend.state, 3)
-
-
-def _connected(backend: Backend) -> bool:
-    return backend.state.startswith("connected")
-
-
-def _state(backend: Backend) -> tuple[Tone, str, str]:
-    if _connected(backend):
-        return ("warn", "warning", "Look at it") if backend.why else ("ok", "check", "Connected")
-    if backend.state == READY and backend.name == "falcon":
-        return "neutral", "ring", "Driver ready"
-    if backend.state == READY and backend.name not in list_devices():
-        return "neutral", "info", "By command"
-    if backend.state == READY:
-        return "ok", "check", "Ready"
-    return ("neutral", "ring", "Not connected") if backend.state == NONE else ("warn", "warning", "Not available")
-
-
-def _icon(kind: str) -> str:
-    return ICONS.get(kind, SIMULATED_ICON)
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
+        """Make room: what is beside goes below."""
+        super().resizeEvent(event)
+        stacked = self.width() < STACKED_BELOW
+        way = QBoxLayout.Direction.TopToBottom if stacked else QBoxLayout.Direction.LeftToRight
+        self._body.setDirection(way)
+        for card in (self.firmware, self.help):
+            card.setMinimumWidth(0 if stacked else BESIDE)
+            card.setMaximumWidth(16_777_215 if stacked else BESIDE)
 
 
-def _sentence(words: str) -> str:
-    """Return a clause with a capital letter and a full stop."""
-    return words[:1].upper() + words[1:] + ("" if not words or words[-1] in ".!?" else ".")
+def _simulated(shown: DeviceShown) -> bool:
+    return shown.icon == "fast_forward"

@@ -6,10 +6,10 @@ from pathlib import Path
 
 from PySide6.QtWidgets import QFileDialog, QHBoxLayout, QLineEdit, QWidget
 
-from study_app.gui.controls import ActionButton
-from study_app.gui.dialogs import Question
-from study_app.gui.labels import label
-from study_app.gui.theme import Theme, font
+from study_app.gui.theme.theme import Theme, font
+from study_app.gui.widgets.controls import ActionButton
+from study_app.gui.widgets.dialogs import Question
+from study_app.gui.widgets.labels import label
 
 
 class WorkspaceDialog(Question):

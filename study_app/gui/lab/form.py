@@ -5,16 +5,16 @@ from __future__ import annotations
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QScrollArea, QStackedLayout, QVBoxLayout, QWidget
 
-from study_app.gui.cards import Card, Rule
-from study_app.gui.controls import ActionButton, Choice
-from study_app.gui.hidden import Hidden
-from study_app.gui.lab.rows import ParameterRow, SwitchRow, row_for
-from study_app.gui.lab.switch import Badge
-from study_app.gui.lab.view import FormSection, LabView, form
-from study_app.gui.labels import Clamped, label
-from study_app.gui.theme import font
-from study_app.gui.themed import dress
+from study_app.gui.lab.parameter_rows import ParameterRow, SwitchRow, row_for
+from study_app.gui.lab.side_switch import Badge
+from study_app.gui.theme.theme import font
+from study_app.gui.theme.themed import dress
+from study_app.gui.widgets.cards import Card, Rule
+from study_app.gui.widgets.controls import ActionButton, Choice
+from study_app.gui.widgets.labels import Clamped, label
+from study_app.gui.widgets.masked_panel import Hidden
 from study_app.lab.ab_comparison import Setting, other
+from study_app.viewmodels.lab import FormSection, LabView, form
 
 HIDDEN = "Hidden while blind"
 

@@ -11,14 +11,14 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from study_app.gui.controls import ActionButton, Choice, Toggle
-from study_app.gui.icons import draw_icon
-from study_app.gui.lab.switch import SideSwitch
-from study_app.gui.lab.view import Choices, LabView
-from study_app.gui.labels import label
-from study_app.gui.stop_button import CompactStop
-from study_app.gui.theme import font
-from study_app.gui.themed import Themed
+from study_app.gui.lab.side_switch import SideSwitch
+from study_app.gui.theme.icons import draw_icon
+from study_app.gui.theme.theme import font
+from study_app.gui.theme.themed import Themed
+from study_app.gui.widgets.controls import ActionButton, Choice, Toggle
+from study_app.gui.widgets.labels import label
+from study_app.gui.widgets.stop_button import CompactStop
+from study_app.viewmodels.lab import Choices, LabView
 
 BUTTON = 44
 FREE = "Free motion"

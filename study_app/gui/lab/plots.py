@@ -11,15 +11,15 @@ from PySide6.QtCore import QPointF, QSize
 from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QStackedLayout, QVBoxLayout, QWidget
 
-from study_app.gui.accessible import describe_plot
-from study_app.gui.cards import Card
-from study_app.gui.hidden import Hidden
 from study_app.gui.lab.form import HIDDEN
-from study_app.gui.lab.view import SPAN_S, Floats, LabView
-from study_app.gui.labels import label
-from study_app.gui.plots import MINUS, Plot, draw_quickly, number, pen
-from study_app.gui.theme import LIGHT, Theme, font
-from study_app.gui.themed import Themed
+from study_app.gui.theme.theme import LIGHT, Theme, font
+from study_app.gui.theme.themed import Themed
+from study_app.gui.widgets.accessible import describe_plot
+from study_app.gui.widgets.cards import Card
+from study_app.gui.widgets.labels import label
+from study_app.gui.widgets.masked_panel import Hidden
+from study_app.gui.widgets.plots import MINUS, Plot, draw_quickly, number, pen
+from study_app.viewmodels.lab import SPAN_S, Floats, LabView
 
 POINTS = 240  # of a curve: one for one to two pixels; painting takes as long as there are points
 STEPS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)

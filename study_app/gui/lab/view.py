@@ -1,200 +1,283 @@
-"""What the liquid lab shows, as one frozen value: widgets only draw it. No Qt here.
+"""The liquid lab: left what can be changed, in the middle what it does, right what it costs.
 
-Everything is in SI units and the scene frame unless said otherwise; a parameter's own ``factor`` and ``shown_unit`` say
-how it is written.
+It draws a `LabView` and says what is asked for; it knows no device and no servo.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Protocol, TypeAlias
+from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
+from PySide6.QtCore import QEvent, QSize, Qt, Signal
+from PySide6.QtGui import QHideEvent, QKeySequence, QResizeEvent, QShortcut, QShowEvent
+from PySide6.QtWidgets import QFileDialog, QGridLayout, QScrollArea, QVBoxLayout, QWidget
 
-from study_app.lab.ab_comparison import Setting, Side, Workbench
-from study_app.lab.parameters import Parameter, Value, sections
+from study_app.gui.lab.form import FormPanel
+from study_app.gui.lab.header import LabHeader
+from study_app.gui.lab.lab_tank import LabTank
+from study_app.gui.lab.measurement_cards import CostCard, ErrorCard, LimiterCard
+from study_app.gui.lab.plots import ForceCard, SpeedCard
+from study_app.gui.lab.side_switch import KEY
+from study_app.gui.lab.tank_note import TankNote
+from study_app.gui.theme.theme import SPACE
+from study_app.gui.widgets.cards import SHADOW
+from study_app.gui.widgets.escape_key import EscapeAnywhere
+from study_app.gui.widgets.main_view import Place
+from study_app.lab.ab_comparison import Setting
+from study_app.viewmodels.lab import LabView
+from study_app.workspace import workspace
 
-Floats: TypeAlias = NDArray[np.float64]
-Point: TypeAlias = tuple[float, float, float]
-Choices: TypeAlias = tuple[tuple[str, str], ...]
-"""Pairs of what is chosen and the words for it."""
-
-SPAN_S = 2.5
-SIDES: tuple[Side, Side] = ("A", "B")
+FORM_WIDTH, FORM_WIDTH_NARROW, SIDE_WIDTH = 404, 380, 300
+LEAST = QSize(928, 560)
+WIDE, ONE_ROW = 1240, 1460
+GAP = 14
+SUFFIX = ".toml"
 
 
-class TailShown(Protocol):
-    """The wake's elements as places the body was at (see ``lab.shadow.Tail``), from the oldest to the newest.
+class LabPlace(Place):
+    """The lab as a place of the operator's window.
 
-    ``positions_m`` (n, 3) [m, hand frame]; ``breaks`` (n,) bool, true where a segment begins; ``ages`` (n,) from 0, the
-    newest, to 1, the oldest; ``alive`` of ``elements`` are held now, in ``segments`` segments.
+    ``changed(name, value, held)`` is a parameter of the felt side in SI, ``held`` while its slider is dragged;
+    ``hand_moved`` [m, hand frame] and ``hand_pressed`` are the mouse's while it moves the ball; ``entered`` and
+    ``left`` come as the place is shown and hidden; ``save_asked`` is a file and the `Setting` that was felt when it was
+    asked for; ``use_asked`` a study's file and that `Setting`, ``preset_opened`` the file of a preset.
     """
 
-    @property
-    def positions_m(self) -> Floats: ...  # noqa: D102
-    @property
-    def breaks(self) -> NDArray[np.bool_]: ...  # noqa: D102
-    @property
-    def ages(self) -> Floats: ...  # noqa: D102
-    @property
-    def elements(self) -> int: ...  # noqa: D102
-    @property
-    def alive(self) -> int: ...  # noqa: D102
-    @property
-    def segments(self) -> int: ...  # noqa: D102
+    changed = Signal(str, object, bool)
+    liquid_chosen = Signal(str, object)
+    switched = Signal()
+    blind_asked = Signal(bool)
+    undo_asked = Signal()
+    redo_asked = Signal()
+    device_chosen = Signal(str)
+    path_chosen = Signal(object)
+    stop_asked = Signal()
+    fade_in_asked = Signal()
+    cancel_asked = Signal()
+    save_asked = Signal(Path, object)
+    use_asked = Signal(Path, object)
+    preset_opened = Signal(Path)
+    copied = Signal()
+    hand_moved = Signal(float, float, float)
+    hand_pressed = Signal(int)
+    entered = Signal()
+    left = Signal()
 
+    def __init__(self) -> None:
+        super().__init__()
+        self.setProperty("role", "window")
+        self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
+        self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
+        self.setMinimumSize(LEAST)
+        self._view: LabView | None = None
+        self._wide: bool | None = None
+        self.dialog: QFileDialog | None = None
+        self.header = LabHeader()
+        self.form = FormPanel()
+        self.tank = LabTank()
+        self.note = TankNote(self.tank)
+        self.force, self.speed = ForceCard(), SpeedCard()
+        self.cost, self.error, self.limiters = CostCard(), ErrorCard(), LimiterCard()
+        self._escape = EscapeAnywhere(self)
+        self._lay_out()
+        self._connect()
+        self._shortcuts()
+        self._arrange(wide=True)
 
-class TraceShown(Protocol):
-    """The last 2.5 s of one motion as A and as B have it (see ``lab.shadow.Trace``); ``t_s`` (n,) ends at 0, now.
+    def _lay_out(self) -> None:
+        self._side = QGridLayout()
+        self._side.setContentsMargins(0, 0, 0, 0)
+        self._side.setSpacing(GAP)
+        self._middle = QGridLayout()
+        self._middle.setContentsMargins(0, 0, 0, 0)
+        self._middle.setSpacing(GAP)
+        self._middle.setColumnStretch(0, 1)
+        self._middle.setColumnStretch(1, 1)
+        framed = QVBoxLayout()
+        framed.setContentsMargins(SHADOW, SHADOW - 1, SHADOW, SHADOW)  # as the cards beside and below it
+        framed.addWidget(self.tank)
+        self._middle.addLayout(framed, 0, 0, 1, 2)
+        self._middle.addWidget(self.force, 1, 0)
+        self._middle.addWidget(self.speed, 1, 1)
+        self._middle.addLayout(self._side, 2, 0, 1, 2)
+        self._area = _scrolled(self._middle)
+        self._side_area = _scrolled(QGridLayout())
+        self._body = QGridLayout()
+        self._body.setContentsMargins(SPACE[4] - 3, GAP, SPACE[4] - 3, GAP)
+        self._body.setSpacing(GAP)
+        self._body.addWidget(self.form, 0, 0)
+        self._body.addWidget(self._area, 0, 1)
+        self._body.addWidget(self._side_area, 0, 2)
+        self._body.setColumnStretch(1, 1)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        column.addWidget(self.header)
+        column.addLayout(self._body, 1)
 
-    ``force_a_n``, ``force_b_n`` (n, 3) are forces as sent, or as they would be, on the hand; ``body_mps``,
-    ``wake_a_mps`` and ``wake_b_mps`` (n,) speeds.
-    """
+    def _arrange(self, *, wide: bool) -> None:
+        """Place the right column beside the middle, or under it where there is no room."""
+        if wide == self._wide:
+            return
+        self._wide = wide
+        cards = (self.cost, self.error, self.limiters)
+        column = self._side_area.widget().layout()
+        assert isinstance(column, QGridLayout)  # noqa: S101  # made so above
+        column.setSpacing(GAP)
+        column.setContentsMargins(0, 0, 0, 0)
+        for number, card in enumerate(cards):
+            if wide:
+                column.addWidget(card, number, 0)
+                column.setRowStretch(number, int(card is self.limiters))
+            else:
+                row, at = ((0, 0), (0, 1), (1, 0))[number]
+                self._side.addWidget(card, row, at, 1, 2 if card is self.limiters else 1)
+        self._side_area.setVisible(wide)
+        self._side_area.setFixedWidth(SIDE_WIDTH)
+        self._middle.setRowStretch(0, 61)
+        self._middle.setRowStretch(1, 39)
 
-    @property
-    def t_s(self) -> Floats: ...  # noqa: D102
-    @property
-    def force_a_n(self) -> Floats: ...  # noqa: D102
-    @property
-    def force_b_n(self) -> Floats: ...  # noqa: D102
-    @property
-    def body_mps(self) -> Floats: ...  # noqa: D102
-    @property
-    def wake_a_mps(self) -> Floats: ...  # noqa: D102
-    @property
-    def wake_b_mps(self) -> Floats: ...  # noqa: D102
+    def _connect(self) -> None:
+        header, form = self.header, self.form
+        for mine, part in (
+            (self.switched, header.switched),
+            (self.blind_asked, header.blind_asked),
+            (self.device_chosen, header.device_chosen),
+            (self.path_chosen, header.path_chosen),
+            (self.undo_asked, header.undo_asked),
+            (self.redo_asked, header.redo_asked),
+            (self.stop_asked, header.stop_asked),
+            (self.changed, form.changed),
+            (self.liquid_chosen, form.liquid_chosen),
+            (self.copied, form.copied),
+            (self.fade_in_asked, self.note.fade_in_asked),
+            (self.cancel_asked, self.note.cancel_asked),
+            (self.hand_moved, self.tank.moved),
+            (self.hand_pressed, self.tank.pressed),
+        ):
+            part.connect(mine)
+        header.save_asked.connect(self.ask_where_to_save)
+        form.open_asked.connect(self.ask_which_to_open)
+        form.use_asked.connect(self.ask_which_study)
+        self._escape.held.connect(self._stop)
 
-
-class LiquidShown(Protocol):
-    """A liquid that a side can be set to (see ``lab.presets.Choice``); ``title`` names it among the others."""
-
-    @property
-    def title(self) -> str: ...  # noqa: D102
-
-
-class LimiterShown(Protocol):
-    """A limiter, how many ticks of the last 10 s it acted in, and whether it does now (see ``lab.live.Limiter``)."""
-
-    @property
-    def name(self) -> str: ...  # noqa: D102
-    @property
-    def ticks(self) -> int: ...  # noqa: D102
-    @property
-    def acting(self) -> bool: ...  # noqa: D102
-
-
-@dataclass(frozen=True, slots=True)
-class Now:
-    """Where the hand is [m, hand frame], the force felt on it [N], the wake that the body meets [m/s, scene]."""
-
-    position_m: Point
-    force_n: Point = (0.0, 0.0, 0.0)
-    wake_mps: Point = (0.0, 0.0, 0.0)
-
-
-@dataclass(frozen=True, slots=True)
-class CostRow:
-    """An effect and the ns it takes of a tick; ``ns`` None where it is not there, and ``why`` not ("not asked for")."""
-
-    effect: str
-    ns: float | None
-    why: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class ErrorRow:
-    """A measure of how far the felt setting is from its reference, written out: ("Force, largest", "< 0.001 N")."""
-
-    measure: str
-    value: str
-    note: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class DeviceShown:
-    """Which devices can be chosen, which is, and how it is: ``state`` is one or two words."""
-
-    choices: Choices
-    chosen: str
-    state: str = ""
-    ready: bool = True
-
-
-@dataclass(frozen=True, slots=True)
-class LabView:
-    """Everything on the liquid lab's place.
-
-    ``liquids`` are what a side can be set to, ``paths`` the programmed motions; ``path`` is the one that runs, None for
-    live motion alone. ``busy`` says what is waited for ("Opening the Falcon"); ``refused`` is the parameter that could
-    not be changed and one line why, a new pair for every refusal; ``said`` tells what was saved or opened last.
-    ``tail_a``, ``tail_b``, ``trace`` and ``now`` are None where nothing has moved yet, a tail also where the setting
-    has no wake. ``cost`` and ``errors`` are of the felt setting, empty until they are measured; ``measuring`` while
-    they are measured anew.
-    """
-
-    workbench: Workbench
-    liquids: tuple[LiquidShown, ...]
-    device: DeviceShown
-    paths: Choices = ()
-    path: str | None = None
-    trace: TraceShown | None = None
-    tail_a: TailShown | None = None
-    tail_b: TailShown | None = None
-    now: Now | None = None
-    limiters: tuple[LimiterShown, ...] = ()
-    cost: tuple[CostRow, ...] = ()
-    tick_ns: float | None = None
-    errors: tuple[ErrorRow, ...] = ()
-    measuring: bool = False
-    force_on: bool = True
-    may_fade_in: bool = True
-    busy: str = ""
-    trouble: str = ""
-    refused: tuple[str, str] | None = None
-    said: str = ""
-    workspace_m: Point = (0.1, 0.06, 0.06)
-    body_radius_m: float = 0.0034
-
-    @property
-    def felt(self) -> Side:
-        """The side that is felt."""
-        return self.workbench.felt
-
-    @property
-    def tail(self) -> TailShown | None:
-        """The tail of the side that is felt."""
-        return self.tail_a if self.felt == "A" else self.tail_b
-
-
-@dataclass(frozen=True, slots=True)
-class FormRow:
-    """A parameter as it is, and as it was when the liquid was chosen."""
-
-    parameter: Parameter
-    value: Value
-    preset: Value
+    def _shortcuts(self) -> None:
+        """Give X, undo and redo to the place alone: other places of the window have keys of their own."""
+        for sequence, signal in (
+            (KEY, self.switched),
+            ("Ctrl+Z", self.undo_asked),
+            ("Ctrl+Shift+Z", self.redo_asked),
+            ("Ctrl+Y", self.redo_asked),
+        ):
+            shortcut = QShortcut(QKeySequence(sequence), self)
+            shortcut.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
+            shortcut.activated.connect(signal)
 
     @property
-    def changed(self) -> bool:
-        """Whether it is something else than it was."""
-        return self.value != self.preset
+    def view(self) -> LabView | None:
+        """What is shown; None before the first."""
+        return self._view
+
+    def show_view(self, view: LabView) -> None:
+        """Show the lab as of now."""
+        self._view = view
+        for part in (
+            self.header, self.form, self.tank, self.note, self.force, self.speed, self.cost, self.error, self.limiters,
+        ):  # fmt: skip
+            part.show_view(view)
+
+    def ask_where_to_save(self) -> None:
+        """Ask for the preset's file; nothing waits meanwhile, and the force can be stopped beside the dialog."""
+        if (setting := self._free_to_ask()) is None:
+            return
+        dialog = self._file_dialog(f"Save preset: {setting.title}", "Presets")
+        dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
+        dialog.setDefaultSuffix(SUFFIX[1:])
+        dialog.selectFile(f"{preset_name(setting.title)}{SUFFIX}")
+        dialog.fileSelected.connect(lambda name: self.save_asked.emit(Path(name), setting))
+        dialog.show()
+
+    def ask_which_to_open(self) -> None:
+        """Ask for a preset's file."""
+        if self._free_to_ask() is not None:
+            dialog = self._file_dialog("Open preset", "Presets and protocols")
+            dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
+            dialog.fileSelected.connect(lambda name: self.preset_opened.emit(Path(name)))
+            dialog.show()
+
+    def ask_which_study(self) -> None:
+        """Ask for the study that is to use the felt setting."""
+        if (setting := self._free_to_ask()) is not None:
+            dialog = self._file_dialog(f"Use {setting.title} in a study", "Protocols")
+            dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
+            dialog.fileSelected.connect(lambda name: self.use_asked.emit(Path(name), setting))
+            dialog.show()
+
+    def _free_to_ask(self) -> Setting | None:
+        """Return the felt setting; None while another question is open, or the comparison is blind."""
+        if self.dialog is not None or self._view is None or self._view.workbench.blind:
+            return None
+        return self._view.workbench.in_hand
+
+    def _file_dialog(self, title: str, files: str) -> QFileDialog:
+        """Return a question for a file, which begins in the workspace's protocols."""
+        self.dialog = QFileDialog(self, title, str(workspace().protocols), f"{files} (*{SUFFIX})")
+        self.dialog.finished.connect(self._forget_dialog)
+        return self.dialog
+
+    def _forget_dialog(self) -> None:
+        if self.dialog is not None:
+            self.dialog.deleteLater()
+        self.dialog = None
+
+    def _stop(self) -> None:
+        """Ask for zero force when Esc was held, in whichever window of the program."""
+        if self.isVisible():
+            self.stop_asked.emit()
+
+    def changeEvent(self, event: QEvent) -> None:  # noqa: N802 - Qt's name
+        """Give the pointer back when the window is left."""
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.ActivationChange and not self.isActiveWindow():
+            self.tank.let_go()
+
+    def wants_narrow_rail(self) -> bool:
+        """Return that it does: parameters, tank and readings stand side by side."""
+        return True
+
+    def showEvent(self, event: QShowEvent) -> None:  # noqa: N802 - Qt's name
+        """Say that the lab is entered."""
+        super().showEvent(event)
+        self.setFocus()
+        self.entered.emit()
+
+    def hideEvent(self, event: QHideEvent) -> None:  # noqa: N802 - Qt's name
+        """Say that the lab is left."""
+        super().hideEvent(event)
+        self.left.emit()
+        if self.dialog is not None:
+            self.dialog.reject()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
+        """Give way in a small window: first the header, then the right column; the middle and the form scroll."""
+        super().resizeEvent(event)
+        self.header.arrange(narrow=self.width() < ONE_ROW)
+        self._arrange(wide=self.width() >= WIDE)
+        self.form.setFixedWidth(FORM_WIDTH if self.width() >= ONE_ROW else FORM_WIDTH_NARROW)
 
 
-@dataclass(frozen=True, slots=True)
-class FormSection:
-    """Parameters that stand under one heading."""
-
-    title: str
-    rows: tuple[FormRow, ...]
+def preset_name(title: str) -> str:
+    """Return a setting's title as a file is called: "Water, edited" becomes "water-edited"."""
+    words = "".join(sign if sign.isalnum() else " " for sign in title.lower()).split()
+    return "-".join(words) or "preset"
 
 
-def form(setting: Setting) -> tuple[FormSection, ...]:
-    """Return every parameter of a setting with its value."""
-    return tuple(
-        FormSection(
-            section.title,
-            tuple(FormRow(it, setting.value(it.name), setting.chosen_value(it.name)) for it in section.parameters),
-        )
-        for section in sections(setting.scene)
-    )
+def _scrolled(layout: QGridLayout) -> QScrollArea:
+    """Return ``layout`` in a frame that scrolls only where there is no room for it."""
+    inside = QWidget()
+    inside.setLayout(layout)
+    area = QScrollArea()
+    area.setWidgetResizable(True)
+    area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+    area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+    area.setWidget(inside)
+    return area

@@ -5,12 +5,12 @@ from __future__ import annotations
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QButtonGroup, QHBoxLayout, QLineEdit, QSizePolicy, QWidget
 
-from study_app.gui.cards import Card
-from study_app.gui.controls import ActionButton, Radio
-from study_app.gui.dialogs import Question
-from study_app.gui.labels import label
-from study_app.gui.operator.view import OperatorView
-from study_app.gui.theme import Theme, font
+from study_app.gui.theme.theme import Theme, font
+from study_app.gui.widgets.cards import Card
+from study_app.gui.widgets.controls import ActionButton, Radio
+from study_app.gui.widgets.dialogs import Question
+from study_app.gui.widgets.labels import label
+from study_app.viewmodels.operator import OperatorView
 
 
 class Actions(Card):

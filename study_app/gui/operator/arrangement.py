@@ -14,16 +14,16 @@ from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QGridLayout, QLayout, QScrollArea, QVBoxLayout, QWidget
 
-from study_app.gui.cards import Card
 from study_app.gui.operator.actions import Actions
 from study_app.gui.operator.banner import Banner
-from study_app.gui.operator.device import ALL_ROWS, DeviceCard
+from study_app.gui.operator.device_card import ALL_ROWS, DeviceCard
 from study_app.gui.operator.header import Header
+from study_app.gui.operator.health_tiles import Tiles
 from study_app.gui.operator.notes import NotesCard
-from study_app.gui.operator.rail import NARROW, SLIM, WIDTH, Rail
-from study_app.gui.operator.stop import StopPanel
-from study_app.gui.operator.tiles import Tiles
-from study_app.gui.operator.view import NOTES_SHOWN
+from study_app.gui.operator.steps_card import NARROW, SLIM, WIDTH, Rail
+from study_app.gui.operator.stop_panel import StopPanel
+from study_app.gui.widgets.cards import Card
+from study_app.viewmodels.operator import NOTES_SHOWN
 
 Width = Literal["wide", "narrow", "slim"]
 Height = Literal["high", "low", "lower", "least"]

@@ -6,12 +6,12 @@ from PySide6.QtCore import QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
-from study_app.gui.cards import SHADOW, Icon
-from study_app.gui.controls import ActionButton
-from study_app.gui.labels import label
-from study_app.gui.operator.view import OperatorView
-from study_app.gui.theme import RADIUS_CARD
-from study_app.gui.themed import Themed
+from study_app.gui.theme.theme import RADIUS_CARD
+from study_app.gui.theme.themed import Themed
+from study_app.gui.widgets.cards import SHADOW, Icon
+from study_app.gui.widgets.controls import ActionButton
+from study_app.gui.widgets.labels import label
+from study_app.viewmodels.operator import OperatorView
 
 WHAT_TO_DO = "The force is off and every answer so far is on disk. End the session, mend the cause, then begin anew."
 RECONNECT = (

@@ -6,12 +6,11 @@ import pyqtgraph as pg
 from PySide6.QtCore import QPointF, QSize
 from PySide6.QtGui import QColor
 
-from study_app.gui.accessible import describe_plot
-from study_app.gui.cards import Card
-from study_app.gui.labels import label
-from study_app.gui.operator.forces import Forces
-from study_app.gui.operator.health import TRACE_WINDOW_S
-from study_app.gui.plots import (
+from study_app.gui.theme.theme import LIGHT, Theme, font
+from study_app.gui.widgets.accessible import describe_plot
+from study_app.gui.widgets.cards import Card
+from study_app.gui.widgets.labels import label
+from study_app.gui.widgets.plots import (
     LINE_PX,
     NAME_MARGIN,
     NAMES,
@@ -25,7 +24,8 @@ from study_app.gui.plots import (
     step_for,
     time_ticks,
 )
-from study_app.gui.theme import LIGHT, Theme, font
+from study_app.viewmodels.force_traces import Forces
+from study_app.viewmodels.servo_health import TRACE_WINDOW_S
 
 FIELD = QSize(320, 210)
 """What the card asks for, whether it shows the force or hides it."""

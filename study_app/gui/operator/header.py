@@ -6,13 +6,13 @@ from PySide6.QtCore import QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
-from study_app.gui.cards import Chip, Logo, Tone
-from study_app.gui.controls import ActionButton
-from study_app.gui.icons import draw_icon
-from study_app.gui.labels import Elided, figures
-from study_app.gui.operator.view import OperatorView, State, minutes
-from study_app.gui.theme import font
-from study_app.gui.themed import Themed
+from study_app.gui.theme.icons import draw_icon
+from study_app.gui.theme.theme import font
+from study_app.gui.theme.themed import Themed
+from study_app.gui.widgets.cards import Chip, Logo, Tone
+from study_app.gui.widgets.controls import ActionButton
+from study_app.gui.widgets.labels import Elided, figures
+from study_app.viewmodels.operator import OperatorView, State, minutes
 
 STATES: dict[State, tuple[Tone, str]] = {
     "preparing": ("neutral", "clock"),

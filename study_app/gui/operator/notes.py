@@ -6,11 +6,11 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QHBoxLayout, QPlainTextEdit, QVBoxLayout, QWidget
 
-from study_app.gui.cards import Card, Icon
-from study_app.gui.controls import ActionButton
-from study_app.gui.labels import Elided, figures, label
-from study_app.gui.operator.view import NOTES_SHOWN, OperatorView, minutes
-from study_app.gui.theme import font
+from study_app.gui.theme.theme import font
+from study_app.gui.widgets.cards import Card, Icon
+from study_app.gui.widgets.controls import ActionButton
+from study_app.gui.widgets.labels import Elided, figures, label
+from study_app.viewmodels.operator import NOTES_SHOWN, OperatorView, minutes
 
 
 class NoteField(QPlainTextEdit):

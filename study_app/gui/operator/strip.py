@@ -6,14 +6,14 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QWidget
 
-from study_app.gui.cards import Chip
-from study_app.gui.controls import ActionButton
-from study_app.gui.labels import Elided
 from study_app.gui.operator.header import shown_state
-from study_app.gui.operator.view import OperatorView
-from study_app.gui.stop_button import CompactStop
-from study_app.gui.theme import PARTICIPANT
-from study_app.gui.themed import Themed, dress
+from study_app.gui.theme.theme import PARTICIPANT
+from study_app.gui.theme.themed import Themed, dress
+from study_app.gui.widgets.cards import Chip
+from study_app.gui.widgets.controls import ActionButton
+from study_app.gui.widgets.labels import Elided
+from study_app.gui.widgets.stop_button import CompactStop
+from study_app.viewmodels.operator import OperatorView
 
 HEIGHT = 52
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from study_app.gui.operator.progress import SessionProgress
 from study_app.session.ports import JournalPort
+from study_app.viewmodels.session_stages import SessionProgress
 
 
 class WatchedJournal:

@@ -11,25 +11,25 @@ from PySide6.QtCore import QSize, Signal
 from PySide6.QtGui import QCloseEvent, QGuiApplication
 from PySide6.QtWidgets import QMainWindow
 
-from study_app.gui.dialogs import Notice
-from study_app.gui.escape import EscapeAnywhere
 from study_app.gui.operator.actions import Actions, EndQuestion, ExcludeQuestion, RepeatQuestion
 from study_app.gui.operator.arrangement import Arrangement, Pieces
 from study_app.gui.operator.banner import Banner
-from study_app.gui.operator.device import DeviceCard
+from study_app.gui.operator.device_card import DeviceCard
 from study_app.gui.operator.force_plots import ForceCard
-from study_app.gui.operator.forces import Forces
 from study_app.gui.operator.header import Header
-from study_app.gui.operator.health import ServoHealth
+from study_app.gui.operator.health_tiles import Tiles
 from study_app.gui.operator.notes import NotesCard
-from study_app.gui.operator.panels import Panels
-from study_app.gui.operator.plots import HiddenForceCard, LatenessCard, PositionCard
-from study_app.gui.operator.rail import Rail
-from study_app.gui.operator.stop import StopPanel
-from study_app.gui.operator.tiles import Tiles
-from study_app.gui.operator.view import OperatorView
-from study_app.gui.theme import DARK, LIGHT, Theme
-from study_app.gui.themed import wear
+from study_app.gui.operator.plot_cards import HiddenForceCard, LatenessCard, PositionCard
+from study_app.gui.operator.steps_card import Rail
+from study_app.gui.operator.stop_panel import StopPanel
+from study_app.gui.theme.theme import DARK, LIGHT, Theme
+from study_app.gui.theme.themed import wear
+from study_app.gui.widgets.dialogs import Notice
+from study_app.gui.widgets.escape_key import EscapeAnywhere
+from study_app.gui.widgets.failed_panel import Panels
+from study_app.viewmodels.force_traces import Forces
+from study_app.viewmodels.operator import OperatorView
+from study_app.viewmodels.servo_health import ServoHealth
 
 FULL = QSize(1600, 900)
 LEAST = QSize(1024, 640)

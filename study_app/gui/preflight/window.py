@@ -6,15 +6,15 @@ from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QCloseEvent, QKeyEvent
 from PySide6.QtWidgets import QAbstractSlider, QGridLayout, QHBoxLayout, QLabel, QScrollArea, QVBoxLayout, QWidget
 
-from study_app.gui.accessible import describe_plot
-from study_app.gui.cards import Card, Chip, Rule
-from study_app.gui.controls import ActionButton
-from study_app.gui.labels import figures, label
-from study_app.gui.plots import LatenessPlot
-from study_app.gui.preflight.rows import CheckRow
-from study_app.gui.preflight.view import WAITING, PreflightView, histogram
-from study_app.gui.theme import LIGHT, Theme, font
-from study_app.gui.themed import dress, take_away, wear
+from study_app.gui.preflight.check_rows import CheckRow
+from study_app.gui.theme.theme import LIGHT, Theme, font
+from study_app.gui.theme.themed import dress, take_away, wear
+from study_app.gui.widgets.accessible import describe_plot
+from study_app.gui.widgets.cards import Card, Chip, Rule
+from study_app.gui.widgets.controls import ActionButton
+from study_app.gui.widgets.labels import figures, label
+from study_app.gui.widgets.plots import LatenessPlot
+from study_app.viewmodels.preflight import WAITING, PreflightView, histogram
 
 FULL, LEAST = QSize(1200, 800), QSize(1024, 640)
 ASIDE = 352

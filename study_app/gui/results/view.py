@@ -1,149 +1,315 @@
-"""What the results window shows, as one frozen value: widgets only draw it. No Qt here."""
+"""Results: choose a study, see who counts and what they said, leave out, unblind, and hand it on."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from datetime import datetime
 from pathlib import Path
-from types import MappingProxyType
-from typing import Literal, TypeAlias
+from typing import Final
 
-from study_app.gui.sessions.facts import SessionFacts, counted
+from PySide6.QtCore import QSignalBlocker, QSize, Qt, Signal
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QBoxLayout, QDialog, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
 
-NAMED: int = 5
-"""Of so many sessions that are not in the figures each is named."""
+from study_app.gui.results.decision_dialogs import LeaveOutDialog, TakeBackDialog, UnblindDialog
+from study_app.gui.results.export_dialog import Extra, WriteDialog
+from study_app.gui.results.figures_panel import FiguresPanel
+from study_app.gui.results.sidebar import ExclusionsCard, SessionsCard
+from study_app.gui.sessions.session_page import SessionPage
+from study_app.gui.theme.theme import font
+from study_app.gui.theme.themed import take_away
+from study_app.gui.widgets.cards import SHADOW, Chip
+from study_app.gui.widgets.controls import ActionButton, Choice
+from study_app.gui.widgets.labels import label
+from study_app.gui.widgets.main_view import Place
+from study_app.viewmodels.results import LeftOut, ResultsView
+from study_app.viewmodels.sessions import SessionFacts
 
-Remedy: TypeAlias = Literal["again", "home", "read", "stop"]
-"""What a button beside a sentence does: look again, go home, go on reading, stop."""
-
-NOTHING: Mapping[tuple[str, int], tuple[tuple[int, str], ...]] = MappingProxyType({})
-
-
-@dataclass(frozen=True, slots=True)
-class StudyChoice:
-    """A study one can choose: its folder, and what it is where it holds no participants' data."""
-
-    folder: Path
-    kind: Literal["", "simulated", "pilot"] = ""
-
-    @property
-    def name(self) -> str:
-        """The folder's name, and what it is where it holds no participants' data."""
-        return f"{self.folder.name}  ·  {self.kind}" if self.kind else self.folder.name
-
-
-@dataclass(frozen=True, slots=True)
-class Opened:
-    """Who opened the key, when and why."""
-
-    at: datetime | None
-    by: str
-    reason: str
-
-    @property
-    def words(self) -> str:
-        """A line: "Unblinded 19 Nov by AK: collection closed"."""
-        day = "" if self.at is None else f" {self.at.day} {self.at:%b}"
-        return f"Unblinded{day} by {self.by}: {self.reason}"
+STACKED_BELOW = 1160
+BESIDE, BESIDE_WIDE, WIDE_FROM = 374, 420, 1700
+STACKED_HEIGHT, EXCLUSIONS = 330, 360
+MOST = 16_777_215
+REASON_SIGNS = 40
+EXTRAS: Final = (
+    Extra("wide", "Answers with a row a participant (wide)"),
+    Extra("parquet", "Every table as Parquet, too"),
+    Extra("sav", "Answers for SPSS, jamovi and JASP (.sav)"),
+    Extra("psych-ds", "A Psych-DS folder of all tables, to share"),
+)
 
 
-@dataclass(frozen=True, slots=True)
-class FigureShown:
-    """A figure as SVG in print's colours; without one, ``caption`` says why."""
+class ResultsPlace(Place):
+    """Draws a `ResultsView` and says what is asked for.
 
-    name: str
-    title: str
-    caption: str
-    svg: bytes = field(default=b"", repr=False)
-
-
-@dataclass(frozen=True, slots=True)
-class LeftOut:
-    """What is left out of the analysis, by which rule or person, why and when.
-
-    ``which`` is participant, session and trial (None: the whole session).
+    Signals: ``entered`` and ``left``; ``study_asked`` (folder); ``remedy_asked`` (a `Remedy`); ``leave_out_asked``
+    and ``take_back_asked`` (participant, session, trial or None, by, reason); ``unblind_asked`` (by, reason);
+    ``tables_asked`` and ``report_asked`` (folder, extras); ``stop_asked`` (giving up what is being written);
+    ``open_asked`` (path).
     """
 
-    what: str
-    by: str
-    reason: str
-    at: datetime | None
-    which: tuple[str, int, int | None]
+    entered = Signal()
+    left = Signal()
+    study_asked = Signal(object)
+    remedy_asked = Signal(str)
+    leave_out_asked = Signal(object)
+    take_back_asked = Signal(object)
+    unblind_asked = Signal(str, str)
+    tables_asked = Signal(object, object)
+    report_asked = Signal(object, object)
+    stop_asked = Signal()
+    open_asked = Signal(object)
+
+    def __init__(self, *, handed_to: Path, no_sav: str = "") -> None:
+        super().__init__()
+        self.view = ResultsView()
+        self.dialog: QDialog | None = None
+        self.writing: WriteDialog | None = None
+        self._handed_to = handed_to
+        self._no_sav = no_sav
+        self.study = Choice()
+        self.study.setAccessibleName("Study")
+        self.study.setFont(font("body"))
+        self.study.setMinimumWidth(200)
+        self.study.setSizeAdjustPolicy(Choice.SizeAdjustPolicy.AdjustToContents)
+        self.chips: list[Chip] = []
+        self.unblind = ActionButton("eye", "Unblind …", height=44)
+        self.export = ActionButton("download", "Export …", height=44)
+        self.report = ActionButton("file", "Report …", role="primary", height=44)
+        self.sessions = SessionsCard()
+        self.exclusions = ExclusionsCard()
+        self.figures = FiguresPanel()
+        self._lay_out()
+        self._connect()
+        self._show_studies()
+        self.show_view(ResultsView())
+
+    def _connect(self) -> None:
+        self.study.activated.connect(lambda: self.study_asked.emit(self.study.currentData()))
+        self.unblind.clicked.connect(self._ask_unblind)
+        self.export.clicked.connect(self._ask_tables)
+        self.report.clicked.connect(self._ask_report)
+        self.exclusions.leave_out_asked.connect(self._ask_leave_out)
+        self.exclusions.take_back_asked.connect(self._ask_take_back)
+        self.exclusions.list_asked.connect(lambda: self.open_asked.emit(self.view.exclusions_file))
+        self.figures.asked.connect(self._remedy)
+        self.sessions.rows.opened.connect(self._open_session)
+
+    def _lay_out(self) -> None:
+        self._chips_there = QWidget()
+        self._chips = QHBoxLayout(self._chips_there)
+        self._chips.setContentsMargins(0, 0, 0, 0)
+        self._chips.setSpacing(8)
+        self._head = QHBoxLayout()
+        self._head.setContentsMargins(SHADOW, 0, SHADOW, 0)
+        self._head.setSpacing(12)
+        self._head.addWidget(label("Results", "title"))
+        self._head.addWidget(self.study)
+        self._head.addStretch()
+        for button in (self.unblind, self.export, self.report):
+            self._head.addWidget(button)
+        self._below = QHBoxLayout()
+        self._below.setContentsMargins(SHADOW, 0, SHADOW, 0)
+        self._left = QBoxLayout(QBoxLayout.Direction.TopToBottom)
+        self._left.setSpacing(12 - 2 * SHADOW)
+        self._left.addWidget(self.sessions, 3)
+        self._left.addWidget(self.exclusions, 1)
+        self._beside = QWidget()
+        self._beside.setLayout(self._left)
+        self._left.setContentsMargins(0, 0, 0, 0)
+        self._row = QBoxLayout(QBoxLayout.Direction.LeftToRight)
+        self._row.setSpacing(16 - 2 * SHADOW)
+        self._row.addWidget(self._beside)
+        self._row.addWidget(self.figures, 1)
+        inside = QWidget()
+        page = QVBoxLayout(inside)
+        page.setContentsMargins(24, 20, 24, 18)
+        page.setSpacing(12)
+        page.addLayout(self._head)
+        page.addLayout(self._below)
+        page.addLayout(self._row, 1)
+        self._area = QScrollArea()
+        self._area.setWidgetResizable(True)
+        self._area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self._area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self._area.setWidget(inside)
+        whole = QVBoxLayout(self)
+        whole.setContentsMargins(0, 0, 0, 0)
+        whole.addWidget(self._area)
+
+    def hand_to(self, folder: Path) -> None:
+        """Suggest another folder to write into from now on."""
+        self._handed_to = folder
+
+    def enter(self) -> None:
+        """Look again at what there is."""
+        self.entered.emit()
+
+    def leave(self) -> None:
+        """Let go of everything that is being read."""
+        self.left.emit()
+
+    def wants_narrow_rail(self) -> bool:
+        """Return that the figures need the width."""
+        return True
+
+    def show_view(self, view: ResultsView) -> None:
+        """Show what there is; only what has changed is made anew."""
+        before, self.view = self.view, view
+        if view.studies != before.studies or view.chosen != before.chosen:
+            self._show_studies()
+        if view.sessions != before.sessions:
+            self.sessions.show_sessions(view.sessions)
+        if view.left_out != before.left_out:
+            self.exclusions.show_left_out(view.left_out)
+        self._show_chips()
+        self.unblind.setVisible(view.sealed is True)
+        for button in (self.unblind, self.export, self.report):
+            button.setEnabled(view.can_be_written)
+        self.exclusions.leave_out.setEnabled(any(one.excluded is None for one in view.sessions))
+        self._beside.setVisible(view.chosen is not None)
+        self.figures.show_view(view)
+
+    def _show_studies(self) -> None:
+        with QSignalBlocker(self.study):
+            self.study.clear()
+            for study in self.view.studies:
+                self.study.addItem(study.name, study.folder)
+            places = [study.folder for study in self.view.studies]
+            self.study.setCurrentIndex(places.index(self.view.chosen) if self.view.chosen in places else -1)
+        self.study.setVisible(bool(self.view.studies))
+        self.study.updateGeometry()
+
+    def _show_chips(self) -> None:
+        told = []
+        if self.view.kind == "simulated":
+            told.append(("warn", "info", "Simulated participants", ""))
+        if self.view.kind == "pilot":
+            told.append(("warn", "info", "Pilot", "Tried out, apart from the data"))
+        if self.view.sealed:
+            told.append(("neutral", "lock", "Blinded: shown by code", "Which setting is which is sealed"))
+        if self.view.opened is not None:
+            told.append(("neutral", "eye", _shortened(self.view.opened.words), self.view.opened.words))
+        if self.view.doubts:
+            words = "1 file is" if len(self.view.doubts) == 1 else f"{len(self.view.doubts)} files are"
+            told.append(("warn", "warning", f"{words} not as recorded", "\n".join(self.view.doubts)))
+        if [chip.word for chip in self.chips] != [words for _, _, words, _ in told]:
+            for chip in self.chips:
+                take_away(chip)
+            self.chips = []
+            for tone, icon, words, tip in told:
+                chip = Chip(tone, icon, words)  # type: ignore[arg-type]  # the tones above
+                chip.setToolTip(tip)
+                chip.wear(self.theme)
+                self._chips.addWidget(chip)
+                self.chips.append(chip)
+            self._arrange()
+
+    def _remedy(self, remedy: str) -> None:
+        if remedy == "home":
+            self.go_asked.emit("home")
+        else:
+            self.remedy_asked.emit(remedy)
+
+    def _ask_unblind(self) -> None:
+        open_ones = sum(one.needs_care for one in self.view.sessions)
+        dialog = UnblindDialog(self, self.theme, self._name(), running=open_ones)
+        dialog.accepted.connect(lambda: self.unblind_asked.emit(dialog.by.text(), dialog.reason.text()))
+        self._open(dialog)
+
+    def _open_session(self, session: SessionFacts) -> None:
+        """Show a session's page; what changes there is read again."""
+        page = SessionPage(self, self.theme, session, self.open_asked.emit)
+        page.changed.connect(self.entered)
+        self._open(page)
+
+    def _ask_leave_out(self) -> None:
+        there = [one for one in self.view.sessions if one.excluded is None]
+        dialog = LeaveOutDialog(self, self.theme, there, self.view.trials, self.sessions.rows.chosen)
+        dialog.accepted.connect(
+            lambda: self.leave_out_asked.emit((*dialog.chosen, dialog.by.text(), dialog.reason.text()))
+        )
+        self._open(dialog)
+
+    def _ask_take_back(self, one: LeftOut) -> None:
+        dialog = TakeBackDialog(self, self.theme, one.what, one.reason)
+        dialog.accepted.connect(lambda: self.take_back_asked.emit((*one.which, dialog.by.text(), dialog.reason.text())))
+        self._open(dialog)
+
+    def _ask_tables(self) -> None:
+        extras = [extra._replace(why_not=self._no_sav) if extra.name == "sav" else extra for extra in EXTRAS]
+        dialog = WriteDialog(
+            self,
+            self.theme,
+            title=f"Export {self._name()}",
+            explanation="Answers, trials and counts of all participants as CSV, with a codebook that explains every "
+            f"column.{self._by_code()}",
+            go_on="Export",
+            to=self._handed_to / f"{self._name()}-tables",
+            extras=extras,
+        )
+        dialog.write_asked.connect(self.tables_asked)
+        self._open_writing(dialog)
+
+    def _ask_report(self) -> None:
+        dialog = WriteDialog(
+            self,
+            self.theme,
+            title=f"Report of {self._name()}",
+            explanation="One page with figures, tests, what can be said and what cannot; beside it every number, table "
+            f"and figure as a file. Larger studies take some minutes.{self._by_code()}",
+            go_on="Write the report",
+            to=self._handed_to / f"{self._name()}-report",
+            opens="Open the report",
+        )
+        dialog.write_asked.connect(self.report_asked)
+        self._open_writing(dialog)
+
+    def _open_writing(self, dialog: WriteDialog) -> None:
+        self.writing = dialog
+        dialog.stop_asked.connect(self.stop_asked)
+        dialog.open_asked.connect(self.open_asked)
+        dialog.finished.connect(self._written)
+        self._open(dialog)
+
+    def _written(self) -> None:
+        self.writing = None
+
+    def _open(self, dialog: QDialog) -> None:
+        self.dialog = dialog
+        dialog.finished.connect(dialog.deleteLater)
+        dialog.open()
+
+    def _by_code(self) -> str:
+        return " Settings stay codes: the key is sealed." if self.view.sealed else ""
+
+    def _name(self) -> str:
+        return "" if self.view.chosen is None else self.view.chosen.name
+
+    def _arrange(self) -> None:
+        """Put the figures below the sessions in a narrow window, and the chips below the heading where they must be."""
+        stacked = self.width() < STACKED_BELOW
+        down, right = QBoxLayout.Direction.TopToBottom, QBoxLayout.Direction.LeftToRight
+        self._row.setDirection(down if stacked else right)
+        self._left.setDirection(right if stacked else down)
+        beside = BESIDE_WIDE if self.width() >= WIDE_FROM else BESIDE
+        least, most = QSize(0, STACKED_HEIGHT), QSize(MOST, STACKED_HEIGHT)
+        self._beside.setMinimumSize(least if stacked else QSize(beside, 0))
+        self._beside.setMaximumSize(most if stacked else QSize(beside, MOST))
+        self.exclusions.setMaximumWidth(EXCLUSIONS if stacked else MOST)
+        self.figures.show_whole(stacked)
+        self._head.removeWidget(self._chips_there)
+        self._below.removeWidget(self._chips_there)
+        room = self.width() - 48 - self._head.sizeHint().width()
+        if sum(chip.sizeHint().width() + 8 for chip in self.chips) + 12 <= room:
+            self._head.insertWidget(2, self._chips_there)
+        else:
+            self._below.addWidget(self._chips_there, 0, Qt.AlignmentFlag.AlignLeft)
+        self._chips_there.setVisible(bool(self.chips))
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
+        """Make room."""
+        super().resizeEvent(event)
+        self._arrange()
 
 
-@dataclass(frozen=True, slots=True)
-class Going:
-    """What is being done, and which share of all is done (0 to 1)."""
-
-    what: str
-    share: float
-
-
-@dataclass(frozen=True, slots=True)
-class Trouble:
-    """Why there is nothing to show, in one sentence, with the words on the button and what it does."""
-
-    title: str
-    sentence: str
-    button: str
-    remedy: Remedy
-
-
-@dataclass(frozen=True, slots=True)
-class ResultsView:
-    """Everything the window shows.
-
-    ``trials`` are the main trials of each session (participant, number), with the words for them. ``colours`` are the
-    figures' colours in print, by the role in the theme that takes their place. ``sealed`` is None while it is not
-    known. ``drawing`` goes on where there are no figures yet, ``testing`` beside those there are; ``untested`` says
-    that this was stopped.
-    """
-
-    studies: tuple[StudyChoice, ...] = ()
-    chosen: Path | None = None
-    sessions: tuple[SessionFacts, ...] = ()
-    sealed: bool | None = None
-    opened: Opened | None = None
-    left_out: tuple[LeftOut, ...] = ()
-    exclusions_file: Path | None = None
-    trials: Mapping[tuple[str, int], tuple[tuple[int, str], ...]] = field(default_factory=lambda: NOTHING)
-    doubts: tuple[str, ...] = ()
-    figures: tuple[FigureShown, ...] = ()
-    colours: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
-    drawing: Going | None = None
-    testing: Going | None = None
-    untested: bool = False
-    trouble: Trouble | None = None
-
-    @property
-    def kind(self) -> Literal["", "simulated", "pilot"]:
-        """What the chosen study is where it holds no participants' data."""
-        return next((study.kind for study in self.studies if study.folder == self.chosen), "")
-
-    @property
-    def can_be_written(self) -> bool:
-        """Whether there is a study that tables and a report can be made of."""
-        return self.chosen is not None and bool(self.sessions)
-
-
-def in_figures(sessions: Sequence[SessionFacts]) -> tuple[str, str]:
-    """Return how many sessions are in the figures, and why the others are not."""
-    inside = [one for one in sessions if one.counts]
-    head = f"{len(inside)} of {counted(len(sessions), 'session')} in the figures"
-    if not sessions:
-        return "No session yet", ""
-    excluded = [one.name for one in sessions if one.excluded is not None]
-    open_ones = [one.name for one in sessions if one.excluded is None and not one.counts]
-    told = [_are(open_ones, "not complete"), _are(excluded, "excluded")]
-    line = "; ".join(filter(None, told))
-    return head, f"{line}." if line else ""
-
-
-def _are(names: Sequence[str], what: str) -> str:
-    """Return "P007 is excluded", "P007, P009 and 12 others are excluded"; empty without names."""
-    if not names:
-        return ""
-    if len(names) > NAMED:
-        return f"{', '.join(names[: NAMED - 1])} and {len(names) - NAMED + 1} others are {what}"
-    return f"{', '.join(names)} {'is' if len(names) == 1 else 'are'} {what}"
+def _shortened(words: str) -> str:
+    """Return a line for a chip, the end cut where it is long."""
+    return words if len(words) <= 2 * REASON_SIGNS else f"{words[: 2 * REASON_SIGNS - 1].rstrip()}…"

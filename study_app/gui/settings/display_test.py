@@ -12,18 +12,18 @@ from PySide6.QtCore import QRect, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QCloseEvent, QColor, QKeyEvent, QPainter, QPaintEvent, QScreen
 from PySide6.QtWidgets import QBoxLayout, QGridLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
-from study_app.gui.controls import ActionButton
-from study_app.gui.fields import NumberField, write_number
-from study_app.gui.frames import Frames
-from study_app.gui.labels import figures, label
-from study_app.gui.settings.frame_times import LEAST_S, FrameFigures, FrameTimes
-from study_app.gui.settings.measure import LEAST_WORDS
-from study_app.gui.settings.offset import OffsetForm
-from study_app.gui.settings.patterns import GreyRamp, LineField
-from study_app.gui.tank.patch import paint_patch, patch_place
-from study_app.gui.theme import PARTICIPANT
-from study_app.gui.themed import wear
+from study_app.gui.display.frame_clock import Frames
+from study_app.gui.participant.tank.photodiode_patch import paint_patch, patch_place
+from study_app.gui.settings.display_offset import OffsetForm
+from study_app.gui.settings.measured_number import LEAST_WORDS
+from study_app.gui.settings.pixel_patterns import GreyRamp, LineField
+from study_app.gui.theme.theme import PARTICIPANT
+from study_app.gui.theme.themed import wear
+from study_app.gui.widgets.controls import ActionButton
+from study_app.gui.widgets.labels import figures, label
+from study_app.gui.widgets.number_field import NumberField, write_number
 from study_app.store.workstation import DisplayOffset
+from study_app.viewmodels.frame_times import LEAST_S, FrameFigures, FrameTimes
 
 TOLD_MS = 500
 INTERVAL_MS = (50.0, 5000.0)

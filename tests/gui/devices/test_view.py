@@ -1,79 +1,115 @@
-"""What is said of each device: true to what was found, and one device for all ways to it."""
+"""The devices' place: each device's row is true, and what is chosen is said, not done."""
 
 from __future__ import annotations
 
 import pytest
+from PySide6.QtCore import QPoint, QSize, Qt
+from PySide6.QtWidgets import QAbstractButton, QFileDialog, QLabel
 
-from study_app.devices import list_devices
-from study_app.devices.backends import NONE, NOT_HERE, READY, Backend, backends
-from study_app.gui.devices.view import FELT_BY_PEOPLE, device_named, devices_shown, looking
+from study_app.devices.backends import NONE, NOT_HERE, READY, Backend
+from study_app.gui.devices.view import NO_FILE, DevicesPlace
+from study_app.gui.theme.theme import DARK
+from study_app.gui.theme.themed import wear
+from study_app.viewmodels.device_list import devices_shown
 
-MOUSE = Backend("mouse", "the window", READY, "seen, not felt")
-SOCKET = Backend("falcon-socket:PATH", "a Unix socket", READY, "by command")
-
-
-def falcon(state, why=""):
-    return Backend("falcon", "libusb 1.0", state, "felt, up to 8 N", why)
-
-
-def ftdi(state, why=""):
-    return Backend("falcon", "ftd2xx", state, "the same", why)
-
-
-class NoFalcons:
-    """A bus with nothing on it."""
-
-    def enumerate_devices(self):
-        return iter(())
+FOUND = [
+    Backend("mouse", "the window", READY, "seen, not felt"),
+    Backend("falcon", "libusb 1.0", NONE, "felt, up to 8 N", "plug it in"),
+    Backend("falcon", "ftd2xx", NOT_HERE, "the same", "for Windows alone"),
+    Backend("falcon-emulated", "the program", READY, "moves by itself"),
+    Backend("falcon-socket:PATH", "a Unix socket", READY, "another program's"),
+]
 
 
-class NoHid:
-    @staticmethod
-    def enumerate():
-        return []
+@pytest.fixture
+def place(qtbot):
+    made = DevicesPlace()
+    qtbot.addWidget(made)
+    made.resize(1200, 700)
+    made.show_devices(devices_shown(FOUND), "mouse")
+    made.show()
+    return made
 
 
-def test_every_device_is_shown_once_and_those_that_people_feel_with_first():
-    shown = devices_shown(backends(usb=NoFalcons(), hid=NoHid(), platform="linux"))
-    names = [device.name for device in shown]
-    assert set(list_devices()) <= set(names)
-    assert len(names) == len(set(names))
-    assert set(names[: len(FELT_BY_PEOPLE)]) == set(FELT_BY_PEOPLE)
-    assert all(device.can.endswith(".") for device in shown)
-    (real,) = (device for device in shown if device.name == "falcon")
-    assert [way.by.split()[0] for way in real.ways] == ["libusb", "ftd2xx"]
+def rows(place):
+    return place.people.rows | place.simulated.rows
 
 
-@pytest.mark.parametrize(
-    ("ways", "word", "ready", "why"),
-    [
-        ((falcon("connected: FT1"), ftdi(NOT_HERE, "for Windows alone")), "Connected", True, ""),
-        ((falcon("connected: unnamed", "no permission"), ftdi(NOT_HERE)), "Look at it", False, "No permission."),
-        ((falcon(NONE, "plug it in"), ftdi(NOT_HERE, "for Windows alone")), "Not connected", False, "Plug it in."),
-        ((falcon(NONE, "plug it in"), ftdi(READY)), "Driver ready", False, ""),
-        ((falcon(NOT_HERE, "install libusb"), ftdi(NOT_HERE, "other")), "Not available", False, "Install libusb."),
-    ],
-)
-def test_a_falcon_is_as_well_as_the_best_way_to_it(ways, word, ready, why):
-    (shown,) = devices_shown(ways)
-    assert (shown.word, shown.ready, shown.why) == (word, ready, why)
+def marked(place):
+    titles = {name: row.title for name, row in rows(place).items()}
+    return [name for name, title in titles.items() if isinstance(title, QAbstractButton) and title.isChecked()]
 
 
-def test_what_needs_a_path_is_not_chosen_here():
-    (shown,) = devices_shown([SOCKET])
-    assert not shown.choosable
-    assert not shown.ready
-    (mouse,) = devices_shown([MOUSE])
-    assert mouse.choosable
-    assert not mouse.diagnosable
+def test_every_device_has_a_row_with_its_state(place):
+    assert list(place.people.rows) == ["mouse", "falcon"]
+    assert list(place.simulated.rows) == ["falcon-emulated", "falcon-socket:PATH"]
+    assert rows(place)["mouse"].chip.word == "Ready"
+    falcon = rows(place)["falcon"]
+    assert (falcon.chip.word, falcon.why.text()) == ("Not connected", "Plug it in.")
+    assert "ftd2xx: not here" in falcon.by.text()
+    assert "Not connected" in falcon.title.accessibleName()
 
 
-def test_the_preferred_device_is_named_before_anybody_looked_and_if_nobody_knows_it():
-    shown = devices_shown([MOUSE, falcon("connected: FT1"), SOCKET])
-    assert device_named("falcon:FT1", shown).title == "Novint Falcon"
-    assert device_named("falcon-socket:/run/f", shown).title == "Falcon behind a socket"
-    assert device_named("falcon", ()) == looking("falcon")
-    assert device_named("falcon", ()).word == "Looking …"
-    unknown = device_named("hammer", shown)
-    assert not unknown.ready
-    assert "choose one of" in unknown.why
+def test_one_is_marked_and_another_can_be_chosen_by_the_keyboard(place, qtbot):
+    assert rows(place)["mouse"].title.isChecked()
+    with qtbot.waitSignal(place.chosen) as chosen:
+        qtbot.keyClick(rows(place)["falcon"].title, Qt.Key.Key_Space)
+    assert chosen.args == ["falcon"]
+    place.show_devices(devices_shown(FOUND), "falcon-emulated")
+    assert marked(place) == ["falcon-emulated"]
+    place.show_devices(devices_shown(FOUND), "falcon-socket:/run/falcon")
+    assert marked(place) == []
+
+
+def test_what_needs_a_path_cannot_be_marked(place):
+    assert isinstance(rows(place)["falcon-socket:PATH"].title, QLabel)
+
+
+def test_falcons_can_be_diagnosed_and_nothing_else(place, qtbot):
+    assert [name for name, row in rows(place).items() if row.diagnose.isVisible()] == ["falcon", "falcon-emulated"]
+    with qtbot.waitSignal(place.diagnose_asked) as asked:
+        qtbot.mouseClick(rows(place)["falcon"].diagnose, Qt.MouseButton.LeftButton)
+    assert asked.args == ["falcon"]
+
+
+def test_entering_and_refresh_look_again_and_rows_stay(place, qtbot):
+    with qtbot.waitSignal(place.look_asked):
+        place.enter()
+    with qtbot.waitSignal(place.look_asked):
+        qtbot.mouseClick(place.refresh, Qt.MouseButton.LeftButton)
+    before = rows(place)["falcon"]
+    place.show_looking(True)
+    assert not place.refresh.isEnabled()
+    found = [one if one.by != "libusb 1.0" else Backend("falcon", one.by, "connected: FT1", one.can) for one in FOUND]
+    place.show_devices(devices_shown(found), "mouse")
+    place.show_looking(False)
+    assert place.refresh.text() == "Refresh"
+    assert rows(place)["falcon"] is before
+    assert (before.chip.word, before.why.isVisible()) == ("Connected", False)
+
+
+def test_a_falcons_firmware_is_chosen_and_forgotten(place, qtbot, monkeypatch):
+    assert place.firmware.file.accessibleName() == NO_FILE
+    assert not place.firmware.forget.isEnabled()
+    monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: ("/there/firmware.bin", ""))
+    with qtbot.waitSignal(place.firmware_chosen) as chosen:
+        qtbot.mouseClick(place.firmware.choose, Qt.MouseButton.LeftButton)
+    assert chosen.args == ["/there/firmware.bin"]
+    place.show_firmware("/there/firmware.bin")
+    with qtbot.waitSignal(place.firmware_chosen) as chosen:
+        qtbot.mouseClick(place.firmware.forget, Qt.MouseButton.LeftButton)
+    assert chosen.args == [None]
+
+
+@pytest.mark.parametrize("size", [QSize(952, 640), QSize(1294, 768), QSize(1704, 1080)])
+def test_no_word_is_cut_at_any_size(place, qtbot, size):
+    wear(place, DARK)
+    place.resize(size)
+
+    def whole():
+        for one in place.findChildren(QAbstractButton):
+            if one.isVisible() and one.text():
+                assert one.width() >= one.fontMetrics().horizontalAdvance(one.text()), one.text()
+                assert 0 <= one.mapTo(place, QPoint()).x() <= size.width() - one.width()
+
+    qtbot.waitUntil(whole)

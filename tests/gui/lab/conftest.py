@@ -7,10 +7,10 @@ from typing import Any
 import numba
 import pytest
 
-from study_app.gui.lab.place import LabPlace
-from study_app.gui.lab.view import LabView
-from study_app.gui.theme import LIGHT
-from study_app.gui.themed import wear
+from study_app.gui.lab.view import LabPlace
+from study_app.gui.theme.theme import LIGHT
+from study_app.gui.theme.themed import wear
+from study_app.viewmodels.lab import LabView
 from tests.gui.lab.sample import lab_view, still_view
 
 

@@ -9,9 +9,9 @@ import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 
-from study_app.gui.lab.rows import ChoiceRow, NumberRow, SwitchRow
-from study_app.gui.lab.view import LabView, form
+from study_app.gui.lab.parameter_rows import ChoiceRow, NumberRow, SwitchRow
 from study_app.lab.parameters import sections
+from study_app.viewmodels.lab import LabView, form
 from tests.gui.lab.sample import still_view, workbench
 
 

@@ -9,8 +9,8 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QTest
 
-from study_app.gui.escape import HOLD_MS
-from study_app.gui.lab.view import LabView
+from study_app.gui.widgets.escape_key import HOLD_MS
+from study_app.viewmodels.lab import LabView
 from tests.gui.lab.sample import blind, heard, settle
 
 

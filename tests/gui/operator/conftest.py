@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from study_app.gui.operator.health import ServoHealth
-from study_app.gui.operator.progress import SessionProgress, stages
-from study_app.gui.operator.view import OperatorView, Session, operator_view
 from study_app.haptics.model.layout import SAMPLE, records
 from study_app.protocol.load import load
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, build_schedule
+from study_app.viewmodels.operator import OperatorView, Session, operator_view
+from study_app.viewmodels.servo_health import ServoHealth
+from study_app.viewmodels.session_stages import SessionProgress, stages
 
 
 @dataclass

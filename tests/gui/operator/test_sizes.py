@@ -11,14 +11,14 @@ import pytest
 from PySide6.QtCore import QRect
 from PySide6.QtWidgets import QAbstractScrollArea, QApplication, QLabel, QPushButton, QWidget
 
-from study_app.gui.controls import ActionButton
-from study_app.gui.labels import Elided
 from study_app.gui.operator import OperatorWindow
 from study_app.gui.operator.arrangement import LEAST_BELOW
 from study_app.gui.operator.force_plots import ForceCard
-from study_app.gui.operator.forces import Forces
-from study_app.gui.operator.stop import LEAST_HEIGHT, LEAST_WIDTH
+from study_app.gui.operator.stop_panel import LEAST_HEIGHT, LEAST_WIDTH
+from study_app.gui.widgets.controls import ActionButton
+from study_app.gui.widgets.labels import Elided
 from study_app.haptics.model.layout import LIMITER_NORM, SAMPLE, records
+from study_app.viewmodels.force_traces import Forces
 
 SIZES = (
     (1024, 640),

@@ -12,10 +12,10 @@ from PySide6.QtGui import QColor, QGuiApplication
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
-from study_app.gui.escape import HOLD_MS
 from study_app.gui.operator import OperatorWindow
-from study_app.gui.operator.stop import LEAST_HEIGHT, LEAST_WIDTH
-from study_app.gui.theme import DARK, LIGHT
+from study_app.gui.operator.stop_panel import LEAST_HEIGHT, LEAST_WIDTH
+from study_app.gui.theme.theme import DARK, LIGHT
+from study_app.gui.widgets.escape_key import HOLD_MS
 
 # The platform without a screen cannot limit or raise windows, and says so.
 

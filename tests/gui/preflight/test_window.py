@@ -11,14 +11,14 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QApplication, QLabel
 
 from study_app.gui.preflight import PreflightWindow
-from study_app.gui.preflight.view import WAITING, histogram, preflight_view, resumed_rows
 from study_app.gui.preflight.window import LEAST
-from study_app.gui.theme import DARK
+from study_app.gui.theme.theme import DARK
 from study_app.haptics.runtime.clocks.grants import Grant
 from study_app.haptics.runtime.telemetry import Timing
 from study_app.protocol.load import load
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.session.preflight import Facts, Screen, checks
+from study_app.viewmodels.preflight import WAITING, histogram, preflight_view, resumed_rows
 
 NOW = datetime(2026, 3, 2, 14, 20)
 WELL = Facts(

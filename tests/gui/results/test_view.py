@@ -1,87 +1,344 @@
-"""What the results window says in words, and a figure in the colours of a theme."""
+"""The results window draws a view and says what is asked for; it knows no file and computes nothing."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import QSize
+from PySide6.QtCore import QEvent, QObject, QPoint, QSize, Qt
+from PySide6.QtWidgets import QApplication, QLabel, QPushButton, QWidget
 
-from study_app.gui.results.figure import drawn, themed_svg
-from study_app.gui.results.view import Opened, StudyChoice, in_figures
-from study_app.gui.sessions.rows import matching, states_of
-from study_app.gui.theme import DARK, LIGHT
-from tests.gui.results.sample import COLOURS, SVG, facts
+from study_app.gui.home.main_window import LEAST, MainWindow
+from study_app.gui.results.view import STACKED_BELOW, ResultsPlace
+from study_app.gui.theme.theme import DARK
+from study_app.gui.widgets.controls import ActionButton
+from study_app.gui.widgets.main_view import Place
+from study_app.viewmodels.results import FigureShown, Going, Opened, Trouble
+from tests.gui.results.sample import LEFT_OUT, STUDY, SVG, facts, view
 
-
-def test_who_is_in_the_figures_and_why_the_others_are_not():
-    held = [facts(f"P{number:03d}") for number in range(1, 13)]
-    assert in_figures(held) == ("12 of 12 sessions in the figures", "")
-    held += [facts("P013", status="unfinished"), facts("P014", excluded="asleep")]
-    assert in_figures(held) == ("12 of 14 sessions in the figures", "P013 is not complete; P014 is excluded.")
-    assert in_figures([]) == ("No session yet", "")
-    assert in_figures(held[:1])[0] == "1 of 1 session in the figures"
+USUAL = QSize(1366, 768)
 
 
-def test_many_that_are_not_are_counted():
-    held = [facts(f"P{number:03d}", status="withdrawn") for number in range(1, 10)]
-    assert in_figures(held)[1] == "P001, P002, P003, P004 and 5 others are not complete."
+class Seen(QObject):
+    """Notes that a part is shown."""
+
+    def __init__(self, shown, part):
+        super().__init__(part)
+        self.shown = shown
+
+    def eventFilter(self, part, event):  # noqa: N802 - Qt's name
+        if event.type() == QEvent.Type.Show:
+            self.shown.append(type(part).__name__)
+        return False
 
 
-def test_an_excluded_session_that_was_not_complete_is_told_once():
-    assert in_figures([facts("P001", status="withdrawn", excluded="left")])[1] == "P001 is excluded."
+def opened(qtbot, size=USUAL, shown=None):
+    window = MainWindow({"home": Place, "results": lambda: ResultsPlace(handed_to=Path("/somewhere"))})
+    qtbot.addWidget(window)
+    window.resize(size)
+    window.show()
+    window.go("results")
+    place = window.place("results")
+    place.main = window  # or it would be collected here
+    place.show_view(shown or view())
+    qtbot.waitUntil(lambda: all(card.drawing is None or card.drawing.settled for card in place.figures.cards))
+    return place
 
 
-def test_who_opened_the_key_is_told_with_day_and_reason():
-    opened = Opened(datetime(2026, 11, 19, tzinfo=UTC), "AK", "collection closed")
-    assert opened.words == "Unblinded 19 Nov by AK: collection closed"
-    assert Opened(None, "AK", "x").words == "Unblinded by AK: x"
+@pytest.fixture
+def place(qtbot):
+    return opened(qtbot)
 
 
-def test_a_study_says_what_it_is():
-    assert StudyChoice(Path("r/rek2024")).name == "rek2024"
-    assert StudyChoice(Path("r/rek2024"), "pilot").name == "rek2024  ·  pilot"
+def chips(place):
+    return [chip.word for chip in place.chips]
 
 
-@pytest.mark.parametrize(
-    ("words", "status", "found"),
-    [
-        ("", "", ["P001", "P002", "Q003"]),
-        (" p00", "", ["P001", "P002"]),
-        ("", "unfinished", ["P002"]),
-        ("", "excluded", ["Q003"]),
-        ("", "invalid", ["P001"]),
-        ("q", "unfinished", []),
-    ],
-)
-def test_sessions_are_found_by_participant_and_state(words, status, found):
-    held = [facts("P001", validity="invalid"), facts("P002", status="unfinished"), facts("Q003", excluded="x")]
-    assert [one.participant for one in held if matching(words, status)(one)] == found
-    assert [state for state, _ in states_of(held)] == ["completed", "unfinished", "invalid", "excluded"]
+def click(qtbot, button):
+    qtbot.mouseClick(button, Qt.MouseButton.LeftButton)
 
 
-def test_in_the_light_theme_a_figure_looks_as_in_print():
-    made = themed_svg(SVG, COLOURS, LIGHT)
-    for role in ("text", "accent", "grid"):
-        assert getattr(LIGHT, role).encode().lower() in made.lower()
-    assert b"#02256d" in made
+def test_a_blinded_study_says_so_and_can_be_unblinded(place):
+    assert chips(place) == ["Simulated participants", "Blinded: shown by code"]
+    assert place.unblind.isVisible()
+    assert place.figures.cards[0].figure.title == "Agreement for each setting"
 
 
-def test_in_the_dark_theme_paper_and_letters_change_and_levels_do_not():
-    made = themed_svg(SVG, COLOURS, DARK)
-    assert COLOURS["text"].encode() not in made
-    assert f'id="paper" style="fill: {DARK.surface}"'.encode() in made
-    assert f'id="level7" style="fill: #02256d; stroke: {DARK.ctl}"'.encode() in made
-    assert b'fill: #ffffff" id="white">7<' in made, "letters on a dark level stay white"
-    assert f'fill: {DARK.text}" id="ink"'.encode() in made
-    assert b'id="shade" style="fill: #0b65a3; fill-opacity: 0.3"' in made, "a shade under light letters stays deep"
-    assert b"font-family: Inter;" in made
-    assert b"sans-serif" not in made
+def test_an_open_study_says_by_whom_and_why_and_cannot_be_unblinded_again(place):
+    by = Opened(datetime(2026, 11, 19, tzinfo=UTC), "AK", "collection closed, " + "and so on " * 20)
+    place.show_view(replace(view(), sealed=False, opened=by))
+    assert chips(place)[1].startswith("Unblinded 19 Nov by AK: collection closed")
+    assert place.chips[1].toolTip() == by.words
+    assert not place.unblind.isVisible()
 
 
-def test_a_figure_is_drawn_at_the_screens_resolution(qapp):
-    image = drawn(themed_svg(SVG, COLOURS, DARK), QSize(200, 100), 2.0)
-    assert (image.width(), image.height(), image.devicePixelRatio()) == (400, 200, 2.0)
-    assert image.pixelColor(2, 2).name() == DARK.surface.lower()
-    assert image.pixelColor(200, 100).name() == "#02256d"
+def test_what_needs_care_is_first_and_the_foot_says_who_counts(place):
+    rows = place.sessions.rows
+    assert rows.shown[0].participant == "P007"
+    assert place.sessions.head.text() == "6 of 7 sessions in the figures"
+    assert place.sessions.why.text() == "P007 is not complete."
+
+
+def test_sessions_are_searched_and_filtered(place, qtbot):
+    def shown():
+        return [one.participant for one in place.sessions.rows.shown]
+
+    qtbot.keyClicks(place.sessions.search, "p00")
+    assert len(shown()) == 7
+    qtbot.keyClicks(place.sessions.search, "3")
+    assert shown() == ["P003"]
+    place.sessions.state.setFocus()
+    qtbot.keyClick(place.sessions.state, Qt.Key.Key_Tab)
+    assert place.sessions.rows.table.hasFocus(), "the keyboard finds what is shown"
+    place.sessions.search.clear()
+    place.sessions.state.setCurrentIndex(place.sessions.state.findData("unfinished"))
+    assert shown() == ["P007"]
+    place.sessions.search.setText("P001")
+    assert shown() == []
+    assert place.sessions.rows.none.isVisible()
+    place.show_view(replace(view(), sessions=(*view().sessions, facts("P020", status="unfinished"))))
+    assert place.sessions.state.currentData() == "unfinished", "what was filtered stays so when sessions come"
+
+
+def test_rows_are_chosen_by_the_keyboard_and_the_choice_begins_the_dialog(place, qtbot):
+    table = place.sessions.rows.table
+    place.sessions.state.setFocus()
+    qtbot.keyClick(place.sessions.state, Qt.Key.Key_Tab)
+    assert table.hasFocus()
+    for _ in range(3):
+        qtbot.keyClick(table, Qt.Key.Key_Down)
+    assert place.sessions.rows.chosen.participant == "P003"
+    qtbot.keyClick(table, Qt.Key.Key_Up)
+    assert place.sessions.rows.chosen.participant == "P002"
+    place.show_view(replace(view(), sessions=(facts("P000"), *view().sessions)))
+    assert place.sessions.rows.chosen.participant == "P002", "what was chosen stays so when sessions come"
+    click(qtbot, place.exclusions.leave_out)
+    assert place.dialog.session.currentText() == "P002"
+    place.dialog.reject()
+
+
+def test_leaving_out_wants_a_name_and_a_reason(place, qtbot):
+    place.sessions.rows.table.selectRow(1)
+    click(qtbot, place.exclusions.leave_out)
+    dialog = place.dialog
+    assert [dialog.trial.itemText(at) for at in range(3)] == [
+        "The whole session", "Trial 2: Part 1, L2", "Trial 3: Part 1, L1"
+    ]  # fmt: skip
+    dialog.trial.setCurrentIndex(2)
+    click(qtbot, dialog.go_on)
+    assert dialog.isVisible()
+    assert "name" in dialog.missing.text()
+    dialog.by.setText("AK")
+    dialog.reason.setText("phone rang")
+    with qtbot.waitSignal(place.leave_out_asked) as asked:
+        click(qtbot, dialog.go_on)
+    assert asked.args[0] == ("P001", 1, 3, "AK", "phone rang")
+
+
+def test_unblinding_warns_of_sessions_that_go_on(place, qtbot):
+    click(qtbot, place.unblind)
+    dialog = place.dialog
+    said = " ".join(one.text() for one in dialog.findChildren(QLabel))
+    assert "1 session is not complete" in said
+    assert "cannot be taken back" in said
+    dialog.by.setText("AK")
+    qtbot.keyClick(dialog.by, Qt.Key.Key_Return)
+    assert "reason" in dialog.missing.text()
+    dialog.reason.setText("closed")
+    with qtbot.waitSignal(place.unblind_asked) as asked:
+        click(qtbot, dialog.go_on)
+    assert asked.args == ["AK", "closed"]
+
+
+def test_what_is_left_out_is_listed_the_last_first_with_its_reason(place, qtbot):
+    assert place.exclusions.none.isVisible()
+    place.show_view(replace(view(), left_out=(LEFT_OUT, replace(LEFT_OUT, what="P005", reason="asleep"))))
+    assert [line.accessibleName().split(" (")[0] for line in place.exclusions.lines] == [
+        "P005: asleep",
+        "P003, trial 4: phone rang",
+    ]
+    with qtbot.waitSignal(place.open_asked) as asked:
+        click(qtbot, place.exclusions.open)
+    assert asked.args[0] == STUDY / "exclusions.csv"
+
+
+def test_what_is_left_out_is_taken_back_with_a_name_and_a_reason(place, qtbot):
+    place.show_view(replace(view(), left_out=(LEFT_OUT,)))
+    back = place.exclusions.lines[0].findChild(ActionButton)
+    assert back.accessibleName() == "Take back: P003, trial 4"
+    click(qtbot, back)
+    dialog = place.dialog
+    click(qtbot, dialog.go_on)
+    assert "name" in dialog.missing.text()
+    dialog.by.setText("CD")
+    dialog.reason.setText("wrong trial")
+    with qtbot.waitSignal(place.take_back_asked) as asked:
+        click(qtbot, dialog.go_on)
+    assert asked.args[0] == ("P003", 1, 4, "CD", "wrong trial")
+
+
+def test_choosing_a_study_asks_for_it_and_showing_one_does_not(place, qtbot):
+    asked = []
+    place.study_asked.connect(asked.append)
+    place.show_view(replace(view(), chosen=Path("results/demo")))
+    assert asked == []
+    place.study.setFocus()
+    qtbot.keyClick(place.study, Qt.Key.Key_Up)
+    assert asked == [STUDY]
+
+
+def test_exporting_asks_for_what_the_command_has(qtbot):
+    place = opened(qtbot)
+    click(qtbot, place.export)
+    dialog = place.writing
+    assert set(dialog.extras) == {"wide", "parquet", "sav", "psych-ds"}
+    dialog.extras["wide"].click()
+    dialog.to.setText("/elsewhere/tables")
+    with qtbot.waitSignal(place.tables_asked) as asked:
+        click(qtbot, dialog.go_on)
+    assert asked.args == [Path("/elsewhere/tables"), ("wide",)]
+    dialog.show_progress("making the tables", 0.3)
+    assert dialog.said.text() == "Making the tables …"
+    dialog.show_written([Path("/elsewhere/tables/a.csv")], Path("/elsewhere/tables"), [])
+    assert dialog.said.text() == "1 file in /elsewhere/tables."
+    with qtbot.waitSignal(place.open_asked) as asked:
+        click(qtbot, dialog.go_on)
+    assert asked.args[0] == Path("/elsewhere/tables")
+    click(qtbot, dialog.cancel)
+    assert place.writing is None
+
+
+def test_a_report_can_be_given_up_and_a_refusal_lets_one_try_again(place, qtbot):
+    click(qtbot, place.report)
+    dialog = place.writing
+    click(qtbot, dialog.go_on)
+    dialog.show_refused("/somewhere cannot be written (Permission denied)")
+    assert dialog.to.isVisible()
+    click(qtbot, dialog.go_on)
+    with qtbot.waitSignal(place.stop_asked):
+        click(qtbot, dialog.cancel)
+    assert dialog.isVisible(), "until it is known that nothing was written"
+    dialog.stopped()
+    assert place.writing is None
+
+
+def test_without_its_library_sav_is_named_and_cannot_be_chosen(qtbot):
+    place = ResultsPlace(handed_to=Path(), no_sav="It needs pyreadstat.")
+    qtbot.addWidget(place)
+    place.show_view(view())
+    place.show()
+    click(qtbot, place.export)
+    assert not place.writing.extras["sav"].isEnabled()
+    assert "It needs pyreadstat." in [one.text() for one in place.writing.findChildren(QLabel)]
+    place.writing.reject()
+
+
+@pytest.mark.parametrize("remedy", ["again", "read", "stop"])
+def test_trouble_is_one_sentence_and_one_button(place, qtbot, remedy):
+    place.show_view(
+        replace(view(), figures=(), trouble=Trouble("It cannot be read", "P002 is damaged.", "Look", remedy))
+    )
+    trouble = place.figures.trouble
+    assert (trouble.title.text(), trouble.sentence.text()) == ("It cannot be read", "P002 is damaged.")
+    with qtbot.waitSignal(place.remedy_asked) as asked:
+        click(qtbot, trouble.button)
+    assert asked.args == [remedy]
+    place.show_view(view())
+    assert not trouble.isVisible()
+
+
+def test_with_no_study_there_is_a_way_home_and_nothing_to_press_in_vain(qtbot):
+    empty = replace(view(), studies=(), chosen=None, sessions=(), figures=(), sealed=None)
+    place = opened(qtbot, shown=replace(empty, trouble=Trouble("No study yet", "The first …", "Go to home", "home")))
+    assert not place.export.isEnabled()
+    assert not place.report.isEnabled()
+    assert not place.study.isVisible()
+    assert chips(place) == []
+    click(qtbot, place.figures.trouble.button)
+    assert place.main.here == "home"
+
+
+def test_reading_says_how_far_it_is_and_can_be_stopped(place, qtbot):
+    place.show_view(replace(view(), figures=(), drawing=Going("drawing", 0.4)))
+    assert place.figures.trouble.title.text() == "Drawing …"
+    with qtbot.waitSignal(place.remedy_asked) as asked:
+        click(qtbot, place.figures.trouble.button)
+    assert asked.args == ["stop"]
+    place.show_view(replace(view(), testing=Going("testing: Unusable", 0.4)))
+    assert place.figures.work.isVisible()
+    assert not place.figures.trouble.isVisible()
+    place.show_view(replace(view(), untested=True))
+    with qtbot.waitSignal(place.remedy_asked) as asked:
+        click(qtbot, place.figures.work.again)
+    assert asked.args == ["read"]
+
+
+def test_a_figure_drawn_again_keeps_its_card_and_its_caption_can_be_read(place, qtbot):
+    card = place.figures.cards[1]
+    click(qtbot, card.more)
+    assert card.caption.isVisible()
+    again = FigureShown("delays", "Answers over added delay", "Dashed: lowest.", SVG)
+    place.show_view(replace(view(), figures=(view().figures[0], again, replace(again, name="recognition"))))
+    assert place.figures.cards[1] is card
+    assert card.caption.text() == "Dashed: lowest."
+    assert (card.drawing.accessibleName(), card.drawing.accessibleDescription()) == (again.title, again.caption)
+    assert len(place.figures.cards) == 3
+    place.show_view(replace(view(), figures=(replace(again, svg=b"", caption="No completed session."),)))
+    assert [one.figure.name for one in place.figures.cards] == ["delays"]
+    assert card.drawing is None
+    assert card.caption.isVisible()
+    qtbot.waitUntil(lambda: all(one.drawing is None or one.drawing.settled for one in place.figures.cards))
+
+
+def test_figures_take_the_colours_of_the_theme(place, qtbot):
+    drawing = place.figures.cards[0].drawing
+    place.main.rail.theme_asked.emit()
+    qtbot.waitUntil(lambda: drawing.settled and drawing._image.pixelColor(3, 3).name() == DARK.surface.lower())
+
+
+@pytest.mark.parametrize("size", [LEAST, QSize(1366, 768), QSize(1920, 1080)])
+def test_nothing_is_cut_off_sideways_and_figures_keep_their_proportions(qtbot, size):
+    by = Opened(datetime(2026, 11, 19, tzinfo=UTC), "AK", "collection closed")
+    place = opened(qtbot, size, replace(view(), opened=by, left_out=(LEFT_OUT,)))
+    inside, seen = place._area.widget(), place._area.viewport()
+
+    def fits():
+        assert inside.width() <= seen.width()
+        for part in (*place.findChildren(QPushButton), *place.chips, place.study):
+            if part.isVisible():
+                assert part.width() >= part.minimumSizeHint().width(), part
+        for card in place.figures.cards:
+            assert card.drawing.settled
+            assert card.drawing.height() == card.drawing.heightForWidth(card.drawing.width())
+            left = card.drawing.mapTo(inside, QPoint(0, 0)).x()
+            assert 0 <= left <= left + card.drawing.width() <= inside.width()
+
+    qtbot.waitUntil(fits)
+    stacked = place.width() < STACKED_BELOW
+    below = place.figures.mapTo(inside, QPoint(0, 0)).y() > place.sessions.mapTo(inside, QPoint(0, 0)).y() + 100
+    assert below == stacked
+
+
+def test_everything_that_can_be_pressed_has_a_name_and_does_something(place):
+    for button in place.findChildren(QPushButton):
+        assert button.receivers("2clicked(bool)") or button.receivers("2clicked()") or button.isCheckable()
+        assert button.accessibleName() or button.text() or not button.isVisible()
+    for part in place.findChildren(QWidget):
+        if part.isVisible() and part.focusPolicy() & Qt.FocusPolicy.TabFocus and not isinstance(part, QPushButton):
+            assert part.accessibleName(), part
+
+
+def test_what_comes_and_goes_in_one_turn_is_never_a_window_of_its_own(place, qtbot):
+    before = set(QApplication.topLevelWidgets())
+    third = FigureShown("recognition", "What each liquid was named", "", SVG)
+    place.show_view(replace(view(), figures=(*view().figures, third), sessions=(*view().sessions, facts("P020"))))
+    gone = [place.figures.cards[-1]]
+    place.show_view(view())
+    shown = []
+    for part in gone:
+        part.installEventFilter(Seen(shown, part))
+    QApplication.processEvents()
+    assert shown == []
+    assert {one for one in QApplication.topLevelWidgets() if one.isVisible()} <= before

@@ -8,11 +8,11 @@ import pytest
 from PySide6.QtCore import QPoint, QSize, Qt
 from PySide6.QtGui import QColor
 
-from study_app.gui.scene_view import TankWidget
+from study_app.gui.participant.tank.photodiode_patch import PATCH
+from study_app.gui.participant.tank_widget import TankWidget
+from study_app.gui.settings.display_offset import offset_words
 from study_app.gui.settings.display_test import FIRST_MS, DisplayTest, figures_words
-from study_app.gui.settings.offset import offset_words
-from study_app.gui.settings.patterns import GREYS, GreyRamp, LineField, lines, steps
-from study_app.gui.tank.patch import PATCH
+from study_app.gui.settings.pixel_patterns import GREYS, GreyRamp, LineField, lines, steps
 from study_app.protocol.wording.languages import words
 from study_app.store.workstation import DisplayOffset
 from tests.gui.small import task_page

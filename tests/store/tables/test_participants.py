@@ -11,13 +11,13 @@ from typing import Any
 import pytest
 
 from study_app.errors import StoreError
-from study_app.gui.sessions.facts import sessions
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.sessions.begin import SessionStore
 from study_app.store.sessions.rebuild import rebuild
 from study_app.store.tables import participants
 from study_app.store.verification.verify_study import verify
+from study_app.viewmodels.sessions import sessions
 
 
 def table(folder: Path) -> list[dict[str, str]]:

@@ -15,7 +15,6 @@ from typing import Any
 import pytest
 
 from study_app.errors import StudyError
-from study_app.gui.sessions.facts import sessions
 from study_app.protocol.model import Protocol
 from study_app.store.blinded import blinding
 from study_app.store.exclusions import exclude
@@ -25,6 +24,7 @@ from study_app.store.sessions.rebuild import rebuild
 from study_app.store.sessions.reopen import check_can_go_on
 from study_app.store.verification.reproduction import reproduced
 from study_app.store.verification.verify_study import verify
+from study_app.viewmodels.sessions import sessions
 from tests.store.conftest import SOURCE
 
 FINISHED = "data/sub-P007/ses-01"

@@ -1,0 +1,1 @@
+"""A session in windows: start-up, bridge, frame budget, endings."""

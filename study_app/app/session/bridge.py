@@ -1,0 +1,468 @@
+"""Where Qt drives a session: frames poll the runner, windows' signals become events, its news becomes views.
+
+A frame is drawn first and at once; what else is to be shown is drawn in the time until the next.
+
+Whatever fails in here ends in zero force: the force is stopped first, then the failure is written down and shown to the
+operator. Nothing of it reaches the participant but a calm page.
+"""
+
+from __future__ import annotations
+
+import logging
+import sys
+import threading
+import traceback
+from collections.abc import Callable
+from dataclasses import replace
+from functools import wraps
+from types import TracebackType
+from typing import Any, Concatenate, ParamSpec
+
+from PySide6.QtCore import QObject, Qt, QTimer, Signal
+
+from study_app.app.session.frame_budget import Slack
+from study_app.app.session.garbage_collection import settle, unsettle
+from study_app.app.session.operator_monitor import Lookout
+from study_app.app.session.parts import Hand, Parts
+from study_app.app.session.reconnection import Reconnection
+from study_app.app.session.thread_priority import Urgency
+from study_app.errors import DeviceError, ServoFault, SessionError, StudyError
+from study_app.gui.display.frame_clock import Frames
+from study_app.gui.operator.strip import Strip
+from study_app.gui.operator.window import OperatorWindow
+from study_app.gui.participant.window import ParticipantWindow
+from study_app.session.pages import Page, TaskPage
+from study_app.session.ports import Ports
+from study_app.session.runner import Runner
+from study_app.session.transitions.events import (
+    Begin,
+    Continue,
+    EndAsked,
+    Event,
+    ForceStopped,
+    Note,
+    PauseAsked,
+    Reconnected,
+    RepeatAsked,
+    ResumeAsked,
+    broken,
+)
+from study_app.store.program_log import DEVICE_FAILED
+from study_app.viewmodels.operator import OperatorView
+
+TRACES_S = 0.030  # every second frame of 60 a second, every fifth of 144
+TILES_S = 0.5
+END_SHOWN_MS = 5000
+log = logging.getLogger(__name__)
+P = ParamSpec("P")
+
+
+def _guarded(
+    slot: Callable[Concatenate[SessionBridge, P], None],
+) -> Callable[Concatenate[SessionBridge, P], None]:
+    """Let no exception leave a slot: an event that came too late is dropped, everything else ends in zero force."""
+
+    @wraps(slot)
+    def run(self: SessionBridge, /, *arguments: P.args, **named: P.kwargs) -> None:
+        try:
+            slot(self, *arguments, **named)
+        except SessionError as error:
+            log.info("dropped: %s", error)
+        except Exception as error:  # noqa: BLE001 - whatever it is, the hand comes first
+            self.fail(error)
+
+    return run
+
+
+class SessionBridge(QObject):
+    """Runs one session in two windows.
+
+    ``done`` comes once, when the session is over and its windows may go; ``diagnose_asked`` when the operator wants to
+    know what is wrong with the device: the force is off and the session paused by then.
+
+    Parameters
+    ----------
+    parts
+        The session's machinery.
+    participant, operator
+        The two windows, made and not yet connected.
+    refresh_hz
+        Frames a second of the participant's screen.
+    strip
+        What tells the state in the participant's window, where both windows share one screen.
+    """
+
+    done = Signal()
+    diagnose_asked = Signal()
+    _thread_broke = Signal(str)
+
+    def __init__(
+        self,
+        parts: Parts,
+        participant: ParticipantWindow,
+        operator: OperatorWindow,
+        *,
+        refresh_hz: float = 60.0,
+        strip: Strip | None = None,
+    ) -> None:
+        super().__init__()
+        self.parts = parts
+        self.participant = participant
+        self.operator = operator
+        self.strip = strip
+        self._called = False
+        self.lookout = Lookout(parts, refresh_hz)
+        self.trouble = ""
+        self.failure: BaseException | None = None
+        ports = Ports(parts.servo, parts.journal, self.present, parts.clock, parts.recorder)
+        if parts.recorder is not None:
+            ports = replace(ports, settled=parts.recorder.settled)
+        self._leaves = False
+        self.runner = Runner(parts.session.protocol, parts.schedule, parts.key, ports, parts.language, parts.start)
+        self.reconnection = None if parts.reconnect is None else Reconnection(parts.reconnect)
+        self._hand: Hand | None = None
+        self._gone = False
+        self._stalled: str | None = None
+        self._lost = False
+        self._hook_before = sys.excepthook
+        self._thread_hook_before = threading.excepthook
+        self._thread_broke.connect(self._tell_of_thread, Qt.ConnectionType.QueuedConnection)
+        self._frames = Frames(refresh_hz, parent=self)
+        self._frames.due.connect(self._frame)
+        self._urgency = Urgency()
+        self._slack = Slack(((self._tiles, TILES_S), (self._traces, TRACES_S), (self._forces, TRACES_S)))
+        self.runner.on_change(lambda _state: self._changed())
+        self._connect()
+
+    def _connect(self) -> None:
+        operator, participant = self.operator, self.participant
+        operator.stop_asked.connect(self._stop_force)
+        operator.fade_in_asked.connect(self._resume)
+        operator.resume_asked.connect(self._resume)
+        operator.pause_asked.connect(self._pause)
+        operator.repeat_asked.connect(self._repeat)
+        operator.end_asked.connect(self._end)
+        operator.note_written.connect(self._note)
+        operator.mark_set.connect(self._mark)
+        operator.exclude_asked.connect(self._exclude)
+        operator.close_asked.connect(self._close)
+        operator.diagnose_asked.connect(self._diagnose)
+        operator.reconnect_asked.connect(self._reconnect)
+        operator.panels.failed.connect(self._panel_failed)
+        if self.reconnection is not None:
+            self.reconnection.connected.connect(self._reconnected)
+            self.reconnection.failed.connect(self._not_reconnected)
+        operator.escape.leave_to(participant)
+        participant.event.connect(self._event)
+        participant.left.connect(operator.come_forward)
+        if self.strip is not None:
+            self.strip.stop_asked.connect(self._stop_force)
+            self.strip.operator_asked.connect(operator.come_forward)
+            operator.header.page.show()
+            operator.page_asked.connect(participant.come_forward)
+        participant.painted.connect(self._painted)
+        participant.swapped.connect(self._frames.swapped)
+        if self.parts.point_to is not None:
+            participant.pointer.connect(self._point)
+            participant.buttons.connect(self._press)
+
+    @property
+    def paced(self) -> str:
+        """What the participant's frames follow now, in words."""
+        return self._frames.paced
+
+    def present(self, page: Page) -> None:
+        """Put a page before the participant; the runner's port."""
+        self.participant.show_page(page)
+        self._hand = self.parts.hand_for(page) if self.parts.hand_for is not None else None
+        if not isinstance(page, TaskPage):
+            self.lookout.health.frames_rest()
+
+    def start(self) -> None:
+        """Begin the session."""
+        sys.excepthook = self._uncaught
+        threading.excepthook = self._uncaught_in_thread
+        settle()
+        self._urgency.hurry()
+        self._frames.start()
+        self._begin()
+
+    @_guarded
+    def _begin(self) -> None:
+        self._post(Begin(self._now()))
+        self._tiles()
+
+    def leave_now(self) -> None:
+        """Zero force and no windows, without a question: the session stays unfinished and can be resumed."""
+        self.parts.servo.stop_force()
+        if not self._gone and not self.runner.finished:
+            self._break_off()
+        self._leave()
+
+    @_guarded
+    def _break_off(self) -> None:
+        """Pause, so that a trial under way is journalled as interrupted."""
+        self._post(PauseAsked(self._now(), "program"))
+
+    def fail(self, error: BaseException) -> None:
+        """Zero force, then say what failed: to the journal, if it still takes it, and to the operator.
+
+        Where no more failed than one of the cockpit's panels, that is switched off, and the session goes on.
+        """
+        if self.operator.panels.take(error):
+            return
+        self.parts.servo.stop_force()
+        first = not self.trouble
+        what = str(error) if isinstance(error, StudyError) else f"{type(error).__name__}: {error}"
+        if not first:
+            return
+        self.trouble, self.failure = what, error
+        log.error("the session broke: %s", error if isinstance(error, StudyError) else what, exc_info=_trace_of(error))
+        traceback.clear_frames(error.__traceback__)  # they may hold a painter, and Qt would paint no window any more
+        try:
+            if not self.runner.finished:
+                self.runner.post(broken(self._now(), error))
+            self._show()
+        except Exception as second:  # noqa: BLE001 - the force is off; the first failure is the one that counts
+            log.error("and could not be written down: %s", second)  # noqa: TRY400 - one line, the first has the trace
+
+    def _uncaught(self, kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+        """Hear of exceptions that Qt met outside our slots, such as in painting."""
+        if self.operator.panels.take(error):
+            return
+        self.fail(error)
+        self._hook_before(kind, error, trace)
+
+    @_guarded
+    def _panel_failed(self, name: str, error: Exception) -> None:
+        """Log it and note it; the panel itself says so to the operator."""
+        log.error("the panel %r failed and is switched off: %s", name, error, exc_info=error)
+        self._remember(f"the cockpit's panel {name!r} failed: {type(error).__name__}: {error}")
+
+    def _uncaught_in_thread(self, told: threading.ExceptHookArgs) -> None:
+        """Hear of an exception that ended a thread, in that thread."""
+        name = told.thread.name if told.thread is not None else "unknown"
+        log.error("the thread %r ended: %s", name, told.exc_value, exc_info=told.exc_value)
+        self._thread_broke.emit(f"{name}: {told.exc_type.__name__}: {told.exc_value}")
+
+    @_guarded
+    def _tell_of_thread(self, what: str) -> None:
+        """Tell the operator, and note it: what that thread did is missing from here on."""
+        self.operator.tell("A part of the program ended", f"{what}. What was answered is kept.")
+        self._remember(f"a thread of the program ended: {what}")
+
+    def _now(self) -> float:
+        return self.parts.clock()
+
+    def _post(self, event: Event) -> None:
+        self.runner.post(event)
+
+    def _frame(self) -> None:
+        """Draw the tank, and with what time is left until the next frame the rest."""
+        self._draw()
+        self._slack.use(self._frames.next_ns)
+
+    @_guarded
+    def _draw(self) -> None:
+        """Look at the device, and draw the tank as late as the trial asks."""
+        self.runner.poll()
+        view = self.runner.view(self.parts.servo.now_ns())
+        if view is not None:
+            self.participant.show_view(view)
+        self.lookout.look()
+        now_s = self._now()
+        if view is not None and self._hand is not None and self._hand.act(now_s, view):
+            self._post(Continue(now_s))
+
+    @_guarded
+    def _painted(self, sample_ns: int) -> None:
+        """Keep when a frame was painted; on the servo's clock, which is not every system's monotonic one."""
+        painted_ns = self.parts.servo.now_ns()
+        self.runner.frame_shown(painted_ns, sample_ns)
+        self.lookout.health.frame(painted_ns)
+
+    @_guarded
+    def _traces(self) -> None:
+        self.lookout.show_traces(self.operator)
+
+    @_guarded
+    def _forces(self) -> None:
+        self.lookout.show_forces(self.operator)
+
+    @_guarded
+    def _tiles(self) -> None:
+        self.lookout.show_lateness(self.operator)
+        self._show()
+
+    def _changed(self) -> None:
+        """Show the news; at the end bring the operator's window back, should the participant's cover it."""
+        if (stalled := self.runner.stalled) != self._stalled:
+            self._stalled = stalled
+            log.warning("the disk takes data again" if stalled is None else f"the session waits: {stalled}")
+        lost, before = self.runner.state.lost_device, self._lost
+        self._lost = lost
+        if lost and not before:
+            log.info(DEVICE_FAILED, ServoFault(self.parts.journal.progress.broke))
+        self._show()
+        if self.runner.finished and self._leaves:
+            QTimer.singleShot(0, self, self._leave)
+        elif self.runner.finished and self.participant.isFullScreen():
+            QTimer.singleShot(END_SHOWN_MS, self.operator, self.operator.come_forward)
+
+    def _show(self) -> None:
+        view = self.view()
+        self.operator.show_view(view)
+        if self.strip is not None:
+            self.strip.show_view(view)
+            if view.state == "trouble" and not self._called:
+                self.operator.come_forward()
+            self._called = view.state == "trouble"
+
+    def view(self) -> OperatorView:
+        """Return what the operator is to see now."""
+        view, again = self.lookout.view(self.trouble, self.runner.stalled), self.reconnection
+        if again is None or not self.runner.state.lost_device:
+            return view
+        return replace(view, may_reconnect=True, reconnects=again.under_way, reconnection=again.line)
+
+    @_guarded
+    def _stop_force(self) -> None:
+        self.parts.servo.stop_force()  # before anything that could fail or wait for the disk
+        self._post(ForceStopped(self._now(), "operator"))
+
+    @_guarded
+    def _event(self, event: Event) -> None:
+        if isinstance(event, ForceStopped):
+            self.parts.servo.stop_force()
+        self._post(event)
+
+    @_guarded
+    def _resume(self) -> None:
+        self._post(ResumeAsked(self._now(), "operator"))
+        if self.strip is not None:
+            self.participant.come_forward()
+
+    @_guarded
+    def _diagnose(self) -> None:
+        """Zero force and a pause first: a device that is looked at must not push."""
+        self.parts.servo.stop_force()
+        try:
+            if not self.runner.finished:
+                self._post(ForceStopped(self._now(), "operator"))
+        finally:
+            self.diagnose_asked.emit()
+
+    @_guarded
+    def _reconnect(self) -> None:
+        """Connect the device again, beside the windows; the force stays off until the operator resumes."""
+        if self.reconnection is not None and self.runner.state.lost_device:
+            self.reconnection.begin()
+            self._show()
+
+    def tell_of_device(self, line: str) -> None:
+        """Show what the device asks for while it is connected again."""
+        if self.reconnection is not None and self.reconnection.under_way:
+            self.reconnection.line = line
+            self._show()
+
+    @_guarded
+    def _reconnected(self, described: dict[str, Any]) -> None:
+        if isinstance(self.failure, DeviceError | ServoFault):
+            self.trouble, self.failure = "", None
+        log.info("the device was connected again")
+        self._post(Reconnected(self._now(), described))
+
+    @_guarded
+    def _not_reconnected(self, error: Exception) -> None:
+        log.warning("the device was not connected again: %s", error, exc_info=_trace_of(error))
+        self._show()
+
+    @_guarded
+    def _pause(self) -> None:
+        self._post(PauseAsked(self._now(), "operator"))
+
+    @_guarded
+    def _repeat(self, reason: str) -> None:
+        self._post(RepeatAsked(self._now(), reason))
+
+    @_guarded
+    def _note(self, text: str) -> None:
+        self._post(Note(self._now(), "note", text))
+
+    @_guarded
+    def _mark(self) -> None:
+        self._post(Note(self._now(), "mark", ""))
+
+    @_guarded
+    def _exclude(self, trial: object, reason: str) -> None:
+        """Leave a trial or the session out; where that fails the session is none the worse, and the operator knows."""
+        if self.parts.exclude is None:
+            return
+        try:
+            self.parts.exclude(trial if isinstance(trial, int) else None, reason)
+        except StudyError as error:
+            self.operator.tell("It was not left out", f"{error}.")
+        else:
+            what = f"trial {trial}" if isinstance(trial, int) else "the session"
+            self._remember(f"left out of the analysis: {what}: {reason}")
+
+    def _remember(self, text: str) -> None:
+        """Note what was decided, while the journal is open."""
+        if not self.runner.finished:
+            self._post(Note(self._now(), "note", text))
+
+    @_guarded
+    def _end(self, status: str, reason: str) -> None:
+        self._post(EndAsked(self._now(), "withdrawn" if status == "withdrawn" else "aborted", reason))
+
+    @_guarded
+    def _point(self, x_m: float, y_m: float, z_m: float) -> None:
+        if self.parts.point_to is not None:
+            self.parts.point_to(x_m, y_m, z_m)
+
+    @_guarded
+    def _press(self, buttons: int) -> None:
+        if self.parts.press is not None:
+            self.parts.press(buttons)
+
+    @_guarded
+    def _close(self) -> None:
+        """Close the operator's window when all is over; else zero force and a question; asked again, leave."""
+        if self.runner.finished:
+            self._leave()
+            return
+        if self.runner.ending:  # as soon as the recordings are on the disk
+            self._leaves = True
+            self.operator.hide()
+            return
+        self.parts.servo.stop_force()
+        if self.operator.question is not None:
+            self.leave_now()
+            return
+        self.operator.ask_to_end()
+        self._post(ForceStopped(self._now(), "operator"))
+
+    def _leave(self) -> None:
+        """Let the windows go, once."""
+        if self._gone:
+            return
+        self._gone = True
+        self._frames.stop()
+        self._urgency.rest()
+        unsettle()
+        sys.excepthook = self._hook_before
+        threading.excepthook = self._thread_hook_before
+        self.participant.may_close = True
+        self.participant.close()
+        self.operator.may_close = True
+        if self.operator.question is not None:
+            self.operator.question.reject()
+        self.operator.hide()
+        self.done.emit()
+        for part in (self.participant, self.operator, self):
+            part.deleteLater()  # here and now, in this thread: never by a garbage collection in another
+
+
+def _trace_of(error: BaseException) -> BaseException | None:
+    """Return what the log says of an error beside its sentence: nothing of one that the user can understand."""
+    return None if isinstance(error, StudyError) else error

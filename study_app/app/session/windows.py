@@ -1,0 +1,175 @@
+"""The two windows of a session, made of its parts and connected by a bridge."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from study_app.app.session.bridge import SessionBridge
+from study_app.app.session.parts import Parts
+from study_app.devices import is_simulated, kind_of, moves_by_itself
+from study_app.devices.mouse import MouseDevice
+from study_app.devices.simulated.hand_commands import HandOrders, hand_of
+from study_app.gui.display.opengl import has_card
+from study_app.gui.display.screens import choose_screens, place
+from study_app.gui.operator import OperatorWindow
+from study_app.gui.operator.strip import Strip
+from study_app.gui.operator.watch import WatchedJournal
+from study_app.gui.participant.window import ParticipantWindow
+from study_app.protocol.describe import expected_duration_s
+from study_app.protocol.model import Protocol, Reach
+from study_app.protocol.orders.schedule import Schedule, stream
+from study_app.protocol.wording.languages import words
+from study_app.session.pages import Page, TaskPage
+from study_app.session.resume import FIRST, Start
+from study_app.session.simulated.observers import Explorer, Reacher
+from study_app.store.blinded.sealing import opened
+from study_app.store.exclusions import exclude
+from study_app.viewmodels.device_list import TITLES
+from study_app.viewmodels.operator import Session
+from study_app.viewmodels.session_stages import SessionProgress, progress_after, stages
+
+if TYPE_CHECKING:
+    from study_app.devices.base import Device
+    from study_app.devices.rig import Machine
+    from study_app.gui.theme.theme import Theme
+    from study_app.haptics.runtime.servo import Servo
+    from study_app.session.request import NewSession
+    from study_app.store.sessions.open_session import SessionStore
+
+
+def open_windows(
+    chosen: NewSession,
+    protocol: Protocol,
+    schedule: Schedule,
+    store: SessionStore,
+    machine: Machine,
+    theme: Theme,
+    start: Start = FIRST,
+    *,
+    text_scale: float = 1.0,
+    photodiode: bool = True,
+    refresh_hz: float | None = None,
+) -> SessionBridge:
+    """Open the operator's and the participant's window; the bridge returned is to be started.
+
+    ``start`` is where a resumed session goes on, ``text_scale`` how much larger than designed the participant's words
+    must be at least, ``photodiode`` whether the tank has a corner for one. With ``refresh_hz`` there are so many
+    frames a second by the clock, whatever the screen's rate is.
+    """
+    clock, device, servo = store.clock.seconds, machine.device, machine.servo
+    journal = WatchedJournal(
+        store, progress_after(SessionProgress(protocol, schedule), opened(store.lines, store.key)), clock
+    )
+    by_mouse = device.name == "mouse"
+    operator = OperatorWindow(
+        protocol.study.name,
+        lateness_limit_s=protocol.limits.lateness_ms / 1000,
+        reach_m=max(device.workspace_m),
+        pointer=by_mouse,
+        force_limit_n=protocol.device.force_limit_n if protocol.study.blinding == "single" else None,
+        theme=theme,
+    )
+    shown_on, operated_on = choose_screens(chosen.screen)
+    strip = Strip() if shown_on is operated_on else None
+    participant = ParticipantWindow(
+        words(chosen.language),
+        clock=clock,
+        windowed=chosen.windowed,
+        captures_pointer=by_mouse,
+        pilot=chosen.pilot,
+        on_card=refresh_hz is None and has_card(),
+        text_scale=text_scale,
+        photodiode=photodiode,
+        strip=strip,
+    )
+    hand = hand_of(device)
+    parts = Parts(
+        session=_facts(chosen, protocol, schedule, machine),
+        schedule=schedule,
+        key=store.key.codes,
+        language=chosen.language,
+        servo=servo,
+        journal=journal,
+        clock=clock,
+        recorder=store.recorder,
+        start=start,
+        exclude=_excluder(chosen),
+        reconnect=machine.reconnect,
+        aim_m=_aim(hand, servo),
+        point_to=device.point_to if isinstance(device, MouseDevice) else None,
+        press=device.press if isinstance(device, MouseDevice) else None,
+        hand_for=_hands(hand, chosen, clock) if hand is not None and moves_by_itself(device.name) else None,
+    )
+    rate_hz = refresh_hz or shown_on.refreshRate() or 60.0
+    bridge = SessionBridge(parts, participant, operator, refresh_hz=rate_hz, strip=strip)
+    place(operator, operated_on, corner=shown_on is operated_on)
+    operator.show()
+    participant.open_on(shown_on)
+    return bridge
+
+
+def _excluder(chosen: NewSession) -> Callable[[int | None, str], None]:
+    """Return what leaves the session, or one of its trials, out of the analysis for a reason."""
+
+    def leave_out(trial: int | None, reason: str) -> None:
+        by = chosen.operator or "operator"
+        exclude(chosen.results, chosen.participant, chosen.session, trial=trial, by=by, reason=reason)
+
+    return leave_out
+
+
+def _facts(chosen: NewSession, protocol: Protocol, schedule: Schedule, machine: Machine) -> Session:
+    """Return what the operator's window says throughout."""
+    seen_alone, nobody = chosen.device in {"mouse", "spacemouse"}, is_simulated(chosen.device)
+    return Session(
+        protocol=protocol,
+        stages=stages(protocol, schedule),
+        who=chosen.who,
+        expected_s=expected_duration_s(protocol),
+        answers_of=protocol.responses_per_participant(),
+        lateness_limit_s=protocol.limits.lateness_ms / 1000,
+        device_name=TITLES[kind_of(chosen.device)],
+        device_kind="mouse" if seen_alone else "simulated" if nobody else "falcon",
+        device_rows=(
+            ("Priority", str(machine.servo.describe()["priority"]).partition(" (")[0]),
+            *_calibration(machine.device),
+        ),
+    )
+
+
+def _calibration(device: Device) -> tuple[tuple[str, str], ...]:
+    """Return what the operator should know of a device that can be calibrated."""
+    used = device.describe().get("calibration")
+    if used is None:
+        return ()
+    return (("Calibration", f"of {used['measured']}" if isinstance(used, dict) else "none"),)
+
+
+def _aim(hand: HandOrders | None, servo: Servo) -> Callable[[], tuple[float, float, float]]:
+    """Return what tells where the hand is; of a simulated one where it means to be, for its lag shows the liquid."""
+    if hand is not None:
+        return lambda: hand.aim_m
+
+    def position_m() -> tuple[float, float, float]:
+        x, y, z = servo.telemetry.position_at(servo.now_ns())[0]
+        return float(x), float(y), float(z)
+
+    return position_m
+
+
+def _hands(
+    hand: HandOrders, chosen: NewSession, clock: Callable[[], float]
+) -> Callable[[Page], Explorer | Reacher | None]:
+    """Return what makes the simulated hand for a page; on a page without a task the hand rests."""
+    draw = stream(chosen.seed, f"run/{chosen.participant}/hand").random
+
+    def hand_for(page: Page) -> Explorer | Reacher | None:
+        if not isinstance(page, TaskPage):
+            hand.rest()
+            return None
+        if isinstance(page.task, Reach):
+            return Reacher(page.task, hand, draw)
+        return Explorer(page.task, hand, draw, clock())
+
+    return hand_for

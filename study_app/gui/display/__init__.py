@@ -1,0 +1,1 @@
+"""Screens, graphics card and frame clock."""

@@ -1,0 +1,168 @@
+"""The main window: the rail, and one place at a time beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
+from PySide6.QtCore import QSize, Qt, Signal
+from PySide6.QtGui import QCloseEvent, QKeySequence, QResizeEvent, QShortcut
+from PySide6.QtWidgets import QDialog, QHBoxLayout, QMainWindow, QStackedWidget, QVBoxLayout, QWidget
+
+from study_app.gui.home.navigation import Rail
+from study_app.gui.theme.theme import DARK, LIGHT, Theme
+from study_app.gui.theme.themed import dress, wear
+from study_app.gui.widgets.dialogs import Notice
+from study_app.gui.widgets.labels import label
+from study_app.gui.widgets.main_view import Place
+
+FULL = QSize(1440, 900)
+LEAST = QSize(1024, 640)
+NARROW_BELOW = 1400
+NONE: Mapping[str, Callable[[], bool]] = MappingProxyType({})
+
+
+def _waiting_place() -> Place:
+    """Return a line in the middle, in place of what is being prepared."""
+    made = Place()
+    column = QVBoxLayout(made)
+    column.addWidget(label("Preparing …", "card", "text2"), 0, Qt.AlignmentFlag.AlignCenter)
+    return made
+
+
+class MainWindow(QMainWindow):
+    """The rail and the places; a place is made when one first goes there.
+
+    Parameters
+    ----------
+    makers
+        What makes each place, by its name; the first is where one begins.
+    prepares
+        For a place that takes long to make, what prepares it beside the window's thread and returns whether that is
+        done; until `prepared` is called, a line stands in its place.
+
+    ``closed`` comes when the operator is done, ``theme_changed`` with the `Theme` that was asked for here.
+    """
+
+    closed = Signal()
+    theme_changed = Signal(object)
+
+    def __init__(
+        self,
+        makers: Mapping[str, Callable[[], Place]],
+        *,
+        theme: Theme = LIGHT,
+        prepares: Mapping[str, Callable[[], bool]] = NONE,
+    ) -> None:
+        super().__init__()
+        self.setWindowTitle("Liquid Study")
+        self.setMinimumSize(LEAST)
+        self.theme = theme
+        self.notice: Notice | None = None
+        self._makers = makers
+        self._prepares = prepares
+        self._places: dict[str, Place] = {}
+        self._waiting = _waiting_place()
+        self._here = next(iter(makers))
+        self.rail = Rail(makers)
+        self.stack = QStackedWidget()
+        self.stack.addWidget(self._waiting)
+        whole = QWidget()
+        whole.setProperty("role", "window")
+        row = QHBoxLayout(whole)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(0)
+        row.addWidget(self.rail)
+        row.addWidget(self.stack, 1)
+        self.setCentralWidget(whole)
+        whole.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
+        self.rail.theme_asked.connect(self._change_theme)
+        self.rail.go_asked.connect(self.go)
+        QShortcut(QKeySequence("Ctrl+Q"), self, self.close)  # not every window has a frame whose keys close it
+        wear(self, theme)
+        self.resize(FULL)
+        self.go(self._here)
+        whole.setFocus()
+
+    @property
+    def here(self) -> str:
+        """The name of the place one is at."""
+        return self._here
+
+    def place(self, name: str) -> Place:
+        """Return a place, made on first use."""
+        if name not in self._places:
+            made = self._makers[name]()
+            made.told.connect(self.tell)
+            made.go_asked.connect(self.go)
+            self._places[name] = made
+            self.stack.addWidget(made)
+            dress(made, self.theme)
+        return self._places[name]
+
+    def go(self, name: str) -> None:
+        """Leave the place one is at and show another."""
+        ready = name in self._places or name not in self._prepares or self._prepares[name]()
+        asked = self.place(name) if ready else self._waiting
+        if self.stack.currentWidget() is asked and name == self._here and asked.isVisible():
+            return
+        if name != self._here:
+            self._now().leave()
+        self._here = name
+        self.rail.mark(name)
+        self.stack.setCurrentWidget(asked)
+        self._arrange()
+        asked.enter()
+
+    def prepared(self, name: str) -> None:
+        """Show a place that was waited for, if one is still there."""
+        if self._here == name and name not in self._places:
+            self.go(name)
+
+    def _now(self) -> Place:
+        """Return the place one is at, or the line that stands there until it is prepared."""
+        return self._places.get(self._here, self._waiting)
+
+    def rest(self) -> None:
+        """Leave the place one is at, and the screen: a session takes over."""
+        self._now().leave()
+        self.hide()
+
+    def come_back(self) -> None:
+        """Be there again, where one was."""
+        self.show()
+        self._now().enter()
+
+    def tell(self, title: str, sentence: str) -> None:
+        """Say what went wrong, with one button."""
+        notice = Notice(self, self.theme, title, sentence)
+        notice.finished.connect(notice.deleteLater)
+        self.notice = notice
+        notice.show()
+
+    def show_theme(self, theme: Theme) -> None:
+        """Wear a theme from now on."""
+        if theme is not self.theme:
+            self.theme = theme
+            wear(self, theme)
+
+    def _change_theme(self) -> None:
+        self.show_theme(LIGHT if self.theme.dark else DARK)
+        self.theme_changed.emit(self.theme)
+
+    def _arrange(self) -> None:
+        self.rail.narrow(self.width() < NARROW_BELOW or self._now().wants_narrow_rail())
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
+        """Make room: the rail becomes narrow in a small window."""
+        super().resizeEvent(event)
+        self._arrange()
+
+    def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802 - Qt's name
+        """Leave every place, close what was asked or said, and tell that the operator is done."""
+        for place in self._places.values():
+            place.leave()
+        for dialog in self.findChildren(QDialog):
+            dialog.close()
+        super().closeEvent(event)
+        self.closed.emit()

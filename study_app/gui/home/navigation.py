@@ -1,0 +1,176 @@
+"""The strip at the left of the main window: the places one can go to, and the switch of the theme."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from PySide6.QtCore import QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QColor, QPainter, QPaintEvent
+from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
+
+from study_app.gui.theme.icons import draw_icon
+from study_app.gui.theme.theme import RADIUS_CONTROL, Theme, font
+from study_app.gui.theme.themed import Themed
+from study_app.gui.widgets.cards import Logo
+from study_app.gui.widgets.controls import PressedByEnter
+from study_app.gui.widgets.labels import label
+
+WIDE_RAIL, NARROW_RAIL = 216, 72
+
+
+class Destination(NamedTuple):
+    """A place by its name in the program, with its icon, its word, and the word for a narrow rail."""
+
+    name: str
+    icon: str
+    word: str
+    short: str
+
+
+DESTINATIONS = (
+    Destination("home", "home", "Home", "Home"),
+    Destination("results", "bars", "Results", "Results"),
+    Destination("lab", "sliders", "Liquid lab", "Lab"),
+    Destination("devices", "device", "Devices", "Devices"),
+    Destination("machine", "screen", "This machine", "Machine"),
+)
+
+
+class RailButton(Themed, PressedByEnter):
+    """A place to go, or a switch, in the rail: icon and word; beside each other when wide, one below the other else."""
+
+    def __init__(self, icon: str, word: str, short: str) -> None:
+        super().__init__(word)
+        self.icon_name, self.word, self.short = icon, word, short
+        self._here = False
+        self._narrow = False
+        self.setProperty("role", "plain")
+        self.setAccessibleName(word)
+        self.setCursor(Qt.CursorShape.PointingHandCursor)
+        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
+        self.narrow(False)
+
+    def narrow(self, yes: bool) -> None:
+        """Stand in a narrow rail or a wide one."""
+        self._narrow = yes
+        self.setText(self.short if yes else self.word)
+        self.updateGeometry()
+        self.update()
+
+    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+        """Return the room for icon and word; a fixed height would not outlast a change of theme."""
+        return QSize(NARROW_RAIL - 24, 58) if self._narrow else QSize(WIDE_RAIL - 24, 42)
+
+    def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+        """Return the same room."""
+        return self.sizeHint()
+
+    @property
+    def here(self) -> bool:
+        """Whether this is the place one is at."""
+        return self._here
+
+    @here.setter
+    def here(self, yes: bool) -> None:
+        self._here = yes
+        self.setAccessibleDescription("You are here" if yes else "")
+        self.update()
+
+    def say(self, icon: str, word: str, short: str) -> None:
+        """Offer something else from now on."""
+        self.icon_name, self.word, self.short = icon, word, short
+        self.setAccessibleName(word)
+        self.narrow(self._narrow)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+        """Paint the place one is at with its tint and mark, then icon and word."""
+        t = self.theme
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setPen(Qt.PenStyle.NoPen)
+        rect = QRectF(self.rect())
+        if self.here or self.underMouse() or self.hasFocus():
+            painter.setBrush(QColor(t.selected if self.here else t.hover))
+            painter.drawRoundedRect(rect, RADIUS_CONTROL, RADIUS_CONTROL)
+        if self.here and not self._narrow:
+            painter.setBrush(QColor(t.accent))
+            painter.drawRoundedRect(QRectF(0, 6, 3, rect.height() - 12), 1.5, 1.5)
+        ink = t.accent if self.here else t.text2
+        if self._narrow:
+            draw_icon(painter, self.icon_name, QRectF(rect.width() / 2 - 10, 8, 20, 20), ink)
+            words, align = QRectF(0, 30, rect.width(), 22), Qt.AlignmentFlag.AlignCenter
+            painter.setFont(font("key"))
+        else:
+            draw_icon(painter, self.icon_name, QRectF(14, rect.height() / 2 - 10, 20, 20), ink)
+            words, align = QRectF(46, 0, rect.width() - 46, rect.height()), Qt.AlignmentFlag.AlignVCenter
+            painter.setFont(font("label", weight=600 if self.here else 500))
+        painter.setPen(QColor(ink))
+        painter.drawText(words, align, self.text())
+
+
+class Rail(Themed, QWidget):
+    """The strip; ``go_asked`` carries the name of a place.
+
+    Parameters
+    ----------
+    names
+        The places there are, of `DESTINATIONS`.
+    """
+
+    go_asked = Signal(str)
+    theme_asked = Signal()
+
+    def __init__(self, names: Iterable[str]) -> None:
+        super().__init__()
+        names = set(names)
+        self.name = label("Liquid Study", "card")
+        self.buttons: dict[str, RailButton] = {}
+        self.switch = RailButton("moon", "Dark theme", "Dark")
+        self.switch.clicked.connect(self.theme_asked)
+        head = QHBoxLayout()
+        head.setSpacing(10)
+        head.setContentsMargins(8, 0, 0, 0)
+        head.addWidget(Logo())
+        head.addWidget(self.name)
+        head.addStretch()
+        column = QVBoxLayout(self)
+        column.setContentsMargins(12, 20, 12, 16)
+        column.setSpacing(6)
+        column.addLayout(head)
+        column.addSpacing(22)
+        for place in DESTINATIONS:
+            if place.name in names:
+                self.buttons[place.name] = self._button(place)
+                column.addWidget(self.buttons[place.name])
+        column.addStretch()
+        column.addWidget(self.switch)
+
+    def _button(self, place: Destination) -> RailButton:
+        made = RailButton(place.icon, place.word, place.short)
+        made.clicked.connect(lambda: self.go_asked.emit(place.name))
+        return made
+
+    def mark(self, name: str) -> None:
+        """Show at which place one is."""
+        for other, button in self.buttons.items():
+            button.here = other == name
+
+    def narrow(self, yes: bool) -> None:
+        """Take less room in a small window."""
+        self.setFixedWidth(NARROW_RAIL if yes else WIDE_RAIL)
+        self.name.setVisible(not yes)
+        for button in (*self.buttons.values(), self.switch):
+            button.narrow(yes)
+
+    def wear(self, theme: Theme) -> None:
+        """Take the colours of ``theme`` and offer the other."""
+        super().wear(theme)
+        word = "Light" if theme.dark else "Dark"
+        self.switch.say("sun" if theme.dark else "moon", f"{word} theme", word)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+        """Paint the strip and the hairline at its side."""
+        painter = QPainter(self)
+        painter.fillRect(self.rect(), QColor(self.theme.surface))
+        painter.fillRect(self.width() - 1, 0, 1, self.height(), QColor(self.theme.border))

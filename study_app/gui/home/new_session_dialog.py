@@ -1,0 +1,441 @@
+"""The questions before a session. Nothing is created until Begin; Cancel leaves everything as it was."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QIntValidator
+from PySide6.QtWidgets import (
+    QDialog,
+    QFileDialog,
+    QGridLayout,
+    QHBoxLayout,
+    QLabel,
+    QLineEdit,
+    QScrollArea,
+    QVBoxLayout,
+    QWidget,
+)
+
+from study_app.devices import kind_of, list_devices
+from study_app.errors import DeviceError, StoreError
+from study_app.gui.display.screens import screens_shown
+from study_app.gui.theme.theme import LIGHT, Theme, font
+from study_app.gui.theme.themed import wear
+from study_app.gui.widgets.background import Background
+from study_app.gui.widgets.cards import Icon, Rule
+from study_app.gui.widgets.controls import ActionButton, Check, Choice, Number
+from study_app.gui.widgets.labels import label, set_ink
+from study_app.session.request import NewSession, draw_seed, study_results
+from study_app.store.folders import MAX_SESSION, StudyFolder, UsedIds, check_participant, used_ids
+from study_app.store.tables.study_description import check_study
+from study_app.store.workstation import DEFAULTS, MachineSettings
+from study_app.viewmodels.device_list import TITLES
+from study_app.viewmodels.home import LANGUAGES, StudyFacts
+from study_app.workspace import workspace
+
+_NOTES = {
+    "mouse": " (seen, not felt)",
+    "spacemouse": " (seen, not felt)",
+    "scripted": " (moves by itself)",
+    "falcon-emulated": " (moves by itself)",
+}
+DEVICE_WORDS = {name: f"{title}{_NOTES.get(name, '')}" for name, title in TITLES.items()}
+NEEDS_FIRMWARE = "falcon"
+FRAME = 60  # of a window, at most
+
+
+@dataclass(frozen=True, slots=True)
+class _FolderState:
+    """A study's folder when it was read: which ids are used, and why no session of the study can be put there."""
+
+    path: Path
+    used: UsedIds
+    fault: str
+
+
+def _state_of(path: Path, study: str) -> _FolderState:
+    folder, fault = StudyFolder(path), ""
+    used = UsedIds(path, frozenset(), ())
+    try:
+        check_study(folder, study)
+        used = used_ids(folder)
+    except StoreError as error:
+        fault = str(error)
+    return _FolderState(path, used, fault)
+
+
+class NewSessionDialog(QDialog):
+    """Asks who, with which seed, in which language, on which device and screen.
+
+    Parameters
+    ----------
+    facts
+        The protocol to run.
+    results
+        Folder that holds the studies' folders; the study's own is suggested.
+    machine
+        What is set for this machine: device, firmware and screen to begin with.
+    """
+
+    def __init__(
+        self,
+        facts: StudyFacts,
+        results: Path,
+        *,
+        machine: MachineSettings = DEFAULTS,
+        theme: Theme = LIGHT,
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self.facts = facts
+        self._machine = machine
+        self._state: _FolderState | None = None
+        self._reader = Background(self)
+        self._reader.done.connect(self._take_state)
+        self.setWindowTitle("New session")
+        self.setModal(True)
+        self.setMinimumWidth(720)
+        self._all_results = results
+        self._suggested = str(study_results(results, facts.protocol.study.name, _known(machine.device)))
+        self.results = _field("Results folder of this study")
+        self.results.setText(self._suggested)
+        self.where = label("", "small", "text3")
+        self.participant = _field("Participant")
+        self.session = Number(1, MAX_SESSION, 1)
+        self.seed = _field("Seed")
+        self.operator = _field("Operator")
+        self.language = Choice()
+        self.device = Choice()
+        self.firmware = _field("Falcon's firmware")
+        self.screen_choice = Choice()
+        self.windowed = Check("In a window instead of full-screen")
+        self.pilot = Check("Pilot: framed, kept apart from the data")
+        self.verdict_icon = Icon("check", "ok", 18)
+        self.verdict = label("", "label", "ok", wraps=True)
+        self._free = 1, ""
+        self.ways = [ActionButton("", "", height=34) for _ in range(2)]
+        self.begin = ActionButton("play", "Begin", role="primary", height=46)
+        self.cancel = ActionButton("", "Cancel", height=46)
+        self._fill()
+        self._lay_out()
+        wear(self, theme)
+        self._check()
+        self.participant.setFocus()
+        self.participant.selectAll()
+
+    def _fill(self) -> None:
+        study = self.facts.protocol.study
+        self.participant.setText(self._state_now().used.suggested())
+        self.session.setAccessibleName("Session")
+        self.seed.setText(str(draw_seed()))
+        self.seed.setValidator(QIntValidator(0, 2_147_483_647, self))
+        self.operator.setPlaceholderText("Initials, such as AK")
+        self.operator.setMaxLength(40)
+        self.operator.setText(self._machine.operator)
+        for code in study.languages:
+            self.language.addItem(LANGUAGES.get(code, code), code)
+        preferred = _known(self._machine.device)
+        for name in dict.fromkeys((*list_devices(), preferred)):
+            self.device.addItem(DEVICE_WORDS.get(name, name), name)
+        self.device.setCurrentIndex(self.device.findData(preferred))
+        self.firmware.setText(self._machine.firmware or "")
+        self.firmware.setPlaceholderText("Where it is switched on already: none")
+        screens = screens_shown()
+        for screen in screens:
+            self.screen_choice.addItem(f"Screen {screen.number}: {screen.words}", screen.number)
+        self.screen_choice.setCurrentIndex(self._machine.screen_among([screen.name for screen in screens]) - 1)
+        self.windowed.setChecked(len(screens) == 1)
+        for name, widget in (("Language", self.language), ("Device", self.device), ("Screen", self.screen_choice)):
+            widget.setAccessibleName(name)
+        fields: tuple[QWidget, ...] = (
+            self.session,
+            self.language,
+            self.device,
+            self.screen_choice,
+            self.windowed,
+            self.pilot,
+        )
+        for field in fields:
+            field.setFont(font("body"))
+        self.device.currentIndexChanged.connect(self._choose_device)
+        self.firmware.textChanged.connect(self._check)
+        self.pilot.toggled.connect(self._choose_pilot)
+        self.participant.textChanged.connect(self._check)
+        self.session.valueChanged.connect(self._check)
+        self.seed.textChanged.connect(self._check)
+        self.results.textChanged.connect(self._check)
+        self.ways[0].clicked.connect(lambda: self.session.setValue(self._free[0]))
+        self.ways[1].clicked.connect(lambda: self.participant.setText(self._free[1]))
+        self.begin.clicked.connect(self.accept)
+        self.cancel.clicked.connect(self.reject)
+        self.begin.setDefault(True)
+        self.cancel.setAutoDefault(False)
+
+    def _lay_out(self) -> None:
+        column = QVBoxLayout(self)
+        column.setContentsMargins(32, 28, 32, 24)
+        column.setSpacing(10)
+        column.addWidget(label("New session", "title_dense"))
+        about = f"{self.facts.title}  ·  {self.facts.extent}  ·  {self.facts.duration}"
+        column.addWidget(label(about, "body", "text2", wraps=True))
+        column.addSpacing(6)
+        self._inside = QWidget()
+        grid = QGridLayout(self._inside)
+        grid.setContentsMargins(0, 0, 0, 0)
+        grid.setHorizontalSpacing(16)
+        grid.setVerticalSpacing(6)
+        for place in (0, 1):
+            grid.setColumnStretch(place, 1)
+        another = ActionButton("repeat", "Draw another", height=40)
+        another.setAutoDefault(False)
+        another.clicked.connect(lambda: self.seed.setText(str(draw_seed())))
+        change = ActionButton("", "Change …", height=40)
+        change.setAutoDefault(False)
+        change.clicked.connect(self._choose_folder)
+        _put(grid, 0, 0, "Participant", self.participant, hint="letters and digits, no name")
+        _put(grid, 0, 1, "Session", self.session)
+        grid.addLayout(self._judge(), 2, 0, 1, 2)
+        _put(grid, 4, 0, "Seed", _beside(self.seed, another), hint="decides every order; recorded")
+        _put(grid, 4, 1, "Operator", self.operator)
+        _put(grid, 6, 0, "Language of the participant's pages", self.language)
+        _put(grid, 6, 1, "Device", self.device)
+        _put(grid, 8, 0, "Participant's screen", self.screen_choice)
+        both = QVBoxLayout()
+        both.setSpacing(2)
+        both.addWidget(self.windowed)
+        both.addWidget(self.pilot)
+        grid.addLayout(both, 8, 1, 2, 1, Qt.AlignmentFlag.AlignBottom)
+        _put(grid, 10, 0, "Results folder of this study", _beside(self.results, change), hint=self.where, across=2)
+        self._firmware_row = self._ask_firmware()
+        grid.addWidget(self._firmware_row, 12, 0, 1, 2)
+        self._firmware_row.setVisible(self._takes_firmware)
+        self._area = QScrollArea()
+        self._area.setWidgetResizable(True)
+        self._area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self._area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self._area.setWidget(self._inside)
+        column.addWidget(self._area, 1)
+        column.addSpacing(10)
+        column.addWidget(Rule())
+        foot = QHBoxLayout()
+        foot.setSpacing(16)
+        foot.addWidget(self.cancel)
+        foot.addWidget(label("Nothing is created until you begin.", "label", "text2"))
+        foot.addStretch()
+        foot.addWidget(self.begin)
+        column.addSpacing(4)
+        column.addLayout(foot)
+
+    def _fit(self) -> None:
+        """Be as high as the questions are, but no higher than the screen: then they scroll, and the foot stays."""
+        inside, whole = self._inside.layout(), self.layout()
+        assert inside is not None and whole is not None  # noqa: S101, PT018 - laid out above
+        wide = self.minimumWidth() - whole.contentsMargins().left() - whole.contentsMargins().right()
+        inside.activate()
+        needed = inside.totalHeightForWidth(wide)
+        self._area.setMinimumHeight(0)
+        around = whole.totalMinimumSize().height() - self._area.minimumSizeHint().height()
+        self._area.setMinimumHeight(min(needed, self.screen().availableSize().height() - FRAME - around))
+        self.adjustSize()
+
+    def _judge(self) -> QVBoxLayout:
+        """Return the place of the verdict, and below it the ways on where an id is used."""
+        verdict = QHBoxLayout()
+        verdict.setSpacing(8)
+        verdict.addWidget(self.verdict_icon, 0, Qt.AlignmentFlag.AlignTop)
+        verdict.addWidget(self.verdict, 1)
+        self._ways_row = QWidget()
+        ways = QHBoxLayout(self._ways_row)
+        ways.setContentsMargins(26, 0, 0, 0)
+        for way in self.ways:
+            way.setAutoDefault(False)
+            ways.addWidget(way)
+        ways.addStretch()
+        below = QVBoxLayout()
+        below.setSpacing(6)
+        below.addLayout(verdict)
+        below.addWidget(self._ways_row)
+        return below
+
+    def _ask_firmware(self) -> QWidget:
+        """Return the row for a Falcon's firmware."""
+        find = ActionButton("", "Choose …", height=40)
+        find.setAutoDefault(False)
+        find.clicked.connect(self._choose_firmware)
+        row = QWidget()
+        inside = QGridLayout(row)
+        inside.setContentsMargins(0, 0, 0, 0)
+        inside.setVerticalSpacing(6)
+        hint = "loaded only where it needs it"
+        _put(inside, 1, 0, "Falcon's firmware", _beside(self.firmware, find), hint=hint)
+        return row
+
+    def _choose_folder(self) -> None:
+        chosen = QFileDialog.getExistingDirectory(self, "Results folder of this study", self.results.text())
+        if chosen:
+            self.results.setText(chosen)
+
+    def _choose_firmware(self) -> None:
+        chosen, _ = QFileDialog.getOpenFileName(
+            self, "Falcon's firmware", self.firmware.text(), "Firmware (*.bin);;All files (*)"
+        )
+        if chosen:
+            self.firmware.setText(chosen)
+
+    @property
+    def _takes_firmware(self) -> bool:
+        return kind_of(self.device.currentData()) == NEEDS_FIRMWARE
+
+    def _choose_device(self) -> None:
+        """Ask for firmware where the device may need it, and for another folder where nobody feels it."""
+        self._firmware_row.setVisible(self._takes_firmware)
+        self._suggest_folder()
+        self._check()
+
+    def _suggest_folder(self) -> None:
+        """Keep pilots and a simulated hand's sessions apart, unless the operator chose a folder."""
+        if self.results.text() == self._suggested:
+            study, pilot = self.facts.protocol.study.name, self.pilot.isChecked()
+            folder = study_results(self._all_results, study, self.device.currentData(), pilot=pilot)
+            self._suggested = str(folder)
+            self.results.setText(self._suggested)
+
+    def _choose_pilot(self, pilot: bool) -> None:
+        """Hold a pilot in a window of its own look, under ids that the data never use."""
+        self.windowed.setChecked(pilot or self.windowed.isChecked())
+        self.windowed.setEnabled(not pilot)
+        self._suggest_folder()
+        self._check()
+
+    def _check(self) -> None:
+        """Judge what stands there, and look whether the folder has changed since."""
+        self._show_verdict()
+        self._look()
+
+    def _show_verdict(self) -> None:
+        """Say at once whether this can begin, and if not, why and what to do."""
+        fault = self._fault()
+        inside = Path(self.results.text()).resolve().is_relative_to(workspace().folder.resolve())
+        self.where.setText("in the workspace" if inside else "outside the workspace: Home will not list its sessions")
+        self._offer_ways()
+        if fault:
+            self._say(fault, good=False)
+        else:
+            self._say(f"{self.participant.text().strip()} is free, session {self.session.value()}", good=True)
+        self._fit()
+
+    def _look(self) -> None:
+        """Read the study's folder again, beside the window's thread: another program may use it, too."""
+        if text := self.results.text().strip():
+            self._reader.run(partial(_state_of, Path(text), self.facts.protocol.study.name))
+
+    def _take_state(self, state: _FolderState) -> None:
+        if state.path == Path(self.results.text().strip()) and state != self._state:
+            self._state = state
+            self._show_verdict()
+
+    def _state_now(self) -> _FolderState:
+        """Return the study's folder as it was last read; one that was just chosen is read at once."""
+        path = Path(self.results.text().strip() or ".")
+        if self._state is None or self._state.path != path:
+            self._state = _state_of(path, self.facts.protocol.study.name)
+        return self._state
+
+    def _fault(self) -> str:
+        """Return why this cannot begin; nothing is touched to find out."""
+        if not self.results.text().strip():
+            return "choose a results folder"
+        participant, state = self.participant.text().strip(), self._state_now()
+        try:
+            check_participant(participant, pilot=self.pilot.isChecked())
+            if state.fault:
+                return state.fault
+            state.used.check_unused(participant, self.session.value())
+        except StoreError as error:
+            return str(error)
+        firmware = self.firmware.text().strip()
+        if self._takes_firmware and firmware and not Path(firmware).is_file():
+            return f"there is no firmware in {firmware}: choose the file, or leave the field empty"
+        return "" if self.seed.hasAcceptableInput() else "the seed is a whole number from 0 to 2147483647"
+
+    def _offer_ways(self) -> None:
+        """Where the id is used, offer the ways to go on that need no thought; going on with its session is for home."""
+        participant, used = self.participant.text().strip(), self._state_now().used
+        held = used.numbers(participant)
+        self._ways_row.setVisible(self.session.value() in held)
+        if self.session.value() not in held:
+            return
+        self._free = min(max(held) + 1, MAX_SESSION), used.suggested()
+        another, new = self.ways
+        another.show_action("", f"Session {self._free[0]} of {participant}")
+        new.show_action("", f"New participant {self._free[1]}")
+
+    def _say(self, words: str, *, good: bool) -> None:
+        self.verdict.setText(words[:1].upper() + words[1:])
+        set_ink(self.verdict, "ok" if good else "bad")
+        self.verdict_icon.show_icon(*(("check", "ok") if good else ("warning", "bad")))
+        self.begin.setEnabled(good)
+
+    def chosen(self) -> NewSession:
+        """Return what was chosen."""
+        return NewSession(
+            source=self.facts.source,
+            participant=self.participant.text().strip(),
+            session=self.session.value(),
+            seed=int(self.seed.text()),
+            operator=self.operator.text().strip(),
+            language=self.language.currentData(),
+            device=self.device.currentData(),
+            windowed=self.windowed.isChecked(),
+            screen=self.screen_choice.currentData(),
+            results=Path(self.results.text().strip()),
+            pilot=self.pilot.isChecked(),
+            firmware=Path(firmware) if self._takes_firmware and (firmware := self.firmware.text().strip()) else None,
+        )
+
+
+def _known(device: str) -> str:
+    """Return the device to begin with: the preferred one, or the default where nobody knows it."""
+    try:
+        kind_of(device)
+    except DeviceError:
+        return list_devices()[0]
+    return device
+
+
+def _field(name: str) -> QLineEdit:
+    field = QLineEdit()
+    field.setFont(font("body", tabular=True))
+    field.setAccessibleName(name)
+    return field
+
+
+def _beside(field: QWidget, button: QWidget) -> QWidget:
+    both = QWidget()
+    row = QHBoxLayout(both)
+    row.setContentsMargins(0, 0, 0, 0)
+    row.setSpacing(8)
+    row.addWidget(field, 1)
+    row.addWidget(button)
+    return both
+
+
+def _put(
+    grid: QGridLayout, row: int, place: int, name: str, field: QWidget, *, hint: str | QLabel = "", across: int = 1
+) -> QLabel:
+    """Put a field under its name, with a hint behind the name."""
+    named = label(name, "label", "text2")
+    head = QHBoxLayout()
+    head.setContentsMargins(0, 6 if row else 0, 0, 0)
+    head.addWidget(named)
+    head.addStretch()
+    if hint:
+        head.addWidget(label(hint, "small", "text3") if isinstance(hint, str) else hint)
+    named.setBuddy(field)
+    grid.addLayout(head, row, place, 1, across)
+    grid.addWidget(field, row + 1, place, 1, across)
+    return named

@@ -1,0 +1,130 @@
+"""Beside the sessions: what there is to feel with, and the way into the lab."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+from PySide6.QtCore import QPointF, QRectF, Qt, Signal
+from PySide6.QtGui import QColor, QLinearGradient, QPainter, QPainterPath, QPaintEvent, QPen, QRadialGradient
+from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout
+
+from study_app.gui.theme.theme import RADIUS_CARD, TANK, font
+from study_app.gui.widgets.cards import SHADOW, Card, Chip, Icon
+from study_app.gui.widgets.controls import ActionButton
+from study_app.gui.widgets.labels import label, set_ink
+from study_app.viewmodels.device_list import DeviceShown
+
+PICTURE = 56
+WAKE_POINTS = 48
+
+
+class DeviceCard(Card):
+    """What sessions begin with, whether it can be felt with now, and the screens."""
+
+    devices_asked = Signal()
+    display_asked = Signal()
+
+    def __init__(self) -> None:
+        super().__init__(padding=20, gap=8)
+        self.icon = Icon("device", "text2", 22)
+        self.name = label("", "card")
+        self.state = Chip(small=True)
+        row = QHBoxLayout()
+        row.setSpacing(10)
+        row.addWidget(self.icon)
+        row.addWidget(self.name, 1)
+        row.addWidget(self.state)
+        self.column.addLayout(row)
+        self.about, self.why, self.screens = (label("", "label", "text2", wraps=True) for _ in range(3))
+        for line in (self.about, self.why, self.screens):
+            line.setFont(font("label", weight=400, tabular=True))
+            self.column.addWidget(line)
+        self.devices = ActionButton("", "Devices", height=38)
+        self.display = ActionButton("", "Display test", height=38)
+        self.devices.clicked.connect(self.devices_asked)
+        self.display.clicked.connect(self.display_asked)
+        buttons = QHBoxLayout()
+        buttons.setSpacing(12)
+        buttons.addWidget(self.devices, 1)
+        buttons.addWidget(self.display, 1)
+        self.column.addSpacing(4)
+        self.column.addLayout(buttons)
+
+    def show_device(self, shown: DeviceShown) -> None:
+        """Show the device that sessions begin with, as it was found."""
+        self.icon.show_icon(shown.icon, "text2")
+        self.name.setText(shown.title)
+        self.state.show_state(shown.tone, shown.sign, shown.word)
+        for line, words in ((self.about, shown.can), (self.why, shown.why)):
+            line.setText(words)
+            line.setVisible(bool(words))
+        set_ink(self.why, "warn" if shown.tone == "warn" else "bad" if shown.tone == "bad" else "text2")
+
+    def show_screens(self, lines: tuple[str, ...]) -> None:
+        """Show a line for each screen."""
+        self.screens.setText("\n".join(lines))
+
+
+class LabCard(Card):
+    """The way into the liquid lab, under a picture of a ball and its wake."""
+
+    lab_asked = Signal()
+
+    def __init__(self) -> None:
+        super().__init__(padding=20, gap=6)
+        self.column.addSpacing(PICTURE - 8)
+        about = label("Tune a liquid by feel and save it.", "label", "text2", wraps=True)
+        about.setFont(font("label", weight=400))
+        self.open = ActionButton("", "Open", height=38)
+        self.open.setAccessibleName("Open the liquid lab")
+        self.open.clicked.connect(self.lab_asked)
+        words = QVBoxLayout()
+        words.setSpacing(4)
+        words.addWidget(label("Liquid lab", "card"))
+        words.addWidget(about)
+        foot = QHBoxLayout()
+        foot.addLayout(words, 1)
+        foot.addWidget(self.open)
+        self.column.addLayout(foot)
+
+    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+        """Paint the card, and into its upper part the water, the wake and the ball."""
+        super().paintEvent(event)
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        body = QRectF(self.rect()).adjusted(SHADOW, SHADOW - 1, -SHADOW, -SHADOW - 1).adjusted(1, 1, -1, -1)
+        card = QPainterPath()
+        card.addRoundedRect(body, RADIUS_CARD, RADIUS_CARD)
+        painter.setClipPath(card)
+        water = QRectF(body.left(), body.top(), body.width(), PICTURE)
+        depth = QLinearGradient(water.topLeft(), water.bottomLeft())
+        depth.setColorAt(0, QColor(TANK.water_light))
+        depth.setColorAt(1, QColor(TANK.water_light).darker(200))
+        painter.fillRect(water, depth)
+        _paint_wake(painter, water)
+
+
+def _paint_wake(painter: QPainter, water: QRectF) -> None:
+    """Paint a wake that thickens and brightens toward the ball at its newest end."""
+    points = [
+        QPointF(
+            water.left() + water.width() * (0.08 + 0.74 * share),
+            water.center().y() + 0.16 * water.height() * math.sin(5.6 * share + 0.4),
+        )
+        for share in (k / WAKE_POINTS for k in range(WAKE_POINTS + 1))
+    ]
+    ink = QColor(TANK.lit)
+    for k, (start, end) in enumerate(pairwise(points)):
+        share = k / WAKE_POINTS
+        ink.setAlphaF(0.15 + 0.8 * share)
+        painter.setPen(QPen(ink, 1.0 + 3.0 * share, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
+        painter.drawLine(start, end)
+    middle, radius = points[-1], 13.0
+    light = QRadialGradient(middle - QPointF(4, 5), 1.6 * radius)
+    light.setColorAt(0, QColor(TANK.proxy_light))
+    light.setColorAt(0.5, QColor(TANK.proxy))
+    light.setColorAt(1, QColor(TANK.proxy).darker(190))
+    painter.setPen(Qt.PenStyle.NoPen)
+    painter.setBrush(light)
+    painter.drawEllipse(middle, radius, radius)

@@ -1,0 +1,108 @@
+"""A card for each protocol, with the facts one chooses by and the two ways to go on."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QSizePolicy, QWidget
+
+from study_app.gui.theme.theme import font
+from study_app.gui.theme.themed import take_away
+from study_app.gui.widgets.cards import Card, Icon
+from study_app.gui.widgets.controls import ActionButton
+from study_app.gui.widgets.labels import Clamped, Elided, label
+from study_app.viewmodels.home import BrokenFacts, StudyFacts
+
+LEAST_WIDTH = 330
+LEAST_HEIGHT = 252
+ABOUT_LINES = 3
+
+
+class StudyCard(Card):
+    """One protocol; ``new_session`` and ``rehearsal`` carry its facts."""
+
+    new_session = Signal(object)
+    rehearsal = Signal(object)
+
+    def __init__(self, facts: StudyFacts, *, first: bool) -> None:
+        super().__init__(padding=20, gap=8)
+        self.facts = facts
+        title = Elided("card")
+        title.setFont(font("card", scale=1.12))
+        title.show_text(facts.title)
+        self.column.addWidget(title)
+        self.column.addWidget(Clamped(facts.description or facts.title, ABOUT_LINES, "body", "text2"))
+        self.column.addStretch()
+        time = f"{facts.duration}  ·  {facts.languages}"
+        for icon, words in (("layers", facts.extent), ("clock", time), ("device", facts.needs)):
+            row = QHBoxLayout()
+            row.setSpacing(10)
+            row.addWidget(Icon(icon, "text2", 18))
+            row.addWidget(label(words, "body"), 1)
+            self.column.addLayout(row)
+        self.held = label("", "label", "text2")
+        self.column.addWidget(self.held)
+        self.new = ActionButton("plus", "New session", role="primary" if first else "")
+        self.rehearse = ActionButton("fast_forward", "Rehearse")
+        self.new.setAccessibleName(f"New session of {facts.title}")
+        self.rehearse.setAccessibleName(f"Rehearse {facts.title}")
+        self.new.clicked.connect(lambda: self.new_session.emit(facts))
+        self.rehearse.clicked.connect(lambda: self.rehearsal.emit(facts))
+        buttons = QHBoxLayout()
+        buttons.setSpacing(12)
+        buttons.addWidget(self.new, 1)
+        buttons.addWidget(self.rehearse, 1)
+        self.column.addLayout(buttons)
+        self.setMinimumHeight(LEAST_HEIGHT)
+
+
+class BrokenCard(Card):
+    """A protocol file that cannot be used, and why."""
+
+    def __init__(self, facts: BrokenFacts) -> None:
+        super().__init__(padding=22, gap=10)
+        title = Elided("card")
+        title.show_text(facts.source)
+        row = QHBoxLayout()
+        row.addWidget(Icon("warning", "warn", 20))
+        row.addWidget(title, 1)
+        self.column.addLayout(row)
+        self.column.addWidget(label("This file cannot be used.", "strong", "warn"))
+        said = label(facts.problem, "label", "text2", wraps=True)
+        said.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self.column.addWidget(said, 1)
+        self.setMinimumHeight(LEAST_HEIGHT)
+
+
+class CardGrid(QWidget):
+    """The cards side by side, as many in a row as there is room for."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.cards: list[QWidget] = []
+        self._grid = QGridLayout(self)
+        self._grid.setContentsMargins(0, 0, 0, 0)
+        self._grid.setSpacing(18)
+        self._across = 0
+        self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
+
+    def show_cards(self, cards: list[QWidget]) -> None:
+        """Show these cards in place of those before."""
+        for card in self.cards:
+            take_away(card)
+        self.cards = cards
+        self._across = 0
+        self.arrange(self.width())
+
+    def arrange(self, width: int) -> None:
+        """Place the cards for a window that leaves them ``width``; a lone card does not stretch over it."""
+        across = max(1, width // LEAST_WIDTH)
+        if across == self._across:
+            return
+        for column in range(self._grid.columnCount()):
+            self._grid.setColumnStretch(column, 0)
+        self._across = across
+        for index, card in enumerate(self.cards):
+            self._grid.addWidget(card, index // across, index % across)
+        for column in range(min(across, max(2, len(self.cards)))):
+            self._grid.setColumnStretch(column, 1)
+        self._grid.activate()  # at once, or what is above keeps the room of the arrangement before

@@ -1,0 +1,274 @@
+"""Home: choose a protocol and begin, go on where one stopped, or see what was held."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from datetime import datetime
+from functools import partial
+from pathlib import Path
+
+from PySide6.QtCore import Qt, QTimer, Signal
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QBoxLayout, QFileDialog, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
+
+from study_app.devices import kind_of
+from study_app.errors import StudyError
+from study_app.gui.application import open_here
+from study_app.gui.display.screens import screens_shown
+from study_app.gui.home.new_session_dialog import NewSessionDialog
+from study_app.gui.home.rehearsal_dialog import RehearsalDialog
+from study_app.gui.home.resume_banner import ResumeBanner
+from study_app.gui.home.sessions_card import SessionsCard
+from study_app.gui.home.sidebar import DeviceCard, LabCard
+from study_app.gui.home.study_cards import BrokenCard, CardGrid, StudyCard
+from study_app.gui.sessions.session_page import SessionPage
+from study_app.gui.theme.themed import dress
+from study_app.gui.widgets.background import Background
+from study_app.gui.widgets.cards import SHADOW
+from study_app.gui.widgets.controls import ActionButton
+from study_app.gui.widgets.labels import Elided, label
+from study_app.gui.widgets.main_view import Place
+from study_app.session.request import resumed
+from study_app.store.workstation import DEFAULTS, MachineSettings
+from study_app.viewmodels.device_list import DeviceShown, looking
+from study_app.viewmodels.home import (
+    BrokenFacts,
+    Interrupted,
+    StudyFacts,
+    held,
+    holds_liquids_alone,
+    interrupted,
+    sources,
+    study_facts,
+)
+from study_app.viewmodels.sessions import SessionFacts, sessions
+from study_app.workspace import workspace
+
+STACKED_BELOW = 1080
+BESIDE = 326
+
+
+class HomePlace(Place):
+    """Protocols, sessions, device, lab.
+
+    ``session_asked`` carries what an operator chose, ``results_asked`` the folder of a study, ``protocol_opened`` the
+    file of a study that was opened here.
+
+    Parameters
+    ----------
+    results
+        Folder that holds the studies' folders; it need not exist.
+    """
+
+    session_asked = Signal(object)
+    results_asked = Signal(object)
+    protocol_opened = Signal(object)
+
+    def __init__(self, results: Path) -> None:
+        super().__init__()
+        self.results = results
+        self.machine = DEFAULTS
+        self.dialog: NewSessionDialog | RehearsalDialog | SessionPage | None = None
+        self._opened: list[str] = []
+        self._facts: list[StudyFacts | BrokenFacts] = []
+        self._reader = Background(self)
+        self._reader.done.connect(self._show_read)
+        self.banner = ResumeBanner()
+        self.grid = CardGrid()
+        self.sessions = SessionsCard()
+        self.device = DeviceCard()
+        self.lab = LabCard()
+        self.open_protocol = ActionButton("file", "Open protocol …")
+        self.folder = Elided("label", "text2")
+        self._lay_out()
+        self.open_protocol.clicked.connect(self._open_protocol)
+        self.banner.resume_asked.connect(self._resume)
+        self.sessions.all_asked.connect(lambda: self.go_asked.emit("results"))
+        self.sessions.open_asked.connect(self._open_session)
+        self.device.devices_asked.connect(lambda: self.go_asked.emit("devices"))
+        self.device.display_asked.connect(lambda: self.go_asked.emit("machine"))
+        self.lab.lab_asked.connect(lambda: self.go_asked.emit("lab"))
+        self.show_studies()
+        self.show_machine(DEFAULTS, looking(DEFAULTS.device))
+
+    def show_machine(self, settings: MachineSettings, device: DeviceShown) -> None:
+        """Begin sessions with what is set for this machine; ``device`` is the preferred one as it was found."""
+        self.machine = settings
+        self.device.show_device(device)
+        self.device.show_screens(_screens(settings))
+
+    def enter(self) -> None:
+        """Read the results folder again, once the window stands; screens may have come and gone."""
+        self.device.show_screens(_screens(self.machine))
+        QTimer.singleShot(0, self, self.show_sessions)
+
+    def _lay_out(self) -> None:
+        titles = QVBoxLayout()
+        titles.setSpacing(4)
+        titles.addWidget(label("Studies", "title"))
+        titles.addWidget(label("Choose a protocol to start a session, or go on where one stopped.", "body", "text2"))
+        titles.addWidget(self.folder)
+        head = QHBoxLayout()
+        head.setContentsMargins(SHADOW, 0, SHADOW, 0)
+        head.addLayout(titles, 1)
+        head.addWidget(self.open_protocol)
+        self._below = QBoxLayout(QBoxLayout.Direction.LeftToRight)
+        self._below.setSpacing(18)
+        self._below.addWidget(self.sessions, 1)
+        self._beside = QBoxLayout(QBoxLayout.Direction.TopToBottom)
+        self._beside.setSpacing(18)
+        self._beside.addWidget(self.device)
+        self._beside.addWidget(self.lab)
+        self._beside.addStretch()
+        self._below.addLayout(self._beside)
+        inside = QWidget()
+        page = QVBoxLayout(inside)
+        page.setContentsMargins(28, 20, 28, 12)
+        page.setSpacing(14)
+        page.addLayout(head)
+        page.addWidget(self.banner)
+        page.addWidget(self.grid)
+        page.addLayout(self._below, 1)
+        self._area = QScrollArea()
+        self._area.setWidgetResizable(True)
+        self._area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self._area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self._area.setWidget(inside)
+        row = QVBoxLayout(self)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.addWidget(self._area)
+
+    @property
+    def reading(self) -> bool:
+        """Whether the results folder is being read."""
+        return self._reader.busy
+
+    def show_results(self, results: Path) -> None:
+        """Show the protocols of the workspace and the sessions of another folder from now on."""
+        self.results = results
+        self.show_studies()
+        self.show_sessions()
+
+    def show_studies(self) -> None:
+        """Show a card for each protocol at hand."""
+        self.folder.show_text(f"Workspace: {workspace().folder}")
+        self._facts = [study_facts(source) for source in dict.fromkeys((*self._opened, *sources()))]
+        cards: list[QWidget] = []
+        for facts in self._facts:
+            if isinstance(facts, BrokenFacts):
+                cards.append(BrokenCard(facts))
+                continue
+            card = StudyCard(facts, first=not any(isinstance(other, StudyCard) for other in cards))
+            card.new_session.connect(self.ask_for_session)
+            card.rehearsal.connect(self.ask_for_rehearsal)
+            cards.append(card)
+        for shown in cards:
+            dress(shown, self.theme)
+        self.grid.show_cards(cards)
+        self._arrange()
+
+    def show_sessions(self) -> None:
+        """Read the results folder again, beside the window's thread."""
+        studies = tuple(facts for facts in self._facts if isinstance(facts, StudyFacts))
+        self._reader.run(partial(_read, self.results, studies))
+
+    def _show_read(self, read: tuple[Path, tuple[SessionFacts, ...], Interrupted | None]) -> None:
+        results, found, stopped = read
+        self.sessions.show_sessions(found, str(results), datetime.now().astimezone())
+        self.banner.show_interrupted(stopped)
+        for card in self.grid.cards:
+            if isinstance(card, StudyCard):
+                card.held.setText(held(found, card.facts.protocol.study.name))
+
+    def ask_for_session(self, facts: StudyFacts) -> None:
+        """Open the questions before a session; ``session_asked`` carries the answers."""
+        dialog = NewSessionDialog(facts, self.results, machine=self.machine, theme=self.theme, parent=self)
+        self._open(dialog)
+        dialog.accepted.connect(lambda: self.session_asked.emit(dialog.chosen()))
+
+    def _resume(self, session: Interrupted) -> None:
+        """Ask to go on with a session as it was begun, on the screens there are now."""
+        try:
+            names = [screen.name for screen in screens_shown()]
+            chosen = resumed(
+                session.folder,
+                protocol=session.source,
+                windowed=len(names) == 1,
+                screen=self.machine.screen_among(names),
+            )
+            real = kind_of(chosen.device) == "falcon"
+            self.session_asked.emit(replace(chosen, firmware=self.machine.firmware_file if real else None))
+        except StudyError as error:
+            self.told.emit("The session cannot go on", f"{error}.")
+
+    def ask_for_rehearsal(self, facts: StudyFacts) -> None:
+        """Open the questions before a rehearsal; the table shows what it left."""
+        dialog = RehearsalDialog(facts, self.results, theme=self.theme, parent=self)
+        self._open(dialog)
+        dialog.finished.connect(self.show_sessions)
+        dialog.finished.connect(lambda: self.sessions.show_kind("simulated") if dialog.over else None)
+        dialog.accepted.connect(lambda: self.results_asked.emit(dialog.folder))
+
+    def _open_session(self, session: SessionFacts) -> None:
+        """Show a session's page; what changes there is read again."""
+        page = SessionPage(self, self.theme, session, open_here)
+        page.changed.connect(self.show_sessions)
+        self._open(page)
+
+    def end(self) -> None:
+        """Stop a rehearsal that is under way."""
+        for dialog in self.findChildren(RehearsalDialog):
+            dialog.end()
+
+    def _open(self, dialog: NewSessionDialog | RehearsalDialog | SessionPage) -> None:
+        self.dialog = dialog
+        dialog.finished.connect(dialog.deleteLater)
+        dialog.open()
+
+    def _open_protocol(self) -> None:
+        chosen, _ = QFileDialog.getOpenFileName(self, "Open protocol", str(workspace().protocols), "Protocols (*.toml)")
+        if not chosen:
+            return
+        if holds_liquids_alone(chosen):
+            self.told.emit("This is a liquid file", f"{chosen} holds no study: open it in the liquid lab.")
+            return
+        if chosen not in self._opened:
+            self._opened.insert(0, chosen)
+        self.protocol_opened.emit(Path(chosen))
+        self.show_studies()
+        self.show_sessions()
+
+    def _arrange(self) -> None:
+        stacked = self.width() < STACKED_BELOW
+        down, right = QBoxLayout.Direction.TopToBottom, QBoxLayout.Direction.LeftToRight
+        self._below.setDirection(down if stacked else right)
+        self._beside.setDirection(right if stacked else down)
+        for card in (self.device, self.lab):
+            card.setMinimumWidth(0 if stacked else BESIDE)
+            card.setMaximumWidth(16_777_215 if stacked else BESIDE)
+        self.grid.arrange(self.width() - 56)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
+        """Make room: cards go below each other."""
+        super().resizeEvent(event)
+        self._arrange()
+
+
+def _read(results: Path, studies: tuple[StudyFacts, ...]) -> tuple[Path, tuple[SessionFacts, ...], Interrupted | None]:
+    """Return the sessions in the results folder, and the one that can go on."""
+    answers = {facts.protocol.study.name: facts.protocol.responses_per_participant() for facts in studies}
+    found = sessions(results, answers)
+    return results, found, interrupted(found, studies, datetime.now().astimezone())
+
+
+def _screens(settings: MachineSettings) -> tuple[str, ...]:
+    """Return a line for each screen: whose it is, size, rate and scaling."""
+    screens = screens_shown()
+    participants = settings.screen_among([screen.name for screen in screens])
+    return tuple(
+        f"{_whose(screen.number, participants, alone=len(screens) == 1)}: {screen.words}" for screen in screens
+    )
+
+
+def _whose(number: int, participants: int, *, alone: bool) -> str:
+    return f"Participant's screen {number}" if number == participants and not alone else f"Screen {number}"

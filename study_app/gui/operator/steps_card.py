@@ -1,0 +1,167 @@
+"""The card at the left: where we are, all steps of the session with their states, and what has been counted."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QResizeEvent
+from PySide6.QtWidgets import QHBoxLayout, QScrollArea, QSizePolicy, QVBoxLayout, QWidget
+
+from study_app.gui.operator.current_step import Now, Tally
+from study_app.gui.theme.icons import draw_icon
+from study_app.gui.theme.theme import font
+from study_app.gui.theme.themed import Themed
+from study_app.gui.widgets.cards import Card, Rule
+from study_app.gui.widgets.labels import Elided, figures, set_ink
+from study_app.viewmodels.operator import OperatorView, StepRow
+
+WIDTH, NARROW, SLIM = 318, 248, 72
+ROW_HEIGHT = 44
+LEAST_ROW_HEIGHT = 26
+DOT = 11
+
+
+class StepLine(Themed, QWidget):
+    """One step: a dot on the line that joins all steps, its name, and its time or place."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.row = StepRow("", "open", "")
+        self.first = self.last = False
+        self.name = Elided("body")
+        self.note = figures("", "label", "text2")
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(37, 0, 0, 0)
+        layout.addWidget(self.name, 1)
+        layout.addWidget(self.note)
+        self._layout = layout
+        self.setMinimumHeight(LEAST_ROW_HEIGHT)
+        self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Preferred)
+
+    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+        """Return the room that a row likes; where there are many, each takes less."""
+        return QSize(super().sizeHint().width(), ROW_HEIGHT)
+
+    def slim(self, yes: bool) -> None:
+        """Show the dot alone; the rest is in its tip."""
+        self._layout.setContentsMargins(0 if yes else 37, 0, 0, 0)
+        for part in (self.name, self.note):
+            part.setVisible(not yes)
+
+    def show_row(self, row: StepRow, *, first: bool, last: bool) -> None:
+        """Show a step's state."""
+        if (row, first, last) == (self.row, self.first, self.last):
+            return
+        self.row, self.first, self.last = row, first, last
+        self.name.show_text(row.label)
+        self.note.setText(row.note)
+        self.name.setFont(font("body", weight=600 if row.state == "now" else 400, scale=0.94))
+        set_ink(self.name, "text2" if row.state == "open" else "text")
+        set_ink(self.note, "accent" if row.state == "now" else "text2")
+        self.setAccessibleName(f"{row.label}, {row.state} {row.note}".strip())
+        self.setToolTip(f"{row.label}  ·  {row.note}" if row.note else row.label)
+        self.update()
+
+    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+        """Paint the line and the dot."""
+        t = self.theme
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        middle = QPointF(12, self.height() / 2)
+        reached = self.row.state != "open"
+        if not self.first:
+            painter.setPen(QPen(QColor(t.ok if reached else t.border), 1.6))
+            painter.drawLine(QPointF(12, 0), QPointF(12, middle.y() - DOT))
+        if not self.last:
+            painter.setPen(QPen(QColor(t.ok if self.row.state == "done" else t.border), 1.6))
+            painter.drawLine(QPointF(12, middle.y() + DOT), QPointF(12, self.height()))
+        if self.row.state == "done":
+            painter.setPen(Qt.PenStyle.NoPen)
+            painter.setBrush(QColor(t.ok_bg))
+            painter.drawEllipse(middle, DOT, DOT)
+            draw_icon(painter, "check", QRectF(5, middle.y() - 7, 14, 14), t.ok, 2.6)
+        elif self.row.state == "now":
+            painter.setPen(QPen(QColor(t.accent), 1.8))
+            painter.setBrush(QColor(t.selected))
+            painter.drawEllipse(middle, DOT, DOT)
+            painter.setPen(Qt.PenStyle.NoPen)
+            painter.setBrush(QColor(t.accent))
+            painter.drawEllipse(middle, 4.5, 4.5)
+        else:
+            painter.setPen(QPen(QColor(t.ctl), 1.5))
+            painter.setBrush(Qt.BrushStyle.NoBrush)
+            painter.drawEllipse(middle, 7, 7)
+
+
+class Rail(Card):
+    """Now, steps and counts; slim, the steps' dots alone."""
+
+    def __init__(self) -> None:
+        super().__init__(gap=10)
+        self.now, self.tally = Now(), Tally()
+        self.heading = self.now.heading
+        self.lines: list[StepLine] = []
+        self._slim = False
+        self._steps = QWidget()
+        self._steps_column = QVBoxLayout(self._steps)
+        self._steps_column.setSpacing(0)
+        self._steps_column.addStretch(1)
+        self.steps_area = QScrollArea()
+        self.steps_area.setWidgetResizable(True)
+        self.steps_area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.steps_area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.steps_area.setWidget(self._steps)
+        self._rules = Rule(), Rule()
+        self.column.addWidget(self._rules[0])
+        self.column.addWidget(self.steps_area, 1)
+        self.column.addWidget(self._rules[1])
+        self.take_back()
+
+    def take_back(self) -> None:
+        """Hold now and counts, above and below the steps."""
+        for part in (self.now, self.tally):
+            part.lie_flat(False)
+        self.column.insertWidget(0, self.now)
+        self.column.addWidget(self.tally)
+        self._be(slim=False)
+
+    def give_away(self) -> None:
+        """Show the steps' dots alone: now and counts stand elsewhere."""
+        for part in (self.now, self.tally):
+            part.lie_flat(True)
+        self._be(slim=True)
+
+    def narrow(self, yes: bool) -> None:
+        """Take less room in a smaller window."""
+        self.setFixedWidth(SLIM if self._slim else NARROW if yes else WIDTH)
+
+    def _be(self, *, slim: bool) -> None:
+        self._slim = slim
+        for part in self._rules:
+            part.setVisible(not slim)
+        self._steps_column.setContentsMargins(0, 0, 0 if slim else 8, 0)
+        bars = Qt.ScrollBarPolicy
+        self.steps_area.setVerticalScrollBarPolicy(bars.ScrollBarAlwaysOff if slim else bars.ScrollBarAsNeeded)
+        for line in self.lines:
+            line.slim(slim)
+
+    def show_view(self, view: OperatorView) -> None:
+        """Show the steps; ``now`` and ``tally`` are shown for themselves, since each may fail alone."""
+        rows = view.steps
+        while len(self.lines) < len(rows):
+            line = StepLine()
+            line.wear(self.theme)
+            line.slim(self._slim)
+            self.lines.append(line)
+            self._steps_column.insertWidget(len(self.lines) - 1, line)
+        for index, (line, row) in enumerate(zip(self.lines, rows, strict=True)):
+            arrived = row.state == "now" != line.row.state
+            line.show_row(row, first=index == 0, last=index == len(rows) - 1)
+            if arrived:
+                self.steps_area.ensureWidgetVisible(line, 0, 2 * LEAST_ROW_HEIGHT)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
+        """Keep the present step in sight."""
+        super().resizeEvent(event)
+        for line in self.lines:
+            if line.row.state == "now":
+                self.steps_area.ensureWidgetVisible(line, 0, LEAST_ROW_HEIGHT)

@@ -1,0 +1,209 @@
+"""The words around the tank: where we are, what to do, how far it is, and the way to pause."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QRectF, Qt
+from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QRegion
+
+from study_app.gui.participant.pages.key_caps import draw_key, key_size
+from study_app.gui.participant.pages.page_widget import mirrored, words_scale
+from study_app.gui.participant.pages.progress_line import BEGINNING, draw_progress
+from study_app.gui.participant.tank.frame import Placed, TaskShown
+from study_app.gui.theme.theme import PARTICIPANT, font
+from study_app.protocol.model import Explore, Reach
+from study_app.session.pages import TaskPage
+
+if TYPE_CHECKING:
+    from study_app.protocol.wording.languages import Words
+
+DESIGNED_FOR = (1920, 1080)
+LEAST_SCALE = 0.72
+INSTRUCTION = 0.72  # of the window's width
+FINE = 0.9
+COUNTED_DOWN_S = 10  # before a task's limit
+PATCH_ROOM = 88  # of the photodiode's patch in the lower right corner [px]
+CENTRED = int(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop | Qt.TextFlag.TextWordWrap)
+RIGHT = int(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+
+
+def caption_scale(width: float, height: float) -> float:
+    """Return how much larger than at 1920 × 1080 words are written in a window of ``width`` × ``height`` [px]."""
+    return min(max(min(width / DESIGNED_FOR[0], height / DESIGNED_FOR[1]), LEAST_SCALE), 2.0)
+
+
+class Captions:
+    """Lays the words out for a size and draws those that a region touches.
+
+    Words are no smaller than ``text_scale`` times as designed. In a language that is read from right to left everything
+    is mirrored but the tank and the photodiode's patch.
+    """
+
+    def __init__(self, page: TaskPage, words: Words, text_scale: float = 1.0) -> None:
+        self._page = page
+        self._words = words
+        self._text_scale = text_scale
+        self._small: QFont
+        self._line: float
+        self._way = Qt.LayoutDirection.RightToLeft if words.right_to_left else Qt.LayoutDirection.LeftToRight
+        self.lay_out(*DESIGNED_FOR, 0.84 * DESIGNED_FOR[1])
+
+    def below(self, width: float, height: float) -> float:
+        """Return the height [px] that instruction and foot need under the tank; the same for most instructions."""
+        self._size_words(width, height)
+        lines = max(2, self._instruction_lines())
+        foot = height - self._top_of_foot(stacked=True) if self._text_scale > 1 else 0.0
+        return max(168 * self._scale, foot + (lines + 0.3) * self._line)
+
+    def above(self, width: float, height: float) -> float:
+        """Return the height [px] that progress and count need above the tank."""
+        self._size_words(width, height)
+        return 102 * self._scale if self._text_scale > 1 else 0.0
+
+    def lay_out(self, width: float, height: float, below: float) -> None:
+        """Find the places in a window of ``width`` × ``height``; the tank ends at ``below`` [px]."""
+        self._size_words(width, height)
+        scale, margin = self._scale, 64 * caption_scale(width, height)
+        head, small = 58 * scale, QFontMetricsF(self._small).height()
+        count = 300 * scale
+        across = width - 2 * margin - (count if isinstance(self._page.task, Reach) else 0)
+        self._head = self._placed(QRectF(margin, head - 20 * scale, across, 40 * scale))
+        self._count = self._placed(QRectF(width - margin - count, head - 26 * scale, count, 70 * scale))
+        start = max(margin, PATCH_ROOM + 12) if self._words.right_to_left else margin
+        room = width - start - (margin if self._words.right_to_left else PATCH_ROOM + 12)
+        if self._foot_width() > room:
+            self._pause_font = font("statement", scale=self._fine * room / self._foot_width())
+        self._foot = QRectF(start, self._foot_middle() - small, min(self._foot_width(), room), 2 * small)
+        longest = max(QFontMetricsF(self._small).horizontalAdvance(text) for text in self._longest_hints()) + 8
+        stacked = self._foot.right() + 24 > (width - longest) / 2
+        middle = self._foot_middle() - (1.25 * small if stacked else 0)
+        self._hint = QRectF((width - longest) / 2, middle - 0.62 * small, longest, 1.24 * small)
+        if stacked:
+            self._foot.setTop(self._foot_middle() - 0.62 * small)
+        tall = self._instruction_lines() * self._line
+        room = self._top_of_foot(stacked=stacked) - below
+        top = below + max(4 * scale, (room - tall) * 0.55)
+        self._instruction = QRectF((1 - INSTRUCTION) / 2 * width, top, INSTRUCTION * width, max(room, tall))
+
+    def _size_words(self, width: float, height: float) -> None:
+        self._width, self._height = width, height
+        base = caption_scale(width, height)
+        least = words_scale(width, height, self._text_scale) if self._text_scale > 1 else 1.0
+        self._scale = max(base, LEAST_SCALE * least)
+        self._fine = max(self._scale, least if self._text_scale > 1 else FINE)  # small words shrink less than the tank
+        self._instruction_font = font("instruction", scale=self._scale)
+        self._count_font = font("number", scale=self._scale)
+        self._small = self._pause_font = font("statement", scale=self._fine)
+        self._line = QFontMetricsF(self._instruction_font).height()
+
+    def _instruction_lines(self) -> int:
+        metrics = QFontMetricsF(self._instruction_font)
+        bounds = metrics.boundingRect(QRectF(0, 0, INSTRUCTION * self._width, 1e4), CENTRED, self._page.instruction)
+        return max(1, round(bounds.height() / self._line))
+
+    def _foot_middle(self) -> float:
+        small = QFontMetricsF(self._small).height()
+        base = caption_scale(self._width, self._height)
+        return self._height - max(58 * base, 0.5 * small + 24 * base)
+
+    def _top_of_foot(self, *, stacked: bool) -> float:
+        return self._foot_middle() - QFontMetricsF(self._small).height() * (1.9 if stacked else 0.65)
+
+    def _foot_width(self) -> float:
+        key, _ = key_size(self._words.escape_key, 1.1 * self._fine)
+        return key + 12 * self._fine + QFontMetricsF(self._pause_font).horizontalAdvance(self._words.pause_hint) + 4
+
+    def things(self, task: TaskShown | None, depth: int = 0) -> dict[str, Placed]:
+        """Return what can change among the words."""
+        return {
+            "count": Placed(self._counted(task), self._count),
+            "hint": Placed(self._hint_words(task, depth), self._hint),
+        }
+
+    def draw(self, painter: QPainter, region: QRegion, task: TaskShown | None, depth: int = 0) -> None:
+        """Draw the words in ``region``; ``depth`` is where the lit target is: -1 further away, 1 nearer, 0 not told."""
+        page, words = self._page, self._words
+        painter.setLayoutDirection(self._way)
+        if page.progress is not None and region.intersects(self._head.toAlignedRect()):
+            draw_progress(painter, self._head, page.progress, words, scale=self._head_scale, share=0.5)
+        if isinstance(page.task, Reach) and region.intersects(self._count.toAlignedRect()):
+            self._draw_count(painter, task)
+        if region.intersects(self._instruction.toAlignedRect()):
+            _text(painter, self._instruction, CENTRED, page.instruction, self._instruction_font, PARTICIPANT.text)
+        if region.intersects(self._placed(self._foot).toAlignedRect()):
+            self._draw_foot(painter)
+        hint = self._hint_words(task, depth)
+        if hint and region.intersects(self._hint.toAlignedRect()):
+            strong = hint.startswith((words.continue_now, words.further_away, words.nearer)) or hint == words.time_is_up
+            colour = PARTICIPANT.text if strong else PARTICIPANT.text3
+            _text(painter, self._hint, int(Qt.AlignmentFlag.AlignCenter), hint, self._small, colour)
+
+    @property
+    def _head_scale(self) -> float:
+        return max(1.25 * self._scale, self._fine)
+
+    def _placed(self, place: QRectF) -> QRectF:
+        """Return a place of a page read from left to right, in this one."""
+        return mirrored(place, self._width) if self._words.right_to_left else place
+
+    def _longest_hints(self) -> tuple[str, ...]:
+        words = self._words
+        counted = words.seconds_left.format(seconds=999)
+        both = words.seconds_left.format(seconds=COUNTED_DOWN_S)
+        if isinstance(self._page.task, Reach):
+            return tuple(f"{away} · {both}" for away in (words.further_away, words.nearer, words.time_is_up))
+        return f"{words.continue_now} · {both}", words.continue_in.format(seconds=999), counted, words.time_is_up
+
+    def _draw_foot(self, painter: QPainter) -> None:
+        """Draw the way to pause."""
+        fine, words = self._fine, self._words
+        key, _ = key_size(words.escape_key, 1.1 * fine)
+        cap = self._placed(QRectF(self._foot.left(), self._foot.top(), key, self._foot.height()))
+        draw_key(painter, cap.left(), cap.center().y(), words.escape_key, 1.1 * fine)
+        beside = self._foot.adjusted(key + 12 * fine, 0, 0, 0)
+        _text(painter, self._placed(beside), BEGINNING, words.pause_hint, self._pause_font, PARTICIPANT.text2)
+
+    def _hint_words(self, task: TaskShown | None, depth: int) -> str:
+        """Return how long it takes until the participant may or must go on, and in which depth the target is."""
+        todo, words = self._page.task, self._words
+        elapsed_s = task.elapsed_s if task else 0.0  # before the first view nothing has happened yet
+        left = math.ceil(todo.limit_s - elapsed_s)
+        if left <= 0:
+            return words.time_is_up
+        counted = words.seconds_left.format(seconds=left)
+        if isinstance(todo, Explore):
+            wait = math.ceil(todo.min_s - elapsed_s)
+            if wait > 0:
+                return words.continue_in.format(seconds=wait)
+            return words.continue_now if left > COUNTED_DOWN_S else f"{words.continue_now} · {counted}"
+        counts = todo.duration_s is not None or left <= COUNTED_DOWN_S
+        away = {0: "", -1: words.further_away, 1: words.nearer}[depth]
+        return " · ".join(filter(None, (away, counted if counts else "")))
+
+    def _counted(self, task: TaskShown | None) -> tuple[int, int | None]:
+        if task is not None:
+            return task.reached, task.of
+        return 0, self._page.task.count if isinstance(self._page.task, Reach) else None
+
+    def _draw_count(self, painter: QPainter, task: TaskShown | None) -> None:
+        reached, of = self._counted(task)
+        count = str(reached) if of is None else self._words.reached.format(reached=reached, of=of)
+        upper = QRectF(self._count.topLeft(), self._count.size() * 0.5)
+        upper.setWidth(self._count.width())
+        _text(painter, upper, RIGHT, count, self._count_font, PARTICIPANT.text)
+        _text(
+            painter,
+            upper.translated(0, upper.height()),
+            RIGHT,
+            self._words.targets_reached,
+            self._small,
+            PARTICIPANT.text2,
+        )
+
+
+def _text(painter: QPainter, place: QRectF, flags: int, text: str, face: QFont, colour: str) -> None:
+    painter.setFont(face)
+    painter.setPen(QColor(colour))
+    painter.drawText(place, flags, text)

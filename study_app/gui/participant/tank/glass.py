@@ -1,0 +1,251 @@
+"""How glass, water, light and floor of the tank are painted; used once for each size by ``backdrop``."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtGui import (
+    QBrush,
+    QColor,
+    QGradient,
+    QImage,
+    QLinearGradient,
+    QPainter,
+    QPainterPath,
+    QPen,
+    QPolygonF,
+    QRadialGradient,
+    QTransform,
+)
+
+from study_app.gui.participant.tank import caustics
+from study_app.gui.participant.tank.camera import Box, Camera, Point
+from study_app.gui.theme.theme import TANK
+
+FLOOR_LINES = 10
+
+
+def at(camera: Camera, point: Point) -> QPointF:
+    """Return where a point falls on the screen."""
+    return QPointF(*camera.point(point))
+
+
+def polygon(camera: Camera, points: list[Point]) -> QPolygonF:
+    """Return points of the tank as a polygon on the screen."""
+    return QPolygonF([at(camera, point) for point in points])
+
+
+def ink(colour: str, alpha: int = 255) -> QColor:
+    """Return a colour of the given opacity, 0 … 255."""
+    made = QColor(colour)
+    made.setAlpha(alpha)
+    return made
+
+
+def pen(colour: str, alpha: int, width: float) -> QPen:
+    """Return a solid pen with round ends."""
+    return QPen(ink(colour, alpha), width, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap, Qt.PenJoinStyle.RoundJoin)
+
+
+def shade(gradient: QGradient, *stops: tuple[float, str, int]) -> QBrush:
+    """Return a brush of a gradient with stops of place, colour and opacity."""
+    for place, colour, alpha in stops:
+        gradient.setColorAt(place, ink(colour, alpha))
+    return QBrush(gradient)
+
+
+def fill(painter: QPainter, shape: QPolygonF | QPainterPath, brush: QBrush) -> None:
+    """Fill a shape, without an edge."""
+    painter.setPen(Qt.PenStyle.NoPen)
+    painter.setBrush(brush)
+    if isinstance(shape, QPainterPath):
+        painter.drawPath(shape)
+    else:
+        painter.drawPolygon(shape)
+
+
+def walls(painter: QPainter, box: Box, camera: Camera) -> None:
+    """Paint the back wall, lit from behind, and the two side walls."""
+    x, z = box.x, box.z
+    back = polygon(camera, [(-x, box.top, -z), (x, box.top, -z), (x, box.floor, -z), (-x, box.floor, -z)])
+    frame = back.boundingRect()
+    base = QLinearGradient(frame.topLeft(), frame.bottomLeft())
+    fill(painter, back, shade(base, (0, "#284A5E", 255), (0.45, "#25475B", 255), (1, "#1A3548", 255)))
+    glow = QRadialGradient(QPointF(frame.center().x(), frame.top() + 0.18 * frame.height()), frame.width() * 0.52)
+    fill(
+        painter,
+        back,
+        shade(glow, (0, "#6B95AA", 150), (0.35, "#4A7489", 96), (0.75, "#2F5A70", 24), (1, "#244A60", 0)),
+    )
+    for side in (-1, 1):
+        far_edge, near_edge = side * x, side * x
+        wall = polygon(
+            camera,
+            [(far_edge, box.top, -z), (near_edge, box.top, z), (near_edge, box.floor, z), (far_edge, box.floor, -z)],
+        )
+        near, far = at(camera, (near_edge, 0, z)), at(camera, (far_edge, 0, -z))
+        along = QLinearGradient(QPointF(near.x(), 0), QPointF(far.x(), 0))
+        fill(painter, wall, shade(along, (0, "#25435A", 255), (0.7, "#1D3B4F", 255), (1, "#1A364A", 255)))
+        down = QLinearGradient(wall.boundingRect().topLeft(), wall.boundingRect().bottomLeft())
+        fill(painter, wall, shade(down, (0, "#0F2B40", 190), (0.28, "#16364B", 60), (1, "#2A4A5C", 60)))
+
+
+def floor(painter: QPainter, box: Box, camera: Camera) -> None:
+    """Paint the floor: sand-free glass with caustics and a grid that gives the eye a scale."""
+    x, y, z = box.x, box.floor, box.z
+    quad = polygon(camera, [(-x, y, -z), (x, y, -z), (x, y, z), (-x, y, z)])
+    far, near = quad.at(0).y(), quad.at(2).y()
+    fill(painter, quad, shade(QLinearGradient(0, far, 0, near), (0, "#24485D", 255), (1, "#3A6B85", 255)))
+    middle = QRadialGradient(at(camera, (0, y, 0)), (quad.at(2).x() - quad.at(3).x()) * 0.5)
+    fill(painter, quad, shade(middle, (0, "#5B8CA4", 60), (1, "#2F6079", 0)))
+    for side in (-1, 1):
+        edge = QLinearGradient(at(camera, (side * x, y, 0)), at(camera, (side * x * 0.72, y, 0)))
+        fill(painter, quad, shade(edge, (0, "#122B3C", 110), (1, "#122B3C", 0)))
+    _caustics(painter, quad)
+    for index in range(1, FLOOR_LINES):
+        share = 2 * index / FLOOR_LINES - 1
+        _grid_line(painter, at(camera, (share * x, y, -z)), at(camera, (share * x, y, z)))
+        _grid_line(painter, at(camera, (-x, y, share * z)), at(camera, (x, y, share * z)))
+
+
+def _grid_line(painter: QPainter, start: QPointF, end: QPointF) -> None:
+    painter.setPen(pen("#BFE0F0", 34, 1.0))
+    painter.drawLine(start, end)
+
+
+def _caustics(painter: QPainter, quad: QPolygonF) -> None:
+    brightness = caustics.brightness()
+    alpha = np.rint(255 * brightness).astype(np.uint32)
+    pixels = np.ascontiguousarray(alpha * 0x01010101)
+    rows, columns = brightness.shape
+    image = QImage(pixels.data, columns, rows, QImage.Format.Format_ARGB32_Premultiplied)
+    square = QPolygonF([QPointF(0, 0), QPointF(columns, 0), QPointF(columns, rows), QPointF(0, rows)])
+    warp = QTransform()
+    if not QTransform.quadToQuad(square, quad, warp):
+        raise ValueError("the floor of the tank has no area on the screen")
+    painter.save()
+    painter.setTransform(warp, combine=True)
+    painter.setOpacity(0.16)
+    painter.drawImage(0, 0, image)
+    painter.restore()
+
+
+def light(painter: QPainter, box: Box, camera: Camera) -> None:
+    """Paint three shafts of light that fall from the surface at the back of the tank."""
+    painter.save()
+    painter.setCompositionMode(QPainter.CompositionMode.CompositionMode_Screen)
+    for place, wide, strength in ((-0.54, 0.10, 74), (0.0, 0.16, 96), (0.46, 0.12, 66)):
+        top = at(camera, (place * box.x, box.water, -0.75 * box.z))
+        foot = at(camera, (place * box.x * 1.04, box.floor, -0.6 * box.z))
+        half = (at(camera, (wide * box.x, box.water, 0)) - at(camera, (0, box.water, 0))).x()
+        painter.save()
+        painter.translate(top)
+        painter.shear((foot.x() - top.x()) / (foot.y() - top.y()), 0)
+        painter.scale(half, (foot.y() - top.y()) * 0.92)
+        _shaft(painter, strength)
+        painter.restore()
+    painter.restore()
+
+
+def _shaft(painter: QPainter, strength: int) -> None:
+    """Paint one shaft into [-1, 1] × [0, 1]: soft on both sides, fading downwards."""
+    steps = 48
+    for step in range(steps):
+        down = (step + 0.5) / steps
+        fade = math.exp(-2.6 * down) * min(1.0, down * 9)
+        across = QLinearGradient(-1 - 0.5 * down, 0, 1 + 0.5 * down, 0)
+        alpha = round(strength * fade)
+        if alpha == 0:
+            continue
+        brush = shade(
+            across,
+            (0, "#8FC4DC", 0),
+            (0.25, "#8FC4DC", round(alpha * 0.25)),
+            (0.5, "#8FC4DC", alpha),
+            (0.75, "#8FC4DC", round(alpha * 0.25)),
+            (1, "#8FC4DC", 0),
+        )
+        painter.fillRect(QRectF(-1.5, step / steps, 3, 1 / steps), brush)
+
+
+def far_edges(painter: QPainter, box: Box, camera: Camera) -> None:
+    """Paint the far edges of the glass."""
+    x, z = box.x, box.z
+    far = [(-x, box.top, -z), (x, box.top, -z), (x, box.floor, -z), (-x, box.floor, -z)]
+    painter.setBrush(Qt.BrushStyle.NoBrush)
+    painter.setPen(pen(TANK.glass, 92, 1.0))
+    painter.drawPolygon(polygon(camera, far))
+    for side in (-1, 1):
+        painter.setPen(pen(TANK.glass, 92, 1.0))
+        painter.drawLine(at(camera, (side * x, box.floor, -z)), at(camera, (side * x, box.floor, z)))
+        painter.setPen(pen(TANK.glass, 128, 1.0))
+        painter.drawLine(at(camera, (side * x, box.top, -z)), at(camera, (side * x, box.top, z)))
+
+
+def near_sides(painter: QPainter, box: Box, camera: Camera) -> None:
+    """Paint the near edges at the sides and below, which nothing that moves can hide."""
+    x, z = box.x, box.z
+    painter.setPen(pen(TANK.glass, 150, 1.25))
+    corners = [(-x, box.top, z), (-x, box.floor, z), (x, box.floor, z), (x, box.top, z)]
+    painter.drawPolyline(polygon(camera, corners))
+
+
+def near_lines(painter: QPainter, box: Box, camera: Camera) -> None:
+    """Paint the near edge of the glass above the water, and the water line: they lie before all that moves."""
+    for height, colour, alpha, width in ((box.top, TANK.glass, 150, 1.25), (box.water, "#E9F6FD", 215, 1.5)):
+        painter.setPen(pen(colour, alpha, width))
+        painter.drawLine(at(camera, (-box.x, height, box.z)), at(camera, (box.x, height, box.z)))
+
+
+def front_area(box: Box, camera: Camera) -> QRectF:
+    """Return the place of water surface and near lines, on whole pixels."""
+    level = [(side * box.x, box.water, end * box.z) for side in (-1, 1) for end in (-1, 1)]
+    glass = [(side * box.x, box.top, box.z) for side in (-1, 1)]
+    return QRectF(polygon(camera, level + glass).boundingRect().adjusted(-2, -2, 2, 2).toAlignedRect())
+
+
+def surface(painter: QPainter, box: Box, camera: Camera) -> None:
+    """Paint the water's surface, seen from above: a pale skin with a few still ripples."""
+    x, y, z = box.x, box.water, box.z
+    skin = polygon(camera, [(-x, y, -z), (x, y, -z), (x, y, z), (-x, y, z)])
+    far, near = skin.at(0).y(), skin.at(2).y()
+    down = QLinearGradient(0, far, 0, near)
+    fill(
+        painter,
+        skin,
+        shade(down, (0, "#D5E8F1", 118), (0.16, "#A9C8D8", 72), (0.5, "#7FA6BA", 26), (1, "#A4C3D3", 64)),
+    )
+    sheen = QRadialGradient(at(camera, (0, y, -0.55 * z)), (skin.at(1).x() - skin.at(0).x()) * 0.42)
+    fill(painter, skin, shade(sheen, (0, "#E4F4FC", 26), (1, "#E4F4FC", 0)))
+    painter.setClipRegion(skin.toPolygon())
+    for depth, high, waves, phase, alpha in (
+        (-0.88, 0.003, 4.6, 0.4, 96),
+        (-0.68, 0.005, 3.4, 2.1, 80),
+        (-0.34, 0.007, 2.6, 4.4, 62),
+        (0.14, 0.009, 2.0, 1.2, 50),
+    ):
+        _ripple(painter, box, camera, depth * z, high, waves, phase, alpha)
+    painter.setClipping(False)
+    painter.setPen(pen("#DDEFF8", 120, 1.0))
+    painter.drawLine(skin.at(0), skin.at(1))
+    painter.drawLine(skin.at(0), skin.at(3))
+    painter.drawLine(skin.at(1), skin.at(2))
+
+
+def _ripple(
+    painter: QPainter, box: Box, camera: Camera, depth: float, high: float, waves: float, phase: float, alpha: int
+) -> None:
+    height = high * (box.water - box.floor)
+    points = []
+    for step in range(97):
+        share = step / 48 - 1
+        swell = math.sin(math.pi * waves * share + phase) + 0.4 * math.sin(math.pi * waves * 1.7 * share + 2 * phase)
+        points.append(at(camera, (share * box.x, box.water + height * swell, depth)))
+    fade = QLinearGradient(points[0], points[-1])
+    painter.setPen(
+        QPen(shade(fade, (0, "#E9F6FD", 0), (0.2, "#E9F6FD", alpha), (0.8, "#E9F6FD", alpha), (1, "#E9F6FD", 0)), 1.0)
+    )
+    painter.setBrush(Qt.BrushStyle.NoBrush)
+    painter.drawPolyline(QPolygonF(points))

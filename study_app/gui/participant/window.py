@@ -1,0 +1,380 @@
+"""The participant's window: one page at a time, whole before it is seen; Esc pauses, and held it stops the force."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from threading import Thread
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QEvent, QRect, QSize, Qt, QTimer, Signal
+from PySide6.QtGui import (
+    QAccessible,
+    QCloseEvent,
+    QColor,
+    QGuiApplication,
+    QKeyEvent,
+    QPainter,
+    QPaintEvent,
+    QPixmap,
+    QResizeEvent,
+    QScreen,
+)
+from PySide6.QtWidgets import QWidget
+
+from study_app.gui.display.screens import place
+from study_app.gui.participant.pages.notices import NoticeWidget, PauseWidget
+from study_app.gui.participant.pages.page_widget import PageWidget
+from study_app.gui.participant.pages.questionnaire import QuestionnaireWidget
+from study_app.gui.participant.pages.reading_page import ReadingPage
+from study_app.gui.participant.pages.text_page import TextWidget
+from study_app.gui.participant.pointer_capture import BUTTONS, PointerCapture
+from study_app.gui.participant.tank_widget import TankWidget, paint_ahead
+from study_app.gui.theme.theme import PARTICIPANT, font, load_fonts, stylesheet
+from study_app.gui.widgets.accessible import give_role
+from study_app.gui.widgets.escape_key import EscapeHold
+from study_app.protocol.wording.languages import Words, words
+from study_app.session.pages import (
+    EndPage,
+    Page,
+    PausePage,
+    QuestionnairePage,
+    TaskPage,
+    TextPage,
+    TroublePage,
+)
+from study_app.session.transitions.events import Continue, ForceStopped, PauseAsked
+
+if TYPE_CHECKING:
+    from study_app.session.trial import TankView
+
+LEAST_SIZE = QSize(1024, 640)
+WINDOWED_SIZE = QSize(1366, 768)
+PILOT_FRAME = 10
+WAITING_MS = 15
+TIME_UP_MS = 1500  # so long it is told that a task's time is over, before the questions
+AHEAD_MS = 100  # after a page came, what comes next is painted
+SETTLING_MS = 100  # from one of the program's windows to the next, none may have the keyboard for so long
+
+
+class ParticipantWindow(QWidget):
+    """Shows pages and says what the participant does.
+
+    Parameters
+    ----------
+    said : the interface's words in the participant's language, until a page is in another
+    clock : seconds since the session's origin, for the events' times
+    windowed : a window of at least 1024 × 640 instead of the whole screen
+    captures_pointer : hold and hide the pointer in the tank, because it is the device
+    pilot : a coloured frame and the title say that this is no participant's session
+    text_scale : how much larger than designed words must be at least, for this screen at this distance
+    on_card : whether the tank is drawn on a surface of the graphics card, in step with the screen
+    photodiode : whether the tank has a corner that a photodiode looks at
+    strip : what stands above every page, where the operator has no screen of their own
+
+    While ``may_close`` is false, closing the window in the middle of a session is a pause.
+    ``event`` carries the session's events; ``pointer`` the hand's place [m] and ``buttons`` the buttons' bits while the
+    pointer is captured; ``painted`` the time of the sample [ns] of every view, while it is drawn, and ``swapped`` comes
+    where a surface has just swapped; ``left`` where the participant closed the last page. ``painting`` is the last
+    thread that painted ahead.
+    """
+
+    event = Signal(object)  # type: ignore[assignment]  # hides QWidget.event() from Python, not from Qt
+    pointer = Signal(float, float, float)
+    buttons = Signal(int)
+    painted = Signal(object)
+    swapped = Signal()
+    left = Signal()
+
+    def __init__(
+        self,
+        said: Words,
+        *,
+        clock: Callable[[], float],
+        windowed: bool = False,
+        captures_pointer: bool = False,
+        pilot: bool = False,
+        text_scale: float = 1.0,
+        on_card: bool = False,
+        strip: QWidget | None = None,
+        photodiode: bool = True,
+    ) -> None:
+        super().__init__()
+        load_fonts()
+        self._strip = strip
+        self._on_card = on_card
+        self._photodiode = photodiode
+        self._words = said
+        self._clock = clock
+        self._text_scale = text_scale
+        self._windowed = windowed
+        self._captures = captures_pointer
+        self.may_close = False
+        self.painting: Thread | None = None
+        self.frame_px = PILOT_FRAME if pilot else 0
+        self._page: Page | None = None
+        self._widget: PageWidget | TankWidget = self._wait_page(said.preparing)
+        self._capture = PointerCapture(self)
+        self._capture.moved.connect(self.pointer)
+        self._capture.pressed.connect(self._press)
+        self._settling = QTimer(self)
+        self._settling.setInterval(SETTLING_MS)
+        self._settling.timeout.connect(self._pause_if_left)
+        self._waiting = QTimer(self)
+        self._waiting.setInterval(WAITING_MS)
+        self._waiting.timeout.connect(self._show_if_painted)
+        self._told_up = QTimer(self)
+        self._told_up.setSingleShot(True)
+        self._told_up.setInterval(TIME_UP_MS)
+        self._told_up.timeout.connect(self._ask)
+        self._ahead = QTimer(self)
+        self._ahead.setSingleShot(True)
+        self._ahead.setInterval(AHEAD_MS)
+        self._ahead.timeout.connect(self._paint_ahead)
+        self._escape = EscapeHold(self)
+        self._escape.held.connect(self._stop_force)
+        self._escape.tapped.connect(self._pause)
+        self.installEventFilter(self._escape)
+        self._pilot = pilot
+        self._title()
+        self.setObjectName("participant")
+        self.setFont(font("body"))
+        self.setStyleSheet(stylesheet(PARTICIPANT))
+        self.setMinimumSize(LEAST_SIZE)
+        give_role(self, QAccessible.Role.Window)
+        if strip is not None:
+            strip.setParent(self)
+
+    @property
+    def page(self) -> Page | None:
+        """The page that is shown; None before the first, and while it is told that the time is up."""
+        return None if self._told_up.isActive() else self._page
+
+    @property
+    def widget(self) -> PageWidget | TankWidget:
+        """What draws the page."""
+        return self._widget
+
+    @property
+    def tank(self) -> TankWidget | None:
+        """The tank, while it is shown."""
+        return self._widget if isinstance(self._widget, TankWidget) else None
+
+    def open_on(self, screen: QScreen | None = None) -> None:
+        """Open the window on ``screen`` (or where the system puts it), full-screen unless windowed."""
+        if screen is not None:
+            self.setScreen(screen)
+            self.move(screen.geometry().topLeft())
+        if self._windowed:
+            self.resize(WINDOWED_SIZE)
+            place(self, self.screen(), corner=False)
+            self.show()
+        else:
+            self.setGeometry(self.screen().geometry())
+            self.showFullScreen()
+        self.activateWindow()
+        self._widget.setFocus()
+
+    def come_forward(self) -> None:
+        """Stand before every other window of the screen."""
+        self.raise_()
+        self.activateWindow()
+
+    def show_page(self, page: Page) -> None:
+        """Put a page in place of the present one, whole and at once."""
+        self._capture.release()
+        self._waiting.stop()
+        self._told_up.stop()
+        if isinstance(page, TextPage) and page.language != self._words.language:
+            self._words = words(page.language)
+            self._title()
+        self._page = page
+        up = self.tank is not None and self.tank.time_is_up
+        if isinstance(page, QuestionnairePage) and up:
+            self._told_up.start()
+            self._put(self._wait_page(self._words.time_is_up))
+        elif isinstance(page, TaskPage) and self.painting is not None and self.painting.is_alive():
+            self._waiting.start()
+            self._put(self._wait_page(self._words.trouble_title))
+        else:
+            self._put(self._make(page, self._widget))
+
+    def _put(self, made: PageWidget | TankWidget) -> None:
+        """Put a widget in place of the present one."""
+        old = self._widget
+        if isinstance(old, TankWidget):
+            old.painted.disconnect(self.painted)  # a late frame of one trial's tank must not begin the next trial
+        made.setGeometry(self._room())
+        if isinstance(made, TankWidget):
+            made.prepare()
+        self._widget = made
+        made.show()
+        made.raise_()
+        if isinstance(made, TankWidget):
+            self._enter_tank(made, made.page)
+        else:
+            made.focus_first()
+        old.hide()  # only now, or Qt would lead the keyboard somewhere itself
+        old.deleteLater()
+        if isinstance(made, TankWidget):
+            made.repaint()  # whole, lest its first view wait for that
+        self._ahead.start()
+
+    def show_view(self, view: TankView) -> None:
+        """Draw a view in the tank, while it is shown."""
+        if self.tank is not None:
+            self.tank.show_view(view)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802
+        """Hear Space and Enter in the tank."""
+        if event.isAutoRepeat():
+            return
+        key = event.key()
+        if key in (Qt.Key.Key_Space, Qt.Key.Key_Return, Qt.Key.Key_Enter) and self._may_leave_tank():
+            self.event.emit(Continue(self._clock()))
+        else:
+            super().keyPressEvent(event)
+
+    def changeEvent(self, event: QEvent) -> None:  # noqa: N802
+        """Hold the pointer in the tank only while this window is active."""
+        super().changeEvent(event)
+        if event.type() != QEvent.Type.ActivationChange or not self._captures or self.tank is None:
+            return
+        if self.isActiveWindow() and self.isVisible() and not self._capture.held:
+            self._capture.take(self.tank, self.tank.page.workspace_m)
+        elif not self.isActiveWindow() and self._capture.held:
+            self._capture.release()
+            self.tank.setCursor(Qt.CursorShape.BlankCursor)
+            self._settling.start()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
+        """Let the page fill the window."""
+        super().resizeEvent(event)
+        if self._strip is not None:
+            room = self._room()
+            self._strip.setGeometry(room.left(), self.frame_px, room.width(), self._strip.height())
+        self._widget.setGeometry(self._room())
+        self._ahead.start()
+
+    def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802
+        """Do not let the participant close a session by accident: that is a pause."""
+        if not self.may_close and not isinstance(self._page, EndPage | None):
+            event.ignore()
+            self._pause()
+            return
+        self._capture.release()
+        super().closeEvent(event)
+        if not self.may_close:
+            self.left.emit()
+
+    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802
+        """Fill what no page covers: nothing, or the frame of a pilot."""
+        painter = QPainter(self)
+        painter.fillRect(self.rect(), QColor(PARTICIPANT.warn if self.frame_px else PARTICIPANT.window))
+        painter.end()
+
+    def _paint_ahead(self) -> None:
+        """While a text or a pause is read, paint the tank that comes after it."""
+        if isinstance(self._page, TextPage | PausePage) and self._page.coming is not None:
+            size, ratio = self._room().size(), self.devicePixelRatioF()
+            self.painting = paint_ahead(self._page.coming, self._words, self._text_scale, size, ratio)
+
+    def _wait_page(self, words_said: str) -> ReadingPage:
+        """Return a page that asks for a moment's patience."""
+        column = ("clock", words_said, (), PARTICIPANT.accent)
+        return ReadingPage(column, self._words, self._clock, parent=self, text_scale=self._text_scale)
+
+    def _show_if_painted(self) -> None:
+        """Put the tank in place of the page that asks to wait, once it is painted."""
+        if isinstance(self._page, TaskPage) and self.painting is not None and not self.painting.is_alive():
+            self._waiting.stop()
+            self._put(self._make(self._page, self._widget))
+
+    def _ask(self) -> None:
+        """Put the questions in place of the page that tells that the time is up."""
+        if isinstance(self._page, QuestionnairePage):
+            self._put(self._make(self._page, self._widget))
+
+    def _title(self) -> None:
+        title = self._words.window_title
+        self.setWindowTitle(f"{title} – pilot" if self._pilot else title)
+        self.setAccessibleName(self.windowTitle())
+
+    def _room(self) -> QRect:
+        """Return where pages are."""
+        frame = self.frame_px
+        above = self._strip.height() if self._strip is not None else 0
+        return self.rect().adjusted(frame, frame + above, -frame, -frame)
+
+    def _make(self, page: Page, old: QWidget) -> PageWidget | TankWidget:
+        said, clock, text = self._words, self._clock, self._text_scale
+        made: PageWidget
+        match page:
+            case TaskPage():
+                by_click = replace(said, continue_now=said.click_now) if self._captures else said
+                tank = TankWidget(
+                    page,
+                    by_click,
+                    self,
+                    text_scale=text,
+                    on_card=self._on_card,
+                    photodiode=self._photodiode,
+                    by_mouse=self._captures,
+                )
+                tank.painted.connect(self.painted)
+                tank.swapped.connect(self.swapped)
+                return tank
+            case QuestionnairePage():
+                made = QuestionnaireWidget(page, said, clock, self, text_scale=text)
+            case TextPage():
+                made = TextWidget(page, said, clock, self, text_scale=text)
+            case PausePage():
+                made = PauseWidget(page, said, clock, under=_picture(old), parent=self, text_scale=text)
+            case TroublePage() | EndPage():
+                made = NoticeWidget(page, said, clock, self, text_scale=text)
+        made.event_made.connect(self.event)
+        return made
+
+    def _enter_tank(self, tank: TankWidget, page: TaskPage) -> None:
+        """Give the keyboard to the window, and the pointer to the hand if it is the device."""
+        self.activateWindow()
+        self.setFocus()
+        tank.setCursor(Qt.CursorShape.BlankCursor)
+        if self._captures:
+            self._capture.take(tank, page.workspace_m)
+
+    def _may_leave_tank(self) -> bool:
+        return self.tank is not None and self.tank.may_leave
+
+    def _press(self, bits: int) -> None:
+        """Take a click of the mouse that is the device: it goes on where Space would, and is a button anywhere else."""
+        if bits & BUTTONS[Qt.MouseButton.LeftButton] and self._may_leave_tank():
+            self.event.emit(Continue(self._clock()))
+        else:
+            self.buttons.emit(bits)
+
+    def _pause_if_left(self) -> None:
+        """Pause where the pointer is the device and went to another program; the operator's window is none."""
+        if self.tank is None or self._capture.held:
+            self._settling.stop()
+        elif QGuiApplication.focusWindow() is None:
+            self._settling.stop()
+            self._pause()
+
+    def _pause(self) -> None:
+        """Pause the session; close the last page."""
+        if isinstance(self._page, TextPage | TaskPage | QuestionnairePage):
+            self.event.emit(PauseAsked(self._clock(), "participant"))
+        elif isinstance(self._page, EndPage):
+            self.close()
+
+    def _stop_force(self) -> None:
+        if self._page is not None:
+            self.event.emit(ForceStopped(self._clock(), "participant"))
+
+
+def _picture(widget: QWidget) -> QPixmap | None:
+    """Return what a page looks like, for the pause to lie on; a pause on a pause shows the first one's ground."""
+    if isinstance(widget, PauseWidget):
+        return widget.under
+    return widget.grab() if widget.width() > 0 else None

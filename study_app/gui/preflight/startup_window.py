@@ -1,0 +1,100 @@
+"""What is shown while a session is being made ready: what is going on, and a way back. Never a frozen window."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QElapsedTimer, Qt, QTimer, Signal
+from PySide6.QtGui import QCloseEvent, QKeyEvent
+from PySide6.QtWidgets import QHBoxLayout, QProgressBar, QVBoxLayout, QWidget
+
+from study_app.gui.theme.theme import LIGHT, Theme
+from study_app.gui.theme.themed import wear
+from study_app.gui.widgets.cards import Logo
+from study_app.gui.widgets.controls import ActionButton
+from study_app.gui.widgets.labels import figures, label
+from study_app.viewmodels.operator import minutes
+
+LONG_AFTER_S = 4.0
+STEP = "Opening the device and the force model …"
+FIRST_TIME = (
+    "The force model is being compiled for this machine, which is done once after an installation or a change "
+    "and takes about a minute."
+)
+
+
+class OpeningWindow(QWidget):
+    """The note; ``cancelled`` when the operator goes back. Nothing has been created until it closes by itself."""
+
+    cancelled = Signal()
+
+    def __init__(self, title: str, who: str, *, theme: Theme = LIGHT) -> None:
+        super().__init__()
+        self.setWindowTitle("Liquid Study")
+        self.setProperty("role", "window")
+        self.setFixedSize(560, 260)
+        self.step = label(STEP, "body", "text2", wraps=True)
+        self.lasted = figures("", "label", "text2")
+        self.cancel = ActionButton("", "Cancel")
+        self.cancel.clicked.connect(self.close)
+        bar = QProgressBar()
+        bar.setRange(0, 0)
+        bar.setTextVisible(False)
+        bar.setFixedHeight(8)
+        words = QVBoxLayout()
+        words.setSpacing(2)
+        words.addWidget(label(title, "card"))
+        words.addWidget(label(who, "label", "text2"))
+        head = QHBoxLayout()
+        head.setSpacing(14)
+        head.addWidget(Logo(40))
+        head.addLayout(words, 1)
+        foot = QHBoxLayout()
+        foot.addWidget(self.cancel)
+        foot.addStretch()
+        foot.addWidget(self.lasted)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(28, 24, 28, 24)
+        column.setSpacing(14)
+        column.addLayout(head)
+        column.addWidget(self.step, 1)
+        column.addWidget(bar)
+        column.addLayout(foot)
+        self._since = QElapsedTimer()
+        self._since.start()
+        self._timer = QTimer(self)
+        self._timer.timeout.connect(self._tell)
+        self._timer.start(250)
+        self._done = False
+        self._said = False
+        wear(self, theme)
+
+    def _tell(self) -> None:
+        seconds = self._since.elapsed() / 1000
+        self.lasted.setText(minutes(seconds))
+        if seconds > LONG_AFTER_S and not self._said:
+            self.step.setText(FIRST_TIME)
+
+    def say(self, line: str) -> None:
+        """Show what the device asks for, from now on instead of what goes on."""
+        self._said = True
+        self.step.setText(line)
+
+    def finish(self) -> None:
+        """Close because all is ready."""
+        self._done = True
+        self._timer.stop()
+        self.close()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
+        """Go back on Esc, tapped or held: whatever was opened so far is let go of, with zero force."""
+        if event.key() == Qt.Key.Key_Escape:
+            self.close()
+        else:
+            super().keyPressEvent(event)
+
+    def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802 - Qt's name
+        """Go back, if it was not we who closed it."""
+        self._timer.stop()
+        super().closeEvent(event)
+        if not self._done:
+            self._done = True
+            self.cancelled.emit()

@@ -1,0 +1,201 @@
+"""Handing results on: where to, what of it, how far it is, and then the way to what was written."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QDialog, QFileDialog, QHBoxLayout, QLineEdit, QVBoxLayout, QWidget
+
+from study_app.gui.theme.theme import Theme, font
+from study_app.gui.theme.themed import wear
+from study_app.gui.widgets.cards import Bar
+from study_app.gui.widgets.controls import ActionButton, Check
+from study_app.gui.widgets.labels import label, set_ink
+from study_app.viewmodels.sessions import counted
+
+WIDTH = 600
+WARNED = 3
+"""Of so many files that are not as recorded each is named."""
+
+
+class Extra(NamedTuple):
+    """Something that is written where it is asked for: its name in the command, its words, and why it cannot be."""
+
+    name: str
+    words: str
+    why_not: str = ""
+
+
+class WriteDialog(QDialog):
+    """Asks for a folder and what to write, then shows how far it is; Cancel leaves nothing behind.
+
+    ``write_asked`` carries the folder and the names of the extras, ``stop_asked`` asks to give up, ``open_asked``
+    carries what is to be opened.
+
+    Parameters
+    ----------
+    title, explanation
+        What is written.
+    go_on
+        The words on the button.
+    to
+        The folder that is suggested.
+    extras
+        What can be written beside.
+    opens
+        The words on the button that opens what was written.
+    """
+
+    write_asked = Signal(object, object)
+    stop_asked = Signal()
+    open_asked = Signal(object)
+
+    def __init__(
+        self,
+        parent: QWidget,
+        theme: Theme,
+        *,
+        title: str,
+        explanation: str,
+        go_on: str,
+        to: Path,
+        extras: Sequence[Extra] = (),
+        opens: str = "Open the folder",
+    ) -> None:
+        super().__init__(parent)
+        self.setWindowTitle(title)
+        self.setModal(True)
+        self.setMinimumWidth(WIDTH)
+        self._opens = opens
+        self._result: Path | None = None
+        self._working = False
+        self.extras = {extra.name: Check(extra.words) for extra in extras}
+        for extra in extras:
+            check = self.extras[extra.name]
+            check.setFont(font("body"))
+            check.setEnabled(not extra.why_not)
+            check.setToolTip(extra.why_not)
+        self.to = QLineEdit(str(to))
+        self.to.setAccessibleName("Folder")
+        self.to.setFont(font("body"))
+        self.choose = ActionButton("", "Choose …", height=40)
+        self.said = label(explanation, "body", "text2", wraps=True)
+        self.bar = Bar()
+        self.bar.hide()
+        self.cancel = ActionButton("", "Cancel")
+        self.go_on = ActionButton("", go_on, role="primary")
+        self.go_on.setDefault(True)
+        self.cancel.setAutoDefault(False)
+        self.choose.setAutoDefault(False)
+        self._lay_out(title, [extra.why_not for extra in extras if extra.why_not])
+        wear(self, theme)
+        self.choose.clicked.connect(self._choose)
+        self.go_on.clicked.connect(self._go_on)
+        self.cancel.clicked.connect(self.reject)
+
+    def _lay_out(self, title: str, why_not: Sequence[str]) -> None:
+        column = QVBoxLayout(self)
+        column.setContentsMargins(28, 24, 28, 24)
+        column.setSpacing(12)
+        column.addWidget(label(title, "title_dense"))
+        column.addWidget(self.said)
+        self._form = QWidget()
+        form = QVBoxLayout(self._form)
+        form.setContentsMargins(0, 0, 0, 0)
+        form.setSpacing(6)
+        for check in self.extras.values():
+            form.addWidget(check)
+        for sentence in why_not:
+            form.addWidget(label(sentence, "small", "text2", wraps=True))
+        form.addSpacing(4)
+        form.addWidget(label("Folder", "label", "text2"))
+        where = QHBoxLayout()
+        where.setSpacing(10)
+        where.addWidget(self.to, 1)
+        where.addWidget(self.choose)
+        form.addLayout(where)
+        form.addWidget(label("Files of an earlier time there give way.", "small", "text2"))
+        column.addWidget(self._form)
+        column.addWidget(self.bar)
+        foot = QHBoxLayout()
+        foot.addWidget(self.cancel)
+        foot.addStretch()
+        foot.addWidget(self.go_on)
+        column.addSpacing(6)
+        column.addLayout(foot)
+
+    def show_progress(self, what: str, share: float) -> None:
+        """Say what is being done and how far it is."""
+        self.said.setText(f"{what[:1].upper()}{what[1:]} …")
+        self.bar.show_share(share)
+
+    def show_written(self, files: Sequence[Path], opens: Path, warnings: Sequence[str]) -> None:
+        """Say what was written, and offer to open it."""
+        self._working = False
+        self._result = opens
+        self.bar.hide()
+        more = f" {len(warnings) - WARNED} more." if len(warnings) > WARNED else ""
+        warned = "".join(f"\n{line}" for line in warnings[:WARNED])
+        self.said.setText(f"{counted(len(files), 'file')} in {files[0].parent}.{warned}{more}")
+        self.cancel.show_action("", "Close")
+        self.go_on.show_action("", self._opens)
+        self.go_on.show()
+        self.go_on.setFocus()
+        self._shrink()
+
+    def show_refused(self, sentence: str) -> None:
+        """Say why nothing was written; what was asked can be changed."""
+        self._working = False
+        self.bar.hide()
+        self._form.show()
+        self.said.setText(f"{sentence}.")
+        set_ink(self.said, "bad")
+        self.go_on.show()
+        self.cancel.setEnabled(True)
+        self._shrink()
+
+    def _choose(self) -> None:
+        chosen = QFileDialog.getExistingDirectory(self, "Folder", self.to.text())
+        if chosen:
+            self.to.setText(chosen)
+
+    def _go_on(self) -> None:
+        if self._result is not None:
+            self.open_asked.emit(self._result)
+            return
+        if not self.to.text().strip():
+            self.to.setFocus()
+            return
+        self._working = True
+        self._form.hide()
+        self.go_on.hide()
+        set_ink(self.said, "text2")
+        self.show_progress("beginning", 0.0)
+        self.bar.show()
+        extras = tuple(name for name, check in self.extras.items() if check.isChecked())
+        self._shrink()
+        self.write_asked.emit(Path(self.to.text().strip()).expanduser(), extras)
+
+    def _shrink(self) -> None:
+        """Be no higher than what there is to say now."""
+        layout = self.layout()
+        if layout is not None:
+            layout.activate()
+        self.adjustSize()
+
+    def reject(self) -> None:
+        """Close; where something is being written, have it given up first."""
+        if self._working:
+            self.cancel.setEnabled(False)
+            self.said.setText("Stopping …")
+            self.stop_asked.emit()
+            return
+        super().reject()
+
+    def stopped(self) -> None:
+        """Close: it was given up, and nothing was written."""
+        self._working = False
+        super().reject()

@@ -1,0 +1,249 @@
+"""The figures one below the other, as large as fits, and what is still being worked on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from PySide6.QtCore import QSize, Qt, Signal
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QHBoxLayout, QScrollArea, QSizePolicy, QVBoxLayout, QWidget
+
+from study_app.gui.results.figure_view import FigureView
+from study_app.gui.theme.theme import font
+from study_app.gui.theme.themed import dress, take_away
+from study_app.gui.widgets.cards import SHADOW, Bar, Card
+from study_app.gui.widgets.controls import ActionButton
+from study_app.gui.widgets.labels import Elided, label
+from study_app.viewmodels.results import FigureShown, Going, Remedy, ResultsView, Trouble
+
+GAP = 12
+PADDING = 14
+AROUND = 2 * (PADDING + SHADOW)
+AT_ONCE = 2
+"""So many figures are to be seen without scrolling, where they can be and still be read."""
+LEAST_WIDTH, MOST_WIDTH = 830, 1240
+
+
+class FigureCard(Card):
+    """One figure, or why it is not there; its caption is shown where that is asked for."""
+
+    def __init__(self, figure: FigureShown, colours: Mapping[str, str]) -> None:
+        super().__init__(padding=PADDING, gap=8)
+        self.figure = figure
+        self.drawing: FigureView | None = None
+        self.caption = label("", "label", "text2", wraps=True)
+        self.caption.setContentsMargins(0, 0, 120, 4)
+        self.caption.setTextInteractionFlags(
+            Qt.TextInteractionFlag.TextSelectableByMouse | Qt.TextInteractionFlag.TextSelectableByKeyboard
+        )
+        self.caption.hide()
+        self.more = ActionButton("info", "Caption", role="plain", height=30)
+        self.more.setCheckable(True)
+        self.more.toggled.connect(self.caption.setVisible)
+        self.more.setFont(font("label"))
+        self._title = label("", "card")
+        self.column.addWidget(self._title)
+        self._place = QHBoxLayout()
+        self.column.addLayout(self._place)
+        self.column.addWidget(self.caption)
+        self.more.setParent(self)  # in the corner that figures leave free
+        self.show_figure(figure, colours)
+
+    def show_figure(self, figure: FigureShown, colours: Mapping[str, str]) -> None:
+        """Show another figure in the place of this one."""
+        self.figure = figure
+        self.caption.setText(figure.caption)
+        there = bool(figure.svg)
+        self._title.setText(figure.title)
+        self._title.setVisible(not there)  # a figure has its own
+        self.more.setVisible(there)
+        self.more.setAccessibleName(f"Caption of {figure.title}")
+        self.caption.setVisible(not there or self.more.isChecked())
+        if self.drawing is not None and there:
+            self.drawing.show_figure(figure, colours)
+        elif self.drawing is not None:
+            take_away(self.drawing)
+            self.drawing = None
+        elif there:
+            self.drawing = FigureView(figure, colours)
+            dress(self.drawing, self.theme)
+            self._place.addWidget(self.drawing, 0, Qt.AlignmentFlag.AlignHCenter)
+            self.more.raise_()
+
+    def fit(self, width: int) -> None:
+        """Draw the figure so wide."""
+        size = QSize(width, 0 if self.drawing is None else self.drawing.heightForWidth(width))
+        if self.drawing is not None and self.drawing.maximumSize() != size:
+            self.drawing.setFixedSize(size)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
+        """Keep the way to the caption in the corner."""
+        super().resizeEvent(event)
+        size = self.more.sizeHint()
+        self.more.setGeometry(
+            self.width() - size.width() - SHADOW - 6,
+            self.height() - size.height() - SHADOW - 5,
+            size.width(),
+            size.height(),
+        )
+
+
+class WorkLine(Card):
+    """What is being done and how far it is, with a way to stop it."""
+
+    stop_asked = Signal()
+    again_asked = Signal()
+
+    def __init__(self) -> None:
+        super().__init__(padding=14, gap=0)
+        self.words = Elided("label", "text2")
+        self.bar = Bar()
+        self.stop = ActionButton("", "Stop", height=36)
+        self.again = ActionButton("", "Go on", height=36)
+        self.stop.clicked.connect(self.stop_asked)
+        self.again.clicked.connect(self.again_asked)
+        row = QHBoxLayout()
+        row.setSpacing(16)
+        row.addWidget(self.words, 1)
+        row.addWidget(self.bar, 1)
+        row.addWidget(self.stop)
+        row.addWidget(self.again)
+        self.column.addLayout(row)
+
+    def show_going(self, going: Going | None, *, untested: bool) -> None:
+        """Say how far it is; ``untested``: that it was stopped, and what is missing."""
+        self.setVisible(going is not None or untested)
+        self.bar.setVisible(going is not None)
+        self.stop.setVisible(going is not None)
+        self.again.setVisible(going is None)
+        if going is not None:
+            self.words.show_text(f"{going.what[:1].upper()}{going.what[1:]} …")
+            self.bar.show_share(going.share)
+        elif untested:
+            self.words.show_text("Stopped before the tests: recognition and the lowest delays are not drawn.")
+
+
+class TroubleCard(Card):
+    """Why there is nothing to show: one sentence and one button; ``asked`` carries what the button does."""
+
+    asked = Signal(str)
+
+    def __init__(self) -> None:
+        super().__init__(padding=28, gap=12)
+        self._remedy: Remedy = "again"
+        self.title = label("", "card")
+        self.sentence = label("", "body", "text2", wraps=True)
+        self.sentence.setMaximumWidth(640)
+        self.sentence.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self.bar = Bar()
+        self.bar.setMaximumWidth(420)
+        self.button = ActionButton("", "", height=40)
+        self.button.clicked.connect(lambda: self.asked.emit(self._remedy))
+        row = QHBoxLayout()
+        row.addWidget(self.button)
+        row.addStretch()
+        self.column.addWidget(self.title)
+        self.column.addWidget(self.sentence)
+        self.column.addWidget(self.bar)
+        self.column.addLayout(row)
+        self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Maximum)
+
+    def show_trouble(self, trouble: Trouble) -> None:
+        """Say what is wrong."""
+        self.title.setText(trouble.title)
+        self.sentence.setText(trouble.sentence)
+        self.sentence.setVisible(bool(trouble.sentence))
+        self.button.show_action("", trouble.button)
+        self.bar.hide()
+        self._remedy = trouble.remedy
+
+    def show_going(self, going: Going) -> None:
+        """Say what is being done, with a way to stop it."""
+        self.show_trouble(Trouble(f"{going.what[:1].upper()}{going.what[1:]} …", "", "Stop", "stop"))
+        self.bar.setVisible(True)
+        self.bar.show_share(going.share)
+
+
+class FiguresPanel(QScrollArea):
+    """The cards of the figures; while there are none, what is going on or why.
+
+    ``asked`` carries what a button beside a sentence does.
+    """
+
+    asked = Signal(str)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.cards: list[FigureCard] = []
+        self.trouble = TroubleCard()
+        self.work = WorkLine()
+        self.trouble.asked.connect(self.asked)
+        self.work.stop_asked.connect(lambda: self.asked.emit("stop"))
+        self.work.again_asked.connect(lambda: self.asked.emit("read"))
+        self._inside = QWidget()
+        self._column = QVBoxLayout(self._inside)
+        self._column.setContentsMargins(0, 0, 0, 0)
+        self._column.setSpacing(GAP - 2 * SHADOW)
+        self._column.addWidget(self.trouble)
+        self._column.addWidget(self.work)
+        self._column.addStretch()
+        self.trouble.hide()
+        self.work.hide()
+        self.setWidgetResizable(True)
+        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.setWidget(self._inside)
+        self._whole = False
+
+    def show_view(self, view: ResultsView) -> None:
+        """Show the figures there are; a card whose figure is drawn anew stays where it is."""
+        names = [figure.name for figure in view.figures]
+        if [card.figure.name for card in self.cards] != names:
+            self._order(view)
+        for card, figure in zip(self.cards, view.figures, strict=True):
+            if card.figure is not figure:
+                card.show_figure(figure, view.colours)
+        if view.trouble is not None:
+            self.trouble.show_trouble(view.trouble)
+        elif view.drawing is not None and not view.figures:
+            self.trouble.show_going(view.drawing)
+        self.trouble.setVisible(view.trouble is not None or (view.drawing is not None and not view.figures))
+        self.work.show_going(view.testing or (view.drawing if view.figures else None), untested=view.untested)
+        self.fit()
+
+    def _order(self, view: ResultsView) -> None:
+        """Keep the cards whose figures are still there, make the others, all in the figures' order."""
+        kept = {card.figure.name: card for card in self.cards}
+        self.cards = []
+        for place, figure in enumerate(view.figures):
+            card = kept.pop(figure.name, None) or FigureCard(figure, view.colours)
+            dress(card, self.trouble.theme)
+            self._column.insertWidget(place, card)
+            self.cards.append(card)
+        for gone in kept.values():
+            take_away(gone)
+
+    def show_whole(self, yes: bool) -> None:
+        """Be as high as the figures are, for a page that scrolls as a whole."""
+        self._whole = yes
+        off = Qt.ScrollBarPolicy.ScrollBarAlwaysOff
+        self.setVerticalScrollBarPolicy(off if yes else Qt.ScrollBarPolicy.ScrollBarAsNeeded)
+        self.fit()
+
+    def fit(self) -> None:
+        """Give the figures the width there is; less where two of them can be seen at once by that."""
+        bar = 0 if self._whole else self.verticalScrollBar().sizeHint().width()  # there or not: or they would flutter
+        width = min(self.width() - bar - AROUND, MOST_WIDTH)
+        first = [card.drawing for card in self.cards if card.drawing is not None][:AT_ONCE]
+        if first and not self._whole:
+            heights = sum(drawing.heightForWidth(1000) for drawing in first) / 1000
+            frames = len(first) * (AROUND - 4) + (len(first) - 1) * self._column.spacing()
+            width = min(width, max(int((self.height() - frames) / heights), LEAST_WIDTH))
+        for card in self.cards:
+            card.fit(max(width, 320))
+        self.setMinimumHeight(self._inside.sizeHint().height() if self._whole else 0)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
+        """Fit the figures to the new size."""
+        super().resizeEvent(event)
+        self.fit()

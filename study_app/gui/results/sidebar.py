@@ -1,0 +1,173 @@
+"""Beside the figures: the sessions with their filters, and what is left out of the analysis."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import datetime
+
+from PySide6.QtCore import QSignalBlocker, Qt, Signal
+from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QScrollArea, QSizePolicy, QVBoxLayout, QWidget
+
+from study_app.gui.sessions.sessions_table import SessionsTable
+from study_app.gui.theme.theme import font
+from study_app.gui.theme.themed import dress, take_away
+from study_app.gui.widgets.cards import Card, Rule
+from study_app.gui.widgets.controls import ActionButton, Choice
+from study_app.gui.widgets.labels import label
+from study_app.viewmodels.results import LeftOut, in_figures
+from study_app.viewmodels.session_columns import Column, matching, states_of
+from study_app.viewmodels.sessions import SessionFacts, started_words
+
+COLUMNS = (
+    Column("participant", "Participant", 90, 76),
+    Column("status", "Status", 120, 112),
+    Column("validity", "Validity", 110, 114),
+)
+EVERY = "All states"
+
+
+class SessionsCard(Card):
+    """The study's sessions; below, how many are in the figures and why the others are not."""
+
+    def __init__(self) -> None:
+        super().__init__(gap=8, padding=14)
+        self.column.setContentsMargins(12, self.column.contentsMargins().top(), 12, 14)
+        self.search = QLineEdit()
+        self.search.setPlaceholderText("Participant")
+        self.search.setAccessibleName("Search by participant")
+        self.search.setClearButtonEnabled(True)
+        self.search.setFont(font("body"))
+        self.state = Choice()
+        self.state.setAccessibleName("State")
+        self.state.setFont(font("body"))
+        self.state.addItem(EVERY, "")
+        self.rows = SessionsTable(COLUMNS, "No session.")
+        self.head = label("", "label")
+        self.head.setFont(font("label", weight=600, tabular=True))
+        self.why = label("", "small", "text2", wraps=True)
+        filters = QHBoxLayout()
+        filters.setSpacing(8)
+        filters.addWidget(self.search, 1)
+        filters.addWidget(self.state, 1)
+        self.details = ActionButton("file", "", role="plain", height=36)
+        self.details.setAccessibleName("Details of the chosen session")
+        self.details.setToolTip("Details of the chosen session")
+        self.details.setEnabled(False)
+        self.details.clicked.connect(self.rows.open_chosen)
+        self.rows.chosen_changed.connect(lambda: self.details.setEnabled(self.rows.chosen is not None))
+        filters.addWidget(self.details)
+        self.column.addLayout(filters)
+        self.column.addWidget(self.rows, 1)
+        self.column.addWidget(Rule())
+        foot = QVBoxLayout()
+        foot.setContentsMargins(10, 2, 10, 0)
+        foot.setSpacing(2)
+        foot.addWidget(self.head)
+        foot.addWidget(self.why)
+        self.column.addLayout(foot)
+        self.search.textChanged.connect(self._filter)
+        self.state.currentIndexChanged.connect(self._filter)
+
+    def show_sessions(self, found: Sequence[SessionFacts]) -> None:
+        """Show these sessions in place of those before; the filters stay."""
+        self.rows.show_rows(found, datetime.now().astimezone())
+        chosen = self.state.currentData()
+        with QSignalBlocker(self.state):
+            self.state.clear()
+            self.state.addItem(EVERY, "")
+            for state, words in states_of(found):
+                self.state.addItem(words, state)
+            self.state.setCurrentIndex(max(0, self.state.findData(chosen)))
+        head, why = in_figures(found)
+        self.head.setText(head)
+        self.why.setText(why)
+        self.why.setVisible(bool(why))
+        self._filter()
+
+    def _filter(self) -> None:
+        state = str(self.state.currentData() or "")
+        filtered = bool(state or self.search.text().strip())
+        self.rows.none.setText("No session is like that." if filtered else "No session.")
+        self.rows.show_matching(matching(self.search.text(), state))
+
+
+class ExclusionsCard(Card):
+    """What is left out, each with its reason.
+
+    ``leave_out_asked`` is to leave out more, ``take_back_asked`` carries the `LeftOut` that is to count again.
+    """
+
+    leave_out_asked = Signal()
+    take_back_asked = Signal(object)
+    list_asked = Signal()
+
+    def __init__(self) -> None:
+        self.leave_out = ActionButton("minus", "Leave out …", height=36)
+        super().__init__("Left out", self.leave_out, padding=14, gap=6)
+        self.none = label("Nothing is left out of the analysis.", "label", "text2", wraps=True)
+        self.none.setFont(font("label", weight=400))
+        self.open = ActionButton("file", "Open the list", role="plain", height=30)
+        self.leave_out.clicked.connect(self.leave_out_asked)
+        self.open.clicked.connect(self.list_asked)
+        inside = QWidget()
+        self._rows = QVBoxLayout(inside)
+        self._rows.setContentsMargins(0, 0, 0, 0)
+        self._rows.setSpacing(8)
+        self._rows.addStretch()
+        self.area = QScrollArea()
+        self.area.setWidgetResizable(True)
+        self.area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.area.setWidget(inside)
+        self.area.setAccessibleName("Left out")
+        self.area.setMinimumHeight(96)
+        self.lines: list[QWidget] = []
+        self.column.addWidget(self.none)
+        self.column.addWidget(self.area, 1)
+        foot = QHBoxLayout()
+        foot.addStretch()
+        foot.addWidget(self.open)
+        self.column.addLayout(foot)
+        self.show_left_out(())
+
+    def show_left_out(self, listed: Sequence[LeftOut]) -> None:
+        """Show what is left out, the last decision first."""
+        for line in self.lines:
+            take_away(line)
+        self.lines = [self._line(one) for one in reversed(listed)]
+        for place, line in enumerate(self.lines):
+            dress(line, self.theme)
+            self._rows.insertWidget(place, line)
+        self.none.setVisible(not listed)
+        for part in (self.area, self.open):
+            part.setVisible(bool(listed))
+        grows = QSizePolicy.Policy.Preferred if listed else QSizePolicy.Policy.Maximum
+        self.setSizePolicy(QSizePolicy.Policy.Preferred, grows)
+
+    def _line(self, one: LeftOut) -> QWidget:
+        """Return one decision with the way to take it back."""
+        back = ActionButton("undo", "Take back …", role="plain", height=30)
+        back.setAccessibleName(f"Take back: {one.what}")
+        back.clicked.connect(lambda: self.take_back_asked.emit(one))
+        return _line(one, back)
+
+
+def _line(one: LeftOut, back: ActionButton) -> QWidget:
+    """Return one decision: what, why, who and when."""
+    made = QWidget()
+    column = QVBoxLayout(made)
+    column.setContentsMargins(0, 0, 6, 0)
+    column.setSpacing(0)
+    what = label(one.what, "label", wraps=True)
+    what.setFont(font("label", weight=600))
+    head = QHBoxLayout()
+    head.addWidget(what, 1)
+    head.addWidget(back)
+    column.addLayout(head)
+    why = label(one.reason, "label", "text2", wraps=True)
+    why.setFont(font("label", weight=400))
+    column.addWidget(why)
+    now = datetime.now().astimezone()
+    when = "" if one.at is None else f", {started_words(one.at.astimezone(now.tzinfo), now)}"
+    column.addWidget(label(f"{one.by}{when}", "small", "text2"))
+    made.setAccessibleName(f"{one.what}: {one.reason} ({one.by}{when})")
+    return made

@@ -1,0 +1,161 @@
+"""A table of sessions: who, which study, when, how it ended, whether it kept to the limits, how much of it is there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from datetime import datetime
+from typing import Any
+
+from PySide6.QtCore import QAbstractTableModel, QModelIndex, Qt, Signal
+from PySide6.QtWidgets import QVBoxLayout, QWidget
+
+from study_app.gui.theme.theme import font
+from study_app.gui.widgets.labels import label
+from study_app.gui.widgets.row_table import BELOW_ROLE, CARE_ROLE, CHIP_ROLE, MARGIN, Index, Table
+from study_app.viewmodels.session_columns import Column, answers_words, status_chip, validity_chip
+from study_app.viewmodels.sessions import SessionFacts, started_words
+
+NOWHERE = QModelIndex()
+
+
+class SessionsModel(QAbstractTableModel):
+    """Sessions as rows of a table; only those that match are in it."""
+
+    def __init__(self, columns: Sequence[Column]) -> None:
+        super().__init__()
+        self._columns = tuple(columns)
+        self._every: tuple[SessionFacts, ...] = ()
+        self._matches: Callable[[SessionFacts], bool] = lambda _facts: True
+        self._now = datetime.now().astimezone()
+        self.shown: tuple[SessionFacts, ...] = ()
+
+    def show(self, found: Sequence[SessionFacts], now: datetime) -> None:
+        """Hold these sessions in place of those before."""
+        self._every, self._now = tuple(found), now
+        self.keep(self._matches)
+
+    def keep(self, matches: Callable[[SessionFacts], bool]) -> None:
+        """Show the sessions alone that match, now and later."""
+        self.beginResetModel()
+        self._matches = matches
+        self.shown = tuple(filter(matches, self._every))
+        self.endResetModel()
+
+    def rowCount(self, parent: Index = NOWHERE) -> int:  # noqa: N802 - Qt's name
+        """Return how many sessions match."""
+        return 0 if parent.isValid() else len(self.shown)
+
+    def columnCount(self, parent: Index = NOWHERE) -> int:  # noqa: N802 - Qt's name
+        """Return how many columns there are."""
+        return 0 if parent.isValid() else len(self._columns)
+
+    def headerData(self, section: int, orientation: Qt.Orientation, role: int = Qt.ItemDataRole.DisplayRole) -> Any:  # noqa: N802 - Qt's name
+        """Return a column's heading; of a row, whose session it is."""
+        if role == Qt.ItemDataRole.DisplayRole:
+            return self._columns[section].heading if orientation == Qt.Orientation.Horizontal else None
+        return None
+
+    def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
+        """Return what a cell says."""
+        facts, name = self.shown[index.row()], self._columns[index.column()].name
+        chip = {"status": status_chip, "validity": validity_chip}.get(name)
+        match role:
+            case Qt.ItemDataRole.DisplayRole:
+                return chip(facts)[2] if chip else self._words(facts, name)
+            case Qt.ItemDataRole.AccessibleTextRole:
+                words = chip(facts)[2] if chip else self._words(facts, name)
+                return f"{words}, {facts.kind}" if name == "study" and facts.kind else words
+            case Qt.ItemDataRole.ToolTipRole:
+                if name == "validity" and facts.excluded is not None:
+                    return f"Left out of the analysis: {facts.excluded}"
+                return f"{facts.name}: began {started_words(facts.started, self._now)}, {answers_words(facts)} answers"
+            case Qt.ItemDataRole.FontRole if name == "participant":
+                return font("label", weight=600, scale=1.08)
+            case _ if role == CHIP_ROLE:
+                return chip(facts) if chip else None
+            case _ if role == BELOW_ROLE:
+                return facts.kind if name == "study" else None
+            case _ if role == CARE_ROLE:
+                return facts.needs_care
+        return None
+
+    def _words(self, facts: SessionFacts, name: str) -> str:
+        match name:
+            case "participant":
+                return facts.name
+            case "study":
+                return facts.study
+            case "started":
+                return started_words(facts.started, self._now)
+        return answers_words(facts)
+
+
+class SessionsTable(QWidget):
+    """The table of sessions, or a sentence in its place; ``opened`` carries the `SessionFacts` of a row.
+
+    ``chosen_changed`` comes when another row, or none, is chosen.
+
+    Parameters
+    ----------
+    columns
+        What the rows show.
+    none
+        The sentence in place of rows where there are none.
+    """
+
+    opened = Signal(object)
+    chosen_changed = Signal()
+
+    def __init__(self, columns: Sequence[Column], none: str) -> None:
+        super().__init__()
+        self.model = SessionsModel(columns)
+        self.table = Table(self.model, [(column.width, column.least) for column in columns], "Sessions")
+        self.none = label(none, "body", "text2", wraps=True)
+        self.none.setContentsMargins(MARGIN, MARGIN, MARGIN, MARGIN)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        column.addWidget(self.none)
+        column.addWidget(self.table, 1)
+        self.table.opened.connect(lambda index: self.opened.emit(self.model.shown[index.row()]))
+        self.table.selectionModel().selectionChanged.connect(lambda *_changes: self.chosen_changed.emit())
+        self.model.modelReset.connect(self._tell_rows)
+        self._tell_rows()
+
+    @property
+    def shown(self) -> tuple[SessionFacts, ...]:
+        """The sessions that stand there."""
+        return self.model.shown
+
+    @property
+    def chosen(self) -> SessionFacts | None:
+        """The session whose row is chosen; None where none is."""
+        row = self.table.chosen_row
+        return None if row is None else self.model.shown[row]
+
+    def show_rows(self, found: Sequence[SessionFacts], now: datetime) -> None:
+        """Show these sessions in place of those before; the one that was chosen stays so."""
+        before = self.chosen
+        self.model.show(found, now)
+        self._choose(before)
+
+    def show_matching(self, matches: Callable[[SessionFacts], bool]) -> None:
+        """Show the rows alone that match, now and later."""
+        before = self.chosen
+        self.model.keep(matches)
+        self._choose(before)
+
+    def open_chosen(self) -> None:
+        """Open the row that is chosen."""
+        if self.chosen is not None:
+            self.opened.emit(self.chosen)
+
+    def _choose(self, before: SessionFacts | None) -> None:
+        places = [one.folder for one in self.shown]
+        if before is not None and before.folder in places:
+            self.table.selectRow(places.index(before.folder))
+        self.chosen_changed.emit()
+
+    def _tell_rows(self) -> None:
+        self.none.setVisible(not self.shown)
+        self.table.setVisible(bool(self.shown))

@@ -1,0 +1,177 @@
+"""The machine's place: what this computer and its screens are like, apart from every study; kept at once, with undo.
+
+It draws `MachineSettings` and the screens there are, and says what is to be changed; it reads and writes no file.
+"""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QGuiApplication, QKeySequence, QResizeEvent, QShortcut
+from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
+
+from study_app.gui.display.screens import ScreenShown, screens_shown
+from study_app.gui.settings.display_test import DisplayTest
+from study_app.gui.settings.screen_numbers import ScreenNumber, identify
+from study_app.gui.settings.setting_cards import OffsetCard, ScreensCard, SeenCard, SessionsCard, WindowsCard
+from study_app.gui.theme.theme import font
+from study_app.gui.theme.themed import dress
+from study_app.gui.widgets.cards import SHADOW
+from study_app.gui.widgets.controls import ActionButton
+from study_app.gui.widgets.labels import Elided, label
+from study_app.gui.widgets.main_view import Place
+from study_app.store.workstation import DEFAULTS, MachineSettings
+
+STACKED_BELOW = 1000
+
+
+class MachinePlace(Place):
+    """What is set, under headings.
+
+    ``changed(values)`` carries new values by their names in `MachineSettings`; ``offset_measured(mean [ms], spread
+    [ms], how, screen)`` what a photodiode said of a screen; ``undo_asked`` takes the last change back.
+    """
+
+    changed = Signal(dict)
+    offset_measured = Signal(float, float, str, str)
+    undo_asked = Signal()
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.settings = DEFAULTS
+        self._screens: tuple[ScreenShown, ...] = ()
+        self.numbers: list[ScreenNumber] = []
+        self.test: DisplayTest | None = None
+        self.screens, self.seen, self.offset = ScreensCard(), SeenCard(), OffsetCard()
+        self.sessions, self.windows = SessionsCard(), WindowsCard()
+        self.undo = ActionButton("undo", "Undo")
+        self.kept_in = Elided("label", "text2")
+        self.kept_in.setFont(font("label", weight=400))
+        self._lay_out()
+        self._connect()
+
+    def _lay_out(self) -> None:
+        titles = QVBoxLayout()
+        titles.setSpacing(4)
+        titles.addWidget(label("This machine", "title"))
+        about = "What this computer and its screens are like, apart from every study. Kept at once."
+        titles.addWidget(label(about, "body", "text2", wraps=True))
+        head = QHBoxLayout()
+        head.setContentsMargins(SHADOW, 0, SHADOW, 0)
+        head.setSpacing(16)
+        head.addLayout(titles, 1)
+        head.addWidget(self.undo)
+        self._body = QBoxLayout(QBoxLayout.Direction.LeftToRight)
+        self._body.setSpacing(18)
+        for cards in ((self.screens, self.seen), (self.offset, self.sessions, self.windows)):
+            column = QVBoxLayout()
+            column.setSpacing(18)
+            for card in cards:
+                column.addWidget(card)
+            column.addStretch()
+            self._body.addLayout(column, 1)
+        foot = QHBoxLayout()
+        foot.setContentsMargins(SHADOW, 0, SHADOW, 0)
+        foot.addWidget(self.kept_in)
+        inside = QWidget()
+        page = QVBoxLayout(inside)
+        page.setContentsMargins(30, 30, 30, 22)
+        page.setSpacing(20)
+        page.addLayout(head)
+        page.addLayout(self._body, 1)
+        page.addLayout(foot)
+        self._area = QScrollArea()
+        self._area.setWidgetResizable(True)
+        self._area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self._area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self._area.setWidget(inside)
+        row = QVBoxLayout(self)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.addWidget(self._area)
+
+    def _connect(self) -> None:
+        for card in (self.seen, self.sessions, self.windows, self.offset):
+            card.changed.connect(lambda name, value: self.changed.emit({name: value}))
+        self.screens.chosen.connect(
+            lambda screen: self.changed.emit({"screen": screen.name, "screen_number": screen.number})
+        )
+        self.screens.identify_asked.connect(self._identify)
+        self.screens.test_asked.connect(self.open_test)
+        self.sessions.devices_asked.connect(lambda: self.go_asked.emit("devices"))
+        self.offset.form.kept.connect(self._measured)
+        self.offset.form.forgotten.connect(lambda: self.changed.emit({"display_offset": None}))
+        self.undo.clicked.connect(self.undo_asked)
+        QShortcut(QKeySequence.StandardKey.Undo, self, self.undo.click, context=Qt.ShortcutContext.WindowShortcut)
+
+    def enter(self) -> None:
+        """Look at the screens again: one may have been plugged in."""
+        self._show()
+
+    def leave(self) -> None:
+        """Take the numbers and the test off the screens."""
+        for one in self.numbers:
+            one.close()
+            one.deleteLater()
+        self.numbers = []
+        if self.test is not None:
+            self.test.close()
+
+    @property
+    def participants(self) -> ScreenShown:
+        """The participant's screen."""
+        return self._screens[self.settings.screen_among([screen.name for screen in self._screens]) - 1]
+
+    def show_settings(self, settings: MachineSettings, *, folder: str, undo: str, kept_in: str) -> None:
+        """Show what is set; ``undo`` names what can be taken back ("" where nothing), ``folder`` is the workspace."""
+        self.settings = settings
+        self.undo.setEnabled(bool(undo))
+        self.undo.show_action("undo", f"Undo {undo}" if undo else "Undo")
+        self.sessions.show_settings(settings, folder)
+        self.windows.show_settings(settings)
+        self.offset.patch.setChecked(settings.photodiode)
+        self.kept_in.show_text(f"Kept in {kept_in}")
+        self._show()
+
+    def _show(self) -> None:
+        """Show what depends on the screens."""
+        self._screens = screens_shown()
+        names = [screen.name for screen in self._screens]
+        missing = self.settings.screen if self.settings.screen not in {"", *names} else ""
+        there = self.participants
+        self.screens.show_screens(self._screens, there.number, missing)
+        self.seen.show_settings(self.settings, there)
+        self.offset.form.show_offset(self.settings.display_offset, there.name)
+        if self.test is not None:
+            self.test.show_offset(self.settings.display_offset, there.name)
+        dress(self.screens, self.theme)
+
+    def _measured(self, mean_ms: float, spread_ms: float, how: str) -> None:
+        self.offset_measured.emit(mean_ms, spread_ms, how, self.participants.name)
+
+    def _identify(self) -> None:
+        self.leave()
+        self.numbers = identify()
+
+    def open_test(self) -> None:
+        """Fill the participant's screen with the display test."""
+        if self.test is not None:
+            return
+        there = self.participants
+        self.test = DisplayTest(
+            "  ·  ".join(filter(None, (f"Screen {there.number}", there.name, there.words))), there.refresh_hz
+        )
+        self.test.kept.connect(self._measured)
+        self.test.forgotten.connect(lambda: self.changed.emit({"display_offset": None}))
+        self.test.left.connect(self._test_left)
+        self.test.show_offset(self.settings.display_offset, there.name)
+        self.test.open_on(QGuiApplication.screens()[there.number - 1])
+
+    def _test_left(self) -> None:
+        test, self.test = self.test, None
+        if test is not None:
+            test.deleteLater()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
+        """Make room: the second column goes below the first."""
+        super().resizeEvent(event)
+        stacked = self.width() < STACKED_BELOW
+        self._body.setDirection(QBoxLayout.Direction.TopToBottom if stacked else QBoxLayout.Direction.LeftToRight)

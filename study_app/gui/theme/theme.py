@@ -1,0 +1,203 @@
+"""Palettes, spacing and the style sheet: every colour of every window, by its role.
+
+No widget names a colour by its number. The values are computed, not chosen by eye: contrast by WCAG 2.2 (tested),
+distances between states and between traces for normal, protan, deutan and tritan eyes by CIEDE2000. A state is always
+colour **and** icon **and** word.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from study_app.gui.theme.fonts import TYPE, Type, TypeRole, font, load_fonts
+
+__all__ = [
+    "DARK", "GRID", "LIGHT", "PARTICIPANT", "RADIUS_CARD", "RADIUS_CONTROL", "SPACE", "TANK", "TYPE",
+    "TankColours", "Theme", "Type", "TypeRole", "font", "load_fonts", "stylesheet",
+]  # fmt: skip
+
+GRID = 4
+SPACE = (4, 8, 12, 16, 24, 32, 40)
+RADIUS_CONTROL = 8
+RADIUS_CARD = 12
+
+
+@dataclass(frozen=True, slots=True)
+class Theme:
+    """Colours by role, as ``#RRGGBB``; ``dark`` tells which way hover and shadow go.
+
+    ``ctl`` edges controls (≥ 3:1), ``border`` and ``grid`` only decorate; ``text3`` never stands on ``sunk``; ``stop``
+    is the force stop's and nobody else's. ``hover`` is the fill of a control under the pointer, ``selected`` of the
+    place one is at.
+    """
+
+    name: str
+    dark: bool
+    window: str
+    surface: str
+    sunk: str
+    hover: str
+    selected: str
+    text: str
+    text2: str
+    text3: str
+    ctl: str
+    border: str
+    grid: str
+    accent: str
+    on_accent: str
+    accent_hover: str
+    ok: str
+    ok_bg: str
+    warn: str
+    warn_bg: str
+    bad: str
+    bad_bg: str
+    stop: str
+    on_stop: str
+    trace_x: str
+    trace_y: str
+    trace_z: str
+
+
+LIGHT = Theme(
+    name="light", dark=False,
+    window="#F4F6F8", surface="#FFFFFF", sunk="#EDF1F4", hover="#F4F6F8", selected="#E3F0F9",
+    text="#13202C", text2="#45535F", text3="#5D6A75",
+    ctl="#7D8994", border="#DCE2E8", grid="#E6EBEF",
+    accent="#0B65A3", on_accent="#FFFFFF", accent_hover="#0A5688",
+    ok="#0A6E5C", ok_bg="#E0F3EE", warn="#8A5200", warn_bg="#FFF1D6", bad="#801226", bad_bg="#FBE7EA",
+    stop="#BD1E1E", on_stop="#FFFFFF",
+    trace_x="#0B65A3", trace_y="#B35600", trace_z="#13202C",
+)  # fmt: skip
+
+DARK = Theme(
+    name="dark", dark=True,
+    window="#0E141A", surface="#161E26", sunk="#1E2831", hover="#1E2831", selected="#16303F",
+    text="#E9EFF4", text2="#B4C0CA", text3="#93A1AD",
+    ctl="#6F7F8D", border="#2B3742", grid="#25303A",
+    accent="#62B5EA", on_accent="#06182A", accent_hover="#86C6EF",
+    ok="#5CCDB0", ok_bg="#12342F", warn="#F0B95B", warn_bg="#3A2C12", bad="#F5707A", bad_bg="#3A171C",
+    stop="#C9302A", on_stop="#FFFFFF",
+    trace_x="#62B5EA", trace_y="#F0A04B", trace_z="#E9EFF4",
+)  # fmt: skip
+
+# The participant's pages: always dark; a cell is a surface, its edge ``ctl``, the chosen cell ``accent``.
+PARTICIPANT = Theme(
+    name="participant", dark=True,
+    window="#0E141A", surface="#161F27", sunk="#33424E", hover="#22303B", selected="#18222B",
+    text="#EDF3F7", text2="#B9C6D0", text3="#98A7B3",
+    ctl="#71818F", border="#222D37", grid="#1A232B",
+    accent="#62B5EA", on_accent="#06182A", accent_hover="#86C6EF",
+    ok="#5CCDB0", ok_bg="#12342F", warn="#F0B95B", warn_bg="#18222B", bad="#F5707A", bad_bg="#3A171C",
+    stop="#C9302A", on_stop="#FFFFFF",
+    trace_x="#62B5EA", trace_y="#F0A04B", trace_z="#E9EFF4",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class TankColours:
+    """The tank's own colours: cold water-grey, the same for every liquid, so that nothing betrays which it is."""
+
+    water_light: str = "#2F6079"
+    glass: str = "#CFE6F2"
+    proxy_light: str = "#FBC061"
+    proxy: str = "#E8912A"
+    lit: str = "#F4FBFF"
+    dim: str = "#A9C4D4"
+    shadow: str = "#06131C"
+    tail_old: str = "#4E97C9"  # the lab's alone: participants never see a tail
+    tail: str = "#F4FBFF"
+    wake: str = "#8FD0F5"
+
+
+TANK = TankColours()
+
+
+def stylesheet(theme: Theme) -> str:
+    """Return the Qt style sheet of a window; fonts are set by widgets through `font`, never here.
+
+    Dynamic properties: a QPushButton is outlined, ``role="primary"`` filled, ``role="danger"`` outlined in bad,
+    ``role="plain"`` without an edge, ``role="stop"`` the force stop; a QFrame is a card with ``role="card"``; a QLabel
+    takes ``role`` text2, text3, ok, warn, bad or accent; fields and buttons are low with ``dense="true"``; the edge of
+    a field is accent with ``state="changed"`` and bad with ``state="refused"``.
+    """
+    t = theme
+    return "\n".join(
+        (
+            f"QWidget {{ color: {t.text}; }}",
+            f"QMainWindow, QDialog, QWidget[role='window'] {{ background: {t.window}; }}",
+            f"QFrame[role='card'] {{ background: {t.surface}; border: 1px solid {t.border};"
+            f" border-radius: {RADIUS_CARD}px; }}",
+            *(
+                f"QLabel[role='{role}'] {{ color: {getattr(t, role)}; }}"
+                for role in ("text2", "text3", "ok", "warn", "bad", "accent")
+            ),
+            _buttons(t),
+            _fields(t),
+            _scrollbars(t),
+            f"QProgressBar {{ background: {t.sunk}; border: none; border-radius: 4px; }}",
+            f"QProgressBar::chunk {{ background: {t.accent}; border-radius: 4px; }}",
+        )
+    )
+
+
+def _buttons(t: Theme) -> str:
+    return f"""
+QPushButton {{ background: {t.surface}; color: {t.text}; border: 1px solid {t.ctl};
+  border-radius: {RADIUS_CONTROL}px; padding: 8px 16px; min-height: 22px; outline: none; }}
+QPushButton:hover {{ background: {t.hover}; border-color: {t.text2}; }}
+QPushButton:pressed {{ background: {t.sunk}; }}
+QPushButton:focus {{ border: 2px solid {t.accent}; padding: 7px 15px; }}
+QPushButton:disabled {{ color: {t.text3}; border-color: {t.border}; background: transparent; }}
+QPushButton[dense='true'] {{ padding: 3px 10px; min-height: 24px; }}
+QPushButton[dense='true']:focus {{ padding: 2px 9px; }}
+QPushButton[role='primary'] {{ background: {t.accent}; color: {t.on_accent}; border: 1px solid {t.accent}; }}
+QPushButton[role='primary']:hover {{ background: {t.accent_hover}; border-color: {t.accent_hover}; }}
+QPushButton[role='primary']:focus {{ border: 2px solid {t.text}; padding: 7px 15px; }}
+QPushButton[role='primary']:disabled {{ background: {t.border}; color: {t.text2}; border-color: {t.border}; }}
+QPushButton[role='danger'] {{ color: {t.bad}; border-color: {t.bad}; }}
+QPushButton[role='danger']:hover {{ background: {t.bad_bg}; }}
+QPushButton[role='plain'] {{ background: transparent; border-color: transparent; color: {t.text2}; }}
+QPushButton[role='plain']:hover {{ background: {t.hover}; }}
+QPushButton[role='plain']:focus {{ border: 2px solid {t.accent}; }}
+QPushButton[role='stop'] {{ background: {t.stop}; color: {t.on_stop}; border: 1px solid {t.stop};
+  border-radius: {RADIUS_CARD}px; }}
+QPushButton[role='stop']:focus {{ border: 3px solid {t.text}; }}
+"""
+
+
+def _fields(t: Theme) -> str:
+    field = "QLineEdit, QComboBox, QSpinBox, QPlainTextEdit"
+    focused = ", ".join(f"{name}:focus" for name in field.split(", "))
+    return f"""
+{field} {{ background: {t.surface}; color: {t.text}; border: 1px solid {t.ctl}; border-radius: {RADIUS_CONTROL}px;
+  padding: 7px 12px; min-height: 24px; selection-background-color: {t.accent}; selection-color: {t.on_accent}; }}
+{focused} {{ border: 2px solid {t.accent}; padding: 6px 11px; }}
+QLineEdit[dense='true'], QComboBox[dense='true'] {{ padding: 3px 6px; min-height: 22px; }}
+QLineEdit[dense='true']:focus, QComboBox[dense='true']:focus {{ padding: 2px 5px; }}
+QLineEdit[state='changed'], QComboBox[state='changed'] {{ border: 2px solid {t.accent}; padding: 2px 5px; }}
+QLineEdit[state='refused'] {{ border: 2px solid {t.bad}; padding: 2px 5px; }}
+QComboBox {{ combobox-popup: 0; }}
+QComboBox::drop-down {{ border: none; width: 28px; }}
+QComboBox QAbstractItemView {{ background: {t.surface}; color: {t.text}; border: 1px solid {t.ctl};
+  selection-background-color: {t.selected}; selection-color: {t.text}; outline: none; }}
+QComboBox QAbstractItemView::item {{ min-height: 30px; padding: 0 8px; }}
+QToolTip {{ background: {t.surface}; color: {t.text}; border: 1px solid {t.ctl}; padding: 4px 8px; }}
+"""
+
+
+def _scrollbars(t: Theme) -> str:
+    return f"""
+QTableView, QHeaderView, QHeaderView::section {{ background: transparent; border: none; outline: none; }}
+QTableView {{ selection-background-color: transparent; selection-color: {t.text}; }}
+QHeaderView::section {{ color: {t.text2}; padding: 0 4px; }}
+QHeaderView::section:first {{ padding-left: 12px; }}
+QScrollArea, QScrollArea > QWidget > QWidget {{ background: transparent; border: none; }}
+QScrollBar:vertical {{ background: transparent; width: 12px; margin: 0; }}
+QScrollBar::handle:vertical {{ background: {t.ctl}; border-radius: 4px; min-height: 32px; margin: 2px; }}
+QScrollBar:horizontal {{ background: transparent; height: 12px; margin: 0; }}
+QScrollBar::handle:horizontal {{ background: {t.ctl}; border-radius: 4px; min-width: 32px; margin: 2px; }}
+QScrollBar::add-line, QScrollBar::sub-line, QScrollBar::add-page, QScrollBar::sub-page {{ background: none;
+  border: none; width: 0; height: 0; }}
+"""

@@ -1,0 +1,189 @@
+"""Cards and what stands in them: hairlines, icons, chips and bars."""
+
+from __future__ import annotations
+
+from typing import Literal, TypeAlias
+
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt
+from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPaintEvent, QPen
+from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
+
+from study_app.gui.theme.icons import draw_icon, draw_logo
+from study_app.gui.theme.theme import RADIUS_CARD, Theme, font
+from study_app.gui.theme.themed import Themed
+from study_app.gui.widgets.labels import Ink, label
+
+Tone: TypeAlias = Literal["ok", "warn", "bad", "accent", "neutral"]
+
+SHADOW = 3
+SHADOW_ALPHAS = (5, 5, 4)
+
+
+class Card(Themed, QWidget):
+    """A rounded surface with a column for its content; ``title`` and a word at the right head it, where given."""
+
+    def __init__(self, title: str = "", aside: QWidget | None = None, *, padding: int = 20, gap: int = 12) -> None:
+        super().__init__()
+        inside = padding + SHADOW
+        self.column = QVBoxLayout(self)
+        self.column.setContentsMargins(inside, padding - 2 + SHADOW, inside, padding - 2 + SHADOW)
+        self.column.setSpacing(gap)
+        if title:
+            self.heading = label(title, "card")
+            row = QHBoxLayout()
+            row.addWidget(self.heading)
+            row.addStretch()
+            if aside is not None:
+                row.addWidget(aside)
+            self.column.addLayout(row)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+        """Paint the surface, its edge and, in light, a shadow of at most 6 % black."""
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        body = QRectF(self.rect()).adjusted(SHADOW, SHADOW - 1, -SHADOW, -SHADOW - 1).adjusted(0.5, 0.5, -0.5, -0.5)
+        if not self.theme.dark:
+            painter.setPen(Qt.PenStyle.NoPen)
+            for spread, alpha in enumerate(SHADOW_ALPHAS, start=1):
+                painter.setBrush(QColor(0, 0, 0, alpha))
+                grown = body.adjusted(-spread, -spread + 1, spread, spread + 1)
+                painter.drawRoundedRect(grown, RADIUS_CARD + spread, RADIUS_CARD + spread)
+        painter.setPen(QPen(QColor(self.theme.border), 1))
+        painter.setBrush(QColor(self.theme.surface))
+        painter.drawRoundedRect(body, RADIUS_CARD, RADIUS_CARD)
+
+
+class Rule(Themed, QWidget):
+    """A hairline between groups; decoration only."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setFixedHeight(1)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+        """Paint the line."""
+        QPainter(self).fillRect(self.rect(), QColor(self.theme.border))
+
+
+class Icon(Themed, QWidget):
+    """An icon in the colour of a role."""
+
+    def __init__(self, name: str, ink: Ink = "text2", size: int = 20) -> None:
+        super().__init__()
+        self.name, self.ink = name, ink
+        self.setFixedSize(size, size)
+
+    def show_icon(self, name: str, ink: Ink) -> None:
+        """Draw another icon from now on."""
+        if (name, ink) != (self.name, self.ink):
+            self.name, self.ink = name, ink
+            self.update()
+
+    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+        """Paint the icon."""
+        draw_icon(QPainter(self), self.name, QRectF(self.rect()), getattr(self.theme, self.ink), 2.0)
+
+
+class Chip(Themed, QWidget):
+    """A state as colour, icon and word."""
+
+    def __init__(self, tone: Tone = "neutral", icon: str = "ring", word: str = "", *, small: bool = False) -> None:
+        super().__init__()
+        self._small = small
+        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+        self.tone, self.icon, self.word = tone, icon, word
+        self.setAccessibleName(word)
+
+    def show_state(self, tone: Tone, icon: str, word: str) -> None:
+        """Say another state from now on."""
+        if (tone, icon, word) == (self.tone, self.icon, self.word):
+            return
+        widened = len(word) != len(self.word) or word.rstrip("0123456789. ") != self.word.rstrip("0123456789. ")
+        self.tone, self.icon, self.word = tone, icon, word
+        self.setAccessibleName(word)
+        if widened:
+            self.updateGeometry()
+        self.update()
+
+    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+        """Return the room for icon and word."""
+        return chip_size(self.word, small=self._small)
+
+    def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+        """Return the same as the hint: a chip is never cut."""
+        return self.sizeHint()
+
+    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+        """Paint the pill, the icon and the word."""
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        paint_chip(painter, QRectF(self.rect()), self.theme, self.tone, self.icon, self.word, small=self._small)
+
+
+def _chip_font(*, small: bool) -> QFont:
+    return font("small" if small else "label", weight=500, tabular=True)
+
+
+def chip_size(word: str, *, small: bool) -> QSize:
+    """Return the room for a chip's icon and word."""
+    return QSize(round(QFontMetricsF(_chip_font(small=small)).horizontalAdvance(word)) + 40, 24 if small else 28)
+
+
+def paint_chip(painter: QPainter, body: QRectF, t: Theme, tone: Tone, icon: str, word: str, *, small: bool) -> None:
+    """Paint a chip's pill, icon and word into ``body``."""
+    fills = {"ok": t.ok_bg, "warn": t.warn_bg, "bad": t.bad_bg, "accent": t.selected, "neutral": t.sunk}
+    inks = {"ok": t.ok, "warn": t.warn, "bad": t.bad, "accent": t.accent, "neutral": t.text2}
+    painter.setPen(Qt.PenStyle.NoPen)
+    painter.setBrush(QColor(fills[tone]))
+    painter.drawRoundedRect(body, body.height() / 2, body.height() / 2)
+    draw_icon(painter, icon, QRectF(body.left() + 10, body.center().y() - 7, 14, 14), inks[tone], 2.2)
+    painter.setPen(QColor(inks[tone]))
+    painter.setFont(_chip_font(small=small))
+    painter.drawText(body.adjusted(29, 0, 0, 0), Qt.AlignmentFlag.AlignVCenter, word)
+
+
+class Bar(Themed, QWidget):
+    """A share of a whole, with a tick where something is asked for at least."""
+
+    def __init__(self, height: int = 8) -> None:
+        super().__init__()
+        self.share = 0.0
+        self.tick: float | None = None
+        self._bar = height
+        self.setFixedHeight(height + 6)
+
+    def show_share(self, share: float, tick: float | None = None) -> None:
+        """Fill ``share`` of the bar (0 to 1); ``tick`` is a place on it (0 to 1) or None."""
+        self.share, self.tick = min(1.0, max(0.0, share)), tick
+        self.update()
+
+    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+        """Paint track, fill and tick."""
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setPen(Qt.PenStyle.NoPen)
+        track = QRectF(0, 3, self.width(), self._bar)
+        radius = self._bar / 2
+        painter.setBrush(QColor(self.theme.sunk))
+        painter.drawRoundedRect(track, radius, radius)
+        if self.share > 0:
+            painter.setBrush(QColor(self.theme.accent))
+            filled = QRectF(track)
+            filled.setWidth(max(self._bar, self.share * self.width()))
+            painter.drawRoundedRect(filled, radius, radius)
+        if self.tick is not None:
+            painter.setPen(QPen(QColor(self.theme.text), 1.6))
+            x = self.tick * self.width()
+            painter.drawLine(QPointF(x, 0), QPointF(x, self.height()))
+
+
+class Logo(Themed, QWidget):
+    """The program's mark."""
+
+    def __init__(self, size: int = 32) -> None:
+        super().__init__()
+        self.setFixedSize(size, size)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+        """Paint the mark."""
+        draw_logo(QPainter(self), QRectF(self.rect()), self.theme.accent, self.theme.on_accent)

@@ -1,0 +1,250 @@
+"""Controls that the style sheet alone cannot draw: buttons with icon and key cap, choices, check and radio marks."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QPoint, QRectF, QSize, Qt
+from PySide6.QtGui import QColor, QFont, QFontMetricsF, QKeyEvent, QPainter, QPaintEvent, QPen, QWheelEvent
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QCheckBox,
+    QComboBox,
+    QPushButton,
+    QRadioButton,
+    QSpinBox,
+    QStyle,
+    QStyledItemDelegate,
+    QStyleOptionButton,
+    QStyleOptionComboBox,
+    QStylePainter,
+)
+
+from study_app.gui.theme.icons import draw_icon
+from study_app.gui.theme.theme import Theme, font
+from study_app.gui.theme.themed import Themed
+
+
+class PressedByEnter(QPushButton):
+    """A button that Enter presses as Space does, in a dialog too, where it would else press the default one."""
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
+        """Press on Enter; the keyboard's own repetition presses nothing."""
+        if event.key() not in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
+            super().keyPressEvent(event)
+        elif not event.isAutoRepeat():
+            self.click()
+
+
+class ActionButton(Themed, PressedByEnter):
+    """A button with an icon before its words and, where a key does the same, the key's cap behind them."""
+
+    def __init__(self, icon: str, text: str, *, key: str = "", role: str = "", height: int = 44) -> None:
+        super().__init__(text)
+        self._icon, self._key, self._role = icon, key, role
+        self.setProperty("role", role)
+        self.setFont(font("strong", scale=0.96))
+        self._key_font: QFont = font("key")
+        self.setMinimumHeight(height)
+        self.setCursor(Qt.CursorShape.PointingHandCursor)
+        if key:
+            self.setShortcut(key)
+
+    def show_action(self, icon: str, text: str) -> None:
+        """Say another action from now on; the key stays."""
+        if (icon, text) == (self._icon, self.text()):
+            return
+        self._icon = icon
+        self.setText(text)
+        if self._key:
+            self.setShortcut(self._key)  # setText clears it
+        self.updateGeometry()  # words that stay ask for no other room, but a sign that comes or goes does
+        self.update()
+
+    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+        """Return the room for icon, words and key cap."""
+        return QSize(round(self._content_width()) + 36, self.minimumHeight())
+
+    def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+        """Return the same room less some padding: words are never cut."""
+        return QSize(round(self._content_width()) + 20, self.minimumHeight())
+
+    def _content_width(self) -> float:
+        width = QFontMetricsF(self.font()).horizontalAdvance(self.text())
+        return width + (28 if self._icon else 0) + (32 if self._key else 0)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+        """Paint the style sheet's button, then its content in the middle."""
+        painter = QStylePainter(self)
+        option = QStyleOptionButton()
+        self.initStyleOption(option)
+        option.text = ""  # type: ignore[attr-defined]  # missing in the stubs
+        painter.drawControl(QStyle.ControlElement.CE_PushButtonBevel, option)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        ink = QColor(self._ink())
+        x = (self.width() - self._content_width()) / 2
+        middle = self.height() / 2
+        if self._icon:
+            draw_icon(painter, self._icon, QRectF(x, middle - 10, 20, 20), ink, 1.9)
+            x += 28
+        painter.setPen(ink)
+        painter.setFont(self.font())
+        text_width = QFontMetricsF(self.font()).horizontalAdvance(self.text())
+        painter.drawText(QRectF(x, 0, text_width + 2, self.height()), Qt.AlignmentFlag.AlignVCenter, self.text())
+        if self._key:
+            self._paint_key(painter, QRectF(x + text_width + 11, middle - 10, 20, 20), ink)
+
+    def _ink(self) -> str:
+        if not self.isEnabled():
+            return self.theme.text2 if self._role == "primary" else self.theme.text3
+        return {"primary": self.theme.on_accent, "danger": self.theme.bad, "plain": self.theme.text2}.get(
+            self._role, self.theme.text
+        )
+
+    def _paint_key(self, painter: QPainter, cap: QRectF, ink: QColor) -> None:
+        painter.setPen(QPen(QColor(self.theme.ctl) if self._role != "primary" else ink, 1))
+        painter.setBrush(Qt.BrushStyle.NoBrush)
+        painter.drawRoundedRect(cap.adjusted(0.5, 0.5, -0.5, -0.5), 5, 5)
+        painter.setPen(ink)
+        painter.setFont(self._key_font)
+        painter.drawText(cap, Qt.AlignmentFlag.AlignCenter, self._key)
+
+
+class Choice(Themed, QComboBox):
+    """A list to choose one from, with its chevron; the wheel scrolls the page, never the choice.
+
+    A word too long for the field ends in "…", whole in the list and in the tip.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setItemDelegate(QStyledItemDelegate(self))  # the theme gives the list's lines their height
+
+    def showPopup(self) -> None:  # noqa: N802 - Qt's name
+        """Open the list, as wide as its longest words."""
+        view = self.view()
+        view.setMinimumWidth(max(self.width(), view.sizeHintForColumn(0) + 24))
+        super().showPopup()
+
+    def wheelEvent(self, event: QWheelEvent) -> None:  # noqa: N802 - Qt's name
+        """Leave the wheel to what scrolls."""
+        event.ignore()
+
+    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+        """Paint the field, then the chevron."""
+        painter = QStylePainter(self)
+        option = QStyleOptionComboBox()
+        self.initStyleOption(option)
+        painter.drawComplexControl(QStyle.ComplexControl.CC_ComboBox, option)
+        whole = self.currentText() or self.placeholderText()
+        field = QStyle.SubControl.SC_ComboBoxEditField
+        room = self.style().subControlRect(QStyle.ComplexControl.CC_ComboBox, option, field, self).width()
+        shown = self.fontMetrics().elidedText(whole, Qt.TextElideMode.ElideRight, room)
+        option.currentText = shown  # type: ignore[attr-defined]  # missing in the stubs
+        painter.drawControl(QStyle.ControlElement.CE_ComboBoxLabel, option)
+        self.setToolTip(whole if shown != whole else "")
+        draw_icon(
+            painter,
+            "chevron_down",
+            QRectF(self.width() - 30, self.height() / 2 - 8, 16, 16),
+            self.theme.text2,
+            2.0,
+        )
+
+
+class Number(QSpinBox):
+    """A whole number, typed or moved by the arrow keys and the wheel."""
+
+    def __init__(self, lowest: int, highest: int, value: int) -> None:
+        super().__init__()
+        self.setRange(lowest, highest)
+        self.setValue(value)
+        self.setFont(font("body", tabular=True))
+        self.setButtonSymbols(QSpinBox.ButtonSymbols.NoButtons)
+
+
+class Check(Themed, QCheckBox):
+    """A yes or no; hit anywhere on mark or words."""
+
+    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+        """Return the room for mark and words."""
+        return _marked_size(self)
+
+    def hitButton(self, _place: QPoint) -> bool:  # noqa: N802 - Qt's name
+        """Take a click anywhere."""
+        return True
+
+    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+        """Paint a box, filled and checked when on, and the words."""
+        painter, mark = _begin_mark(self, self.theme)
+        painter.setBrush(QColor(self.theme.accent if self.isChecked() else self.theme.surface))
+        painter.drawRoundedRect(mark, 5, 5)
+        if self.isChecked():
+            draw_icon(painter, "check", mark.adjusted(2, 2, -2, -2), self.theme.on_accent, 3.0)
+
+
+class Toggle(Check):
+    """A yes or no that takes effect at once, as a switch; hit anywhere on switch or words."""
+
+    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+        """Return the room for switch and words."""
+        return QSize(round(QFontMetricsF(self.font()).horizontalAdvance(self.text())) + 50, 32)
+
+    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+        """Paint a track with its knob at the right when on, and the words."""
+        t = self.theme
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setPen(QColor(t.text if self.isEnabled() else t.text3))
+        painter.setFont(self.font())
+        words = QRectF(46, 0, self.width() - 46, self.height())
+        painter.drawText(words, Qt.AlignmentFlag.AlignVCenter, self.text())
+        track = QRectF(4, self.height() / 2 - 9, 32, 18)
+        painter.setPen(QPen(QColor(t.accent if self.isChecked() else t.ctl), 1.4))
+        painter.setBrush(QColor(t.accent if self.isChecked() else t.surface))
+        painter.drawRoundedRect(track, 9, 9)
+        knob = QRectF(track.right() - 15 if self.isChecked() else track.left() + 3, track.top() + 3, 12, 12)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QColor(t.on_accent if self.isChecked() else t.ctl))
+        painter.drawEllipse(knob)
+        if self.hasFocus():
+            painter.setPen(QPen(QColor(t.accent), 2))
+            painter.setBrush(Qt.BrushStyle.NoBrush)
+            painter.drawRoundedRect(track.adjusted(-3, -3, 3, 3), 12, 12)
+
+
+class Radio(Themed, QRadioButton):
+    """One of several; hit anywhere on mark or words."""
+
+    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+        """Return the room for mark and words."""
+        return _marked_size(self)
+
+    def hitButton(self, _place: QPoint) -> bool:  # noqa: N802 - Qt's name
+        """Take a click anywhere."""
+        return True
+
+    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+        """Paint a ring, with a dot when on, and the words."""
+        painter, mark = _begin_mark(self, self.theme)
+        painter.setBrush(QColor(self.theme.surface))
+        painter.drawEllipse(mark)
+        if self.isChecked():
+            painter.setPen(Qt.PenStyle.NoPen)
+            painter.setBrush(QColor(self.theme.accent))
+            painter.drawEllipse(mark.center(), 5, 5)
+
+
+def _marked_size(button: QAbstractButton) -> QSize:
+    return QSize(round(QFontMetricsF(button.font()).horizontalAdvance(button.text())) + 34, 32)
+
+
+def _begin_mark(button: QAbstractButton, theme: Theme) -> tuple[QPainter, QRectF]:
+    """Paint the button's words; return the painter with the mark's pen, and the mark's place."""
+    painter = QPainter(button)
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+    painter.setPen(QColor(theme.text if button.isEnabled() else theme.text3))
+    painter.setFont(button.font())
+    words = QRectF(30, 0, button.width() - 30, button.height())
+    painter.drawText(words, Qt.AlignmentFlag.AlignVCenter, button.text())
+    marked = button.isChecked() or button.hasFocus()
+    painter.setPen(QPen(QColor(theme.accent if marked else theme.ctl), 2 if button.hasFocus() else 1.4))
+    return painter, QRectF(2, button.height() / 2 - 9, 18, 18)

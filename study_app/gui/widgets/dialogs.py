@@ -1,0 +1,58 @@
+"""Questions with a way back, and notices: one sentence and one button each."""
+
+from __future__ import annotations
+
+from PySide6.QtWidgets import QDialog, QHBoxLayout, QVBoxLayout, QWidget
+
+from study_app.gui.theme.theme import Theme
+from study_app.gui.theme.themed import wear
+from study_app.gui.widgets.controls import ActionButton
+from study_app.gui.widgets.labels import label
+
+
+class Question(QDialog):
+    """A question with a way back. It blocks nothing: whatever is asked, the force can be stopped behind it."""
+
+    def __init__(self, parent: QWidget, theme: Theme, title: str, explanation: str) -> None:
+        super().__init__(parent)
+        self.setWindowTitle(title)
+        self.setModal(False)
+        self.column = QVBoxLayout(self)
+        self.column.setContentsMargins(28, 24, 28, 24)
+        self.column.setSpacing(12)
+        self.column.addWidget(label(title, "title_dense"))
+        said = label(explanation, "body", "text2", wraps=True)
+        said.setMinimumWidth(420)
+        self.column.addWidget(said)
+        self._theme = theme
+
+    def add_buttons(self, back: str, go_on: ActionButton) -> None:
+        """Put the way back at the left and the step that goes on at the right."""
+        self.back, self.go_on = ActionButton("", back), go_on
+        self.back.clicked.connect(self.reject)
+        self.go_on.clicked.connect(self.accept)
+        self.back.setAutoDefault(False)
+        self.go_on.setDefault(True)
+        row = QHBoxLayout()
+        row.addWidget(self.back)
+        row.addStretch()
+        row.addWidget(self.go_on)
+        self.column.addSpacing(8)
+        self.column.addLayout(row)
+        wear(self, self._theme)
+
+
+class Notice(Question):
+    """Something that went wrong, in one sentence."""
+
+    def __init__(self, parent: QWidget, theme: Theme, title: str, sentence: str) -> None:
+        super().__init__(parent, theme, title, sentence)
+        self.close_button = ActionButton("", "Close", role="primary")
+        self.close_button.clicked.connect(self.accept)
+        self.close_button.setDefault(True)
+        row = QHBoxLayout()
+        row.addStretch()
+        row.addWidget(self.close_button)
+        self.column.addSpacing(8)
+        self.column.addLayout(row)
+        wear(self, theme)

@@ -1,0 +1,131 @@
+"""Labels in the type scale and the palette's roles."""
+
+from __future__ import annotations
+
+from typing import Literal, TypeAlias
+
+from PySide6.QtCore import QSize, Qt
+from PySide6.QtGui import QFontMetricsF, QResizeEvent, QTextLayout
+from PySide6.QtWidgets import QLabel, QSizePolicy
+
+from study_app.gui.theme.theme import TypeRole, font
+from study_app.gui.widgets.accessible import HeadingLabel
+
+HEADINGS: frozenset[TypeRole] = frozenset({"display", "title", "title_dense", "card"})
+"""The type roles of headings, for people who see them and for screen readers."""
+Ink: TypeAlias = Literal["text", "text2", "text3", "ok", "warn", "bad", "accent"]
+
+
+def label(text: str = "", role: TypeRole = "body", ink: Ink = "text", *, wraps: bool = False) -> QLabel:
+    """Return a label in the type ``role`` and the colour role ``ink``."""
+    made = HeadingLabel(text) if role in HEADINGS else QLabel(text)
+    made.setTextFormat(Qt.TextFormat.PlainText)
+    made.setFont(font(role))
+    made.setProperty("role", ink)
+    made.setWordWrap(wraps)
+    if wraps:
+        policy = QSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Minimum)
+        policy.setHeightForWidth(True)
+        made.setSizePolicy(policy)
+    return made
+
+
+def figures(text: str = "", role: TypeRole = "label", ink: Ink = "text") -> QLabel:
+    """Return a label whose figures share one width, for numbers that change or stand in a column."""
+    made = label(text, role, ink)
+    made.setFont(font(role, tabular=True))
+    return made
+
+
+class Elided(QLabel):
+    """A label that ends in "…" where its room is too small; the whole text is in its tip."""
+
+    def __init__(self, role: TypeRole = "body", ink: Ink = "text") -> None:
+        super().__init__()
+        self.setTextFormat(Qt.TextFormat.PlainText)
+        self.setFont(font(role))
+        self.setProperty("role", ink)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
+        self._whole = ""
+
+    def show_text(self, text: str) -> None:
+        """Show ``text``, as much of it as there is room for."""
+        if text != self._whole:
+            self._whole = text
+            self.setAccessibleName(text)
+            self.updateGeometry()
+            self._elide()
+
+    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+        """Return the room for the whole text."""
+        metrics = QFontMetricsF(self.font())
+        return QSize(round(metrics.horizontalAdvance(self._whole)) + 2, round(metrics.height()) + 2)
+
+    def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+        """Return the least that still says something."""
+        return QSize(24, self.sizeHint().height())
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
+        """Cut the text anew."""
+        super().resizeEvent(event)
+        self._elide()
+
+    def _elide(self) -> None:
+        shown = self.fontMetrics().elidedText(self._whole, Qt.TextElideMode.ElideRight, self.width())
+        self.setText(shown)
+        self.setToolTip(self._whole if shown != self._whole else "")
+
+
+class Clamped(QLabel):
+    """A label of at most so many lines, which ends in "…" where they are too few; the whole text is in its tip."""
+
+    def __init__(self, text: str, lines: int, role: TypeRole = "body", ink: Ink = "text") -> None:
+        super().__init__()
+        self.setTextFormat(Qt.TextFormat.PlainText)
+        self.setFont(font(role))
+        self.setProperty("role", ink)
+        self.setWordWrap(True)
+        self.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self.setAccessibleName(text)
+        self._whole, self._most = text, lines
+        self.setFixedHeight(lines * self.fontMetrics().lineSpacing() + 2)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
+        """Cut the text anew."""
+        super().resizeEvent(event)
+        self._cut()
+
+    def show_text(self, text: str) -> None:
+        """Show ``text``, as much of it as there is room for."""
+        if text != self._whole:
+            self._whole = text
+            self.setAccessibleName(text)
+            self._cut()
+
+    def _cut(self) -> None:
+        lines = self._broken(self.width())
+        if len(lines) > self._most:
+            rest = " ".join(lines[self._most - 1 :])
+            rest = self.fontMetrics().elidedText(rest, Qt.TextElideMode.ElideRight, self.width())
+            lines = [*lines[: self._most - 1], rest]
+        self.setText("\n".join(lines))
+        self.setToolTip(self._whole if lines and lines[-1].endswith("…") else "")
+
+    def _broken(self, width: int) -> list[str]:
+        """Return the text in lines that fit into ``width``."""
+        layout = QTextLayout(self._whole, self.font())
+        layout.beginLayout()
+        lines = []
+        while (line := layout.createLine()).isValid():
+            line.setLineWidth(width)
+            lines.append(self._whole[line.textStart() : line.textStart() + line.textLength()].strip())
+        layout.endLayout()
+        return lines
+
+
+def set_ink(widget: QLabel, ink: Ink) -> None:
+    """Give a label the colour of another role; the style sheet is asked anew."""
+    if widget.property("role") != ink:
+        widget.setProperty("role", ink)
+        widget.style().unpolish(widget)
+        widget.style().polish(widget)

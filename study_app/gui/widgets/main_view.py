@@ -1,0 +1,28 @@
+"""What a place of the main window is: a part that fills it, entered and left."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QWidget
+
+from study_app.gui.theme.themed import Themed
+
+
+class Place(Themed, QWidget):
+    """A part that fills the main window beside the rail.
+
+    ``told`` carries a title and a sentence that the main window is to say, ``go_asked`` the name of another place.
+    """
+
+    told = Signal(str, str)
+    go_asked = Signal(str)
+
+    def enter(self) -> None:
+        """Take note that the place is shown from now on: look again at what may have changed."""
+
+    def leave(self) -> None:
+        """Take note that the place is no longer shown: let go of whatever acts on the hand, at once."""
+
+    def wants_narrow_rail(self) -> bool:
+        """Return whether the place needs the width that a wide rail takes."""
+        return False

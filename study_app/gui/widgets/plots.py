@@ -1,0 +1,322 @@
+"""Live plots in the program's own look: pyqtgraph draws the curves, everything else about it is switched off.
+
+Horizontal grid only, few ticks, curves named at their ends and told apart by stroke as well as colour.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pyqtgraph as pg
+from numpy.typing import NDArray
+from PySide6.QtCore import QCoreApplication, QEvent, QPointF, QSize, Qt
+from PySide6.QtGui import QColor, QPen
+from PySide6.QtWidgets import QFrame
+
+from study_app.gui.theme.theme import LIGHT, Theme, font
+from study_app.gui.theme.themed import Themed
+
+Floats = NDArray[np.float64]
+
+MINUS = "\u2212"
+THIN_SPACE = "\u2009"
+STROKE = 2.0
+NOTHING = QPen(QColor(0, 0, 0, 0))
+# Dash and gap in stroke widths: x solid, y long dashes, z dots.
+DASHES: tuple[tuple[float, float] | None, ...] = (None, (6.0, 3.0), (1.0, 1.6))
+LINE_PX = 16.0  # a line of the plots' texts
+NAME_MARGIN = 1.0  # around names [px]
+NAMES_AFTER_PX = 6.0  # from a curve's end to its name
+HALF_TICK_PX = 24.0  # half of "10 000" under the end of an axis
+DIGIT_PX = 8.5  # a digit of the longest number along an axis, with its share of the gap to the next
+MOST_FOR_NAMES = 0.5  # of that plot's height
+P99_ABOVE = 0.1  # the highest the 99th percentile's line ends above the top grid line [decades]
+NAMES = ("x right", "y up", "z near")
+
+
+def number(value: float) -> str:
+    """Return a tick's number with a real minus and thin groups: "−20", "10 000"."""
+    text = f"{abs(value):,.6g}".replace(",", THIN_SPACE)
+    return f"{MINUS}{text}" if value < 0 else text
+
+
+def pen(colour: str, width: float = STROKE, dash: tuple[float, float] | None = None) -> QPen:
+    """Return a cosmetic pen: its width is px of the screen whatever the plot's scale."""
+    made = QPen(QColor(colour), width)
+    made.setCosmetic(True)
+    made.setCapStyle(Qt.PenCapStyle.FlatCap)
+    made.setJoinStyle(Qt.PenJoinStyle.BevelJoin)  # so many points lie on a curve that joins are not seen, but paid for
+    if dash is not None:
+        made.setDashPattern(list(dash))
+    return made
+
+
+class Plot(Themed, pg.GraphicsView):
+    """An empty plot: no menu, no buttons, no mouse, no frame; horizontal grid lines at the ticks of y.
+
+    Made of pyqtgraph's view box and axes alone: its plot item brings menus that outlive the window.
+    """
+
+    def __init__(self) -> None:
+        super().__init__(background=LIGHT.surface)
+        self.setFrameShape(QFrame.Shape.NoFrame)
+        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+        self.box = pg.ViewBox(enableMenu=False, enableMouse=False, defaultPadding=0)
+        self.axes = {side: pg.AxisItem(side) for side in ("left", "bottom")}
+        whole = pg.GraphicsLayout()
+        whole.setContentsMargins(0, 0, 0, 0)
+        whole.setSpacing(0)
+        whole.addItem(self.axes["left"], 0, 0)
+        whole.addItem(self.box, 0, 1)
+        whole.addItem(self.axes["bottom"], 1, 1)
+        self.setCentralItem(whole)
+        self._grid: list[Any] = []
+        for axis in self.axes.values():
+            axis.linkToView(self.box)
+            axis.setStyle(
+                tickLength=0,
+                tickFont=font("small", tabular=True),
+                tickTextOffset=10,
+                tickAlpha=0,
+                hideOverlappingLabels=False,
+            )
+            axis.setPen(NOTHING)
+            axis.setTickPen(NOTHING)
+        self.axes["left"].setWidth(60)
+        self.axes["bottom"].setHeight(28)
+
+    def stroke(self, colour: str, width: float = STROKE, dash: tuple[float, float] | None = None) -> QPen:
+        """Return a pen of so many logical px, as wide on a screen of any density."""
+        return pen(colour, width * self.devicePixelRatioF(), dash)
+
+    def event(self, event: QEvent) -> bool:
+        """Draw with pens for the screen that the window was moved to."""
+        if event.type() == QEvent.Type.DevicePixelRatioChange:
+            self.wear(self.theme)
+        return bool(super().event(event))
+
+    def paint_now(self) -> None:
+        """Paint what was changed at once, and not when Qt finds the time."""
+        QCoreApplication.sendPostedEvents(self.scene(), QEvent.Type.MetaCall.value)
+
+    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+        """Return a small size: a plot takes what is left, and never makes a window scroll."""
+        return QSize(320, 150)
+
+    def show_ticks(self, side: str, ticks: list[tuple[float, str]]) -> None:
+        """Write ``ticks`` (place, text) at an axis; those of y also get a grid line."""
+        self.axes[side].setTicks([ticks])
+        if side == "left":
+            for line in self._grid:
+                self.box.removeItem(line)
+            self._grid = [pg.InfiniteLine(place, angle=0, pen=pen(self.theme.grid, 1)) for place, _ in ticks]
+            for line in self._grid:
+                line.setZValue(-10)
+                self.box.addItem(line, ignoreBounds=True)
+
+    def wear(self, theme: Theme) -> None:
+        """Take the colours of ``theme``."""
+        super().wear(theme)
+        self.setBackground(theme.surface)
+        for axis in self.axes.values():
+            axis.setTextPen(QColor(theme.text3))
+        for line in self._grid:
+            line.setPen(pen(theme.grid, 1))
+
+
+class TracePlot(Plot):
+    """Three curves over the last seconds, named at their newest ends.
+
+    Parameters
+    ----------
+    span_s
+        Seconds shown.
+    reach
+        Values from −reach to reach are shown; where a curve goes beyond, the plot widens.
+    names
+        What the curves are called.
+    """
+
+    def __init__(self, span_s: float, reach: float, names: Sequence[str] = NAMES) -> None:
+        super().__init__()
+        self._span_s = span_s
+        self._asked = self._reach = reach
+        self._rows_and_step = (0, 0.0)
+        self._name_height = self._names_after_s = 0.0
+        self._newest: list[float] = []
+        self.curves = [pg.PlotCurveItem(antialias=True) for _ in names]
+        for curve, dash in zip(self.curves, (*DASHES, None), strict=False):
+            draw_quickly(curve, solid=dash is None)
+        self.ends = [pg.TextItem(name, anchor=(0, 0.5)) for name in names]
+        for item in (*self.curves, *self.ends):
+            self.box.addItem(item)
+        for end in self.ends:
+            end.textItem.setFont(font("small", weight=600))
+            end.textItem.document().setDocumentMargin(NAME_MARGIN)
+            end.setVisible(False)
+        self.box.sigResized.connect(self._make_room)
+        self.show_ticks("bottom", time_ticks(span_s))
+        self._make_room()
+        self.wear(LIGHT)
+
+    def show_reach(self, reach: float) -> None:
+        """Show values from −reach to reach, and as much more as makes even ticks."""
+        if reach != self._asked:
+            self._asked = reach
+            self._make_room()
+
+    def _make_room(self) -> None:
+        """Keep room in px for the names at the right and for half a line above and below the outermost ticks."""
+        height, width = max(60.0, self.box.height()), max(120.0, self.box.width())
+        most = 3 if height > 130 else 2 if height > 84 else 1  # grid lines on either side of zero
+        step = step_for(self._asked, most)
+        rows = max(1, int(np.ceil(self._asked / step - 1e-9)))
+        self._reach = rows * step
+        self._name_height = 2 * self._reach * (LINE_PX + 1) / (height - LINE_PX)
+        beyond = self._reach * height / (height - LINE_PX)
+        self.box.setYRange(-beyond, beyond, padding=0)
+        named = max(end.textItem.boundingRect().width() for end in self.ends) + NAMES_AFTER_PX + 2
+        share = min(0.4, named / width)
+        self._names_after_s = 1.02 * self._span_s / (1 - share) * NAMES_AFTER_PX / width
+        self.box.setXRange(-1.02 * self._span_s, 1.02 * self._span_s * share / (1 - share), padding=0)
+        if (rows, step) != self._rows_and_step:
+            self._rows_and_step = (rows, step)
+            self.show_ticks("left", [(k * step, number(k * step)) for k in range(-rows, rows + 1)])
+        self._place_names()
+
+    def show_traces(self, times_s: Floats, values: Floats) -> None:
+        """Draw ``values`` (n, curves) over ``times_s`` (n,), zero being now."""
+        if len(values) and float(np.nanmax(np.abs(values))) > 1.08 * self._reach:
+            self.show_reach(float(np.nanmax(np.abs(values))))
+        for axis, curve in enumerate(self.curves):
+            curve.setData(times_s, values[:, axis])
+        self._newest = [float(value) for value in values[-1]] if len(values) else []
+        for end in self.ends:
+            end.setVisible(len(values) > 0)
+        self._place_names()
+
+    def _place_names(self) -> None:
+        """Put every name at its curve's newest end, or as near to it as the others and the plot's edges let it."""
+        if not self._newest:
+            return
+        for end, height in zip(self.ends, apart(self._newest, self._name_height, self._reach), strict=True):
+            end.setPos(QPointF(self._names_after_s, height))
+
+    def wear(self, theme: Theme) -> None:
+        """Take the colours of ``theme``."""
+        super().wear(theme)
+        colours = (theme.trace_x, theme.trace_y, theme.trace_z)
+        for curve, end, colour, dash in zip(self.curves, self.ends, colours, DASHES, strict=False):
+            curve.setPen(self.stroke(colour, STROKE, dash))
+            end.setColor(QColor(colour))
+
+
+class LatenessPlot(Plot):
+    """Ticks of the servo by how late they began, both axes logarithmic; 99th percentile and limit marked."""
+
+    def __init__(self, limit_us: float) -> None:
+        super().__init__()
+        self._limit = float(np.log10(limit_us))
+        self._decades = (0, 0)
+        self.bars = pg.BarGraphItem(x=[], height=[], width=0.05, y0=0.0)
+        self.p99_line = pg.PlotCurveItem()
+        self.limit_line = pg.InfiniteLine(self._limit, angle=90)
+        self.p99_name = pg.TextItem("", anchor=(0.5, 1))
+        self.limit_name = pg.TextItem(f"limit {number(limit_us)}", anchor=(1, 0))
+        for item in (self.bars, self.p99_line, self.limit_line, self.p99_name, self.limit_name):
+            self.box.addItem(item)
+        for name in (self.p99_name, self.limit_name):
+            name.textItem.setFont(font("small", weight=600, tabular=True))
+            name.textItem.document().setDocumentMargin(NAME_MARGIN)
+        self.box.sigResized.connect(self._make_room)
+        self._show_decades(max(3, int(np.ceil(self._limit + 0.1))), 4)
+        self.wear(LIGHT)
+
+    def _show_decades(self, across: int, up: int) -> None:
+        if (across, up) == self._decades:
+            return
+        self._decades = (across, up)
+        self._make_room()
+        self.show_ticks("left", [(k, number(10.0**k)) for k in range(up + 1)])
+
+    def _make_room(self) -> None:
+        """Keep two lines of text free above the bars: the limit's name stands above that of the 99th percentile."""
+        across, up = self._decades
+        beside = min(0.2, HALF_TICK_PX / max(1.0, self.box.width()))  # half of the last tick's text
+        last = across * (1 + beside / (1 - beside))
+        self.box.setXRange(-0.02 * across, last, padding=0)
+        apart = 1 if self.box.width() >= DIGIT_PX * (across + 1) * (last + 0.02 * across) else 2
+        self.show_ticks("bottom", [(k, number(10.0**k)) for k in range(0, across + 1, apart)])
+        line = self.limit_name.textItem.boundingRect().height() + NAME_MARGIN
+        share = min(2 * line / max(1.0, self.box.height()), MOST_FOR_NAMES)
+        top = (up + P99_ABOVE + 0.3 * share) / (1 - share)
+        self.box.setYRange(-0.3, top, padding=0)
+        self.limit_name.setPos(self._limit - 0.01 * across, top)
+
+    def show_histogram(self, edges_us: Floats, counts: NDArray[np.int64], p99_us: float | None) -> None:
+        """Draw ``counts`` (bins,) between ``edges_us`` (bins + 1,) and the 99th percentile [µs]."""
+        edges = np.log10(edges_us)
+        filled = counts > 0
+        up = max(4, int(np.ceil(np.log10(max(1, counts.max(initial=0))))))
+        self._show_decades(max(int(np.ceil(edges[-1] - 1e-9)), int(np.ceil(self._limit + 0.1))), up)
+        heights = np.log10(np.maximum(counts[filled], 1)) + 0.3
+        width = (edges[1] - edges[0]) * 0.72
+        self.bars.setOpts(x=(edges[:-1] + edges[1:])[filled] / 2, height=heights, width=width, y0=-0.3)
+        self.p99_name.setVisible(p99_us is not None)
+        self.p99_line.setVisible(p99_us is not None)
+        if p99_us is not None:
+            at = float(np.log10(max(p99_us, 1.0)))
+            near = counts[np.abs((edges[:-1] + edges[1:]) / 2 - at) < 0.12 * self._decades[0]]
+            top = min(up + P99_ABOVE, float(np.log10(max(1, near.max(initial=1)))) + 0.3)
+            self.p99_line.setData([at, at], [-0.3, top])
+            self.p99_name.setPos(at, top)
+            self.p99_name.setText(f"p99 {number(round(p99_us))}")
+
+    def wear(self, theme: Theme) -> None:
+        """Take the colours of ``theme``."""
+        super().wear(theme)
+        self.bars.setOpts(brush=QColor(theme.accent), pen=QPen(Qt.PenStyle.NoPen))
+        self.p99_line.setPen(self.stroke(theme.text, 1.4))
+        self.p99_name.setColor(QColor(theme.text))
+        self.limit_line.setPen(self.stroke(theme.bad, 1.4, (4.0, 3.0)))
+        self.limit_name.setColor(QColor(theme.bad))
+
+
+def draw_quickly(curve: pg.PlotCurveItem, *, solid: bool) -> None:
+    """Let a solid curve be drawn a piece at a time, which takes half as long; dashes run on from piece to piece."""
+    curve.setSegmentedLineMode("on" if solid else "off")
+
+
+def step_for(reach: float, most: int) -> float:
+    """Return the least even step between ticks (1, 2 or 5 times a power of ten) that ``reach`` holds ``most`` times."""
+    least = max(reach, 1e-9) / (most + 0.01)
+    power = 10.0 ** np.floor(np.log10(least))
+    return float(next(power * step for step in (1, 2, 5, 10) if power * step >= least))
+
+
+def time_ticks(span_s: float) -> list[tuple[float, str]]:
+    """Return a tick every two seconds before now."""
+    return [(-t, "0 s" if t == 0 else f"{MINUS}{t} s") for t in range(0, int(span_s) + 1, 2)]
+
+
+def apart(places: Sequence[float], least: float, reach: float) -> list[float]:
+    """Return ``places`` moved as little as their order allows so that names there do not touch, within ±reach."""
+    order = np.argsort(places, kind="stable")
+    moved = np.asarray(places, float)[order]
+    for _ in range(8):
+        for i in range(len(moved) - 1):
+            lack = least - (moved[i + 1] - moved[i])
+            if lack > 0:
+                moved[i] -= lack / 2
+                moved[i + 1] += lack / 2
+    for i in range(len(moved) - 1):
+        moved[i + 1] = max(moved[i + 1], moved[i] + least)
+    rank = np.arange(len(moved))
+    moved = np.maximum(moved, -reach + least * rank)
+    moved = np.minimum(moved, reach - least * rank[::-1])
+    back = np.empty_like(moved)
+    back[order] = moved
+    return [float(place) for place in back]

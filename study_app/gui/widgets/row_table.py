@@ -1,0 +1,173 @@
+"""Tables in the program's look: rows chosen by pointer and keyboard, chips in cells, hairlines between rows.
+
+The model gives each cell's words as its display text, so that screen readers hear what is drawn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from PySide6.QtCore import QAbstractItemModel, QModelIndex, QPersistentModelIndex, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QColor, QFont, QKeyEvent, QPainter, QPaintEvent, QPen, QResizeEvent
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QFrame,
+    QHeaderView,
+    QStyledItemDelegate,
+    QStyleOptionViewItem,
+    QTableView,
+)
+
+from study_app.gui.theme.theme import RADIUS_CONTROL, Theme, font
+from study_app.gui.theme.themed import Themed
+from study_app.gui.widgets.cards import chip_size, paint_chip
+
+ROW_HEIGHT = 43
+MARGIN = 12
+GAP = 4
+Index = QModelIndex | QPersistentModelIndex
+CHIP_ROLE = Qt.ItemDataRole.UserRole + 1
+"""Tone, icon and word of a chip, in place of the text."""
+BELOW_ROLE = Qt.ItemDataRole.UserRole + 2
+"""A word in small letters below the text."""
+CARE_ROLE = Qt.ItemDataRole.UserRole + 3
+"""Whether the row is tinted because it needs care."""
+
+
+class _Cells(QStyledItemDelegate):
+    """Draws texts and chips; the table draws what spans a row."""
+
+    def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: Index) -> None:
+        table = self.parent()
+        assert isinstance(table, Table)  # noqa: S101 - made by it
+        theme = table.theme
+        place = QRectF(option.rect).adjusted(MARGIN if index.column() == 0 else GAP, 0, -GAP, 0)  # type: ignore[attr-defined]
+        chip = index.data(CHIP_ROLE)
+        painter.save()
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        if chip is not None:
+            size = QSize(min(chip_size(chip[2], small=True).width(), int(place.width())), 24)
+            body = QRectF(place.left(), place.center().y() - 12, size.width(), 24)
+            paint_chip(painter, body, theme, *chip, small=True)
+            painter.restore()
+            return
+        below = index.data(BELOW_ROLE)
+        face = index.data(Qt.ItemDataRole.FontRole) or font("label", weight=400, tabular=True)
+        upper = QRectF(place) if not below else QRectF(place.left(), place.top() + 3, place.width(), place.height() / 2)
+        _write(painter, upper, face, theme.text if index.column() == 0 else theme.text2, str(index.data() or ""))
+        if below:
+            lower = QRectF(upper).translated(0, upper.height() - 4)
+            _write(painter, lower, font("small"), theme.text2, below)
+        painter.restore()
+
+
+def _write(painter: QPainter, place: QRectF, face: QFont, ink: str, words: str) -> None:
+    painter.setFont(face)
+    painter.setPen(QColor(ink))
+    shown = painter.fontMetrics().elidedText(words, Qt.TextElideMode.ElideRight, int(place.width()))
+    painter.drawText(place, Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft, shown)
+
+
+class Table(Themed, QTableView):
+    """A table of whole rows; ``opened`` carries the index of a row that was double-clicked or entered.
+
+    Parameters
+    ----------
+    model
+        What it shows.
+    widths
+        Of each column the share of the width and the least width [px].
+    name
+        What a screen reader calls it.
+    """
+
+    opened = Signal(QModelIndex)
+
+    def __init__(self, model: QAbstractItemModel, widths: Sequence[tuple[int, int]], name: str) -> None:
+        super().__init__()
+        self._widths = tuple(widths)
+        self.setAccessibleName(name)
+        self.setModel(model)
+        self.setItemDelegate(_Cells(self))
+        self.setFrameShape(QFrame.Shape.NoFrame)
+        self.setShowGrid(False)
+        self.setWordWrap(False)
+        self.setTabKeyNavigation(False)
+        self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+        self.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.setVerticalScrollMode(QAbstractItemView.ScrollMode.ScrollPerPixel)
+        self.verticalHeader().hide()
+        self.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
+        self.verticalHeader().setDefaultSectionSize(ROW_HEIGHT)
+        head = self.horizontalHeader()
+        head.setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
+        head.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
+        head.setMinimumSectionSize(10)
+        head.setFont(font("small"))
+        head.setFixedHeight(26)
+        head.setHighlightSections(False)
+        head.setSectionsClickable(False)
+        self.doubleClicked.connect(self.opened)
+
+    @property
+    def chosen_row(self) -> int | None:
+        """The row that is chosen; None where none is."""
+        chosen = self.selectionModel().selectedRows()
+        return chosen[0].row() if chosen else None
+
+    def wear(self, theme: Theme) -> None:
+        """Take the colours of ``theme``."""
+        self.theme = theme
+        self.viewport().update()
+
+    def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+        """Return the room for the heading and a row."""
+        return QSize(sum(least for _, least in self._widths), 26 + ROW_HEIGHT)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
+        """Open the row at Enter."""
+        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter) and self.currentIndex().isValid():
+            self.opened.emit(self.currentIndex())
+        else:
+            super().keyPressEvent(event)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
+        """Share the width among the columns."""
+        super().resizeEvent(event)
+        least = sum(least for _, least in self._widths)
+        shares = sum(share for share, _ in self._widths)
+        spare = max(0, self.viewport().width() - least)
+        for column, (share, needs) in enumerate(self._widths):
+            self.setColumnWidth(column, needs + spare * share // shares)
+
+    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+        """Paint tints and hairlines, then the cells, then the ring of the keyboard."""
+        painter = QPainter(self.viewport())
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        first, last = self.rowAt(0), self.rowAt(self.viewport().height() - 1)
+        rows = self.model().rowCount()
+        for row in range(max(0, first), (last if last >= 0 else rows - 1) + 1):
+            body = self._row(row)
+            chosen = self.selectionModel().isRowSelected(row, QModelIndex())
+            if chosen or self.model().index(row, 0).data(CARE_ROLE):
+                painter.setPen(Qt.PenStyle.NoPen)
+                painter.setBrush(QColor(self.theme.selected if chosen else self.theme.hover))
+                painter.drawRoundedRect(body, RADIUS_CONTROL, RADIUS_CONTROL)
+            painter.setPen(QPen(QColor(self.theme.grid), 1))
+            under = body.bottom() + 1
+            painter.drawLine(MARGIN, int(under), self.viewport().width() - MARGIN, int(under))
+        painter.end()
+        super().paintEvent(event)
+        if self.hasFocus() and self.currentIndex().isValid():
+            painter = QPainter(self.viewport())
+            painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+            painter.setPen(QPen(QColor(self.theme.accent), 2))
+            ring = self._row(self.currentIndex().row()).adjusted(1, 1, -1, -1)
+            painter.drawRoundedRect(ring, RADIUS_CONTROL, RADIUS_CONTROL)
+            painter.end()
+
+    def _row(self, row: int) -> QRectF:
+        top = self.rowViewportPosition(row)
+        return QRectF(0, top + 1, self.viewport().width(), ROW_HEIGHT - 3)

@@ -1,0 +1,227 @@
+"""A slider for a number in a range, even or by decades, with a tick at the value it began with."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPen, QWheelEvent
+from PySide6.QtWidgets import QSizePolicy, QSlider
+
+from study_app.gui.theme.themed import Themed
+
+STEPS = 200
+PAGE = 20
+FIGURES = 3  # that a slider's number has: more would be false precision
+KNOB = 7.5
+TRACK = 4.0
+MARGIN = KNOB + 4  # room for knob and focus ring at both ends
+
+
+@dataclass(frozen=True, slots=True)
+class Range:
+    """The numbers a slider reaches, from ``least`` to ``most``; by decades where ``logarithmic``."""
+
+    least: float
+    most: float
+    logarithmic: bool = False
+    whole: bool = False
+
+    @property
+    def steps(self) -> int:
+        """How many steps of the keyboard lead from end to end."""
+        if self.whole and not self.logarithmic:
+            return max(1, min(STEPS, round(self.most - self.least)))
+        return STEPS
+
+    def share(self, value: float) -> float:
+        """Return where a number is, 0 at the left end and 1 at the right; beyond the ends, at the end."""
+        if self.most <= self.least:
+            return 0.0
+        value = min(max(value, self.least), self.most)
+        if self._by_decades:
+            return math.log(value / self.least) / math.log(self.most / self.least)
+        return (value - self.least) / (self.most - self.least)
+
+    def value(self, share: float) -> float:
+        """Return the number at a place, with as many figures as a slider can tell apart."""
+        if share <= 0.0 or self.most <= self.least:
+            return self.least
+        if share >= 1.0:
+            return self.most
+        if self._by_decades:
+            found = self.least * (self.most / self.least) ** share
+            digits = FIGURES - 1 - math.floor(math.log10(abs(found)))
+        else:
+            found = self.least + share * (self.most - self.least)
+            digits = FIGURES - math.floor(math.log10(self.most - self.least))
+        found = round(found) if self.whole else round(found, digits)
+        return min(max(float(found), self.least), self.most)
+
+    @property
+    def _by_decades(self) -> bool:
+        return self.logarithmic and self.least > 0
+
+
+class Slider(Themed, QSlider):
+    """A slider on a `Range`; the wheel scrolls the page, never the slider.
+
+    ``slid(value, held)`` comes as it is moved by mouse or keyboard: ``held`` while the knob is dragged, and once more,
+    not held, when it is let go. Double click or Delete asks for the tick's value.
+    """
+
+    slid = Signal(float, bool)
+
+    def __init__(self, span: Range | None = None) -> None:
+        super().__init__(Qt.Orientation.Horizontal)
+        self._span = span or Range(0.0, 1.0)
+        self._value = self._span.least
+        self._tick: float | None = None
+        self._dragged = False
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.setCursor(Qt.CursorShape.PointingHandCursor)
+        self.setRange(0, self._span.steps)
+        self.valueChanged.connect(self._set)
+
+    @property
+    def number(self) -> float:
+        """The number the slider is at."""
+        return self._value
+
+    @property
+    def tick(self) -> float | None:
+        """The number marked on the track."""
+        return self._tick
+
+    @property
+    def dragged(self) -> bool:
+        """Whether the knob is held."""
+        return self._dragged
+
+    def show_number(self, span: Range, value: float, tick: float | None = None) -> None:
+        """Stand at ``value`` of ``span``, with a tick at ``tick``; says nothing."""
+        if (span, value, tick) == (self._span, self._value, self._tick):
+            return
+        self._span, self._value, self._tick = span, value, tick
+        self._tell()
+        self.update()
+
+    def let_go(self) -> None:
+        """Let the knob go without a word, whatever the mouse holds on to."""
+        self._dragged = False
+        self.update()
+
+    def step(self, steps: int) -> None:
+        """Go some steps to the right, or to the left where ``steps`` is negative."""
+        self._move(self._stepped(steps), held=False)
+
+    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+        """Return a width that can be aimed at."""
+        return QSize(110, 32)
+
+    def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+        """Return the least that still slides."""
+        return QSize(64, 32)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
+        """Step with the arrows and the page keys, go to the ends, or back to the tick."""
+        keys = Qt.Key
+        page = max(1, self._span.steps // (STEPS // PAGE))
+        steps = {
+            keys.Key_Left: -1, keys.Key_Down: -1, keys.Key_Right: 1, keys.Key_Up: 1,
+            keys.Key_PageDown: -page, keys.Key_PageUp: page,
+        }.get(keys(event.key()))  # fmt: skip
+        if steps is not None:
+            self.step(steps)
+        elif event.key() == keys.Key_Home:
+            self._move(self._span.least, held=False)
+        elif event.key() == keys.Key_End:
+            self._move(self._span.most, held=False)
+        elif event.key() in {keys.Key_Delete, keys.Key_Backspace} and self._tick is not None:
+            self._move(self._tick, held=False)
+        else:
+            event.ignore()
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:  # noqa: N802 - Qt's name
+        """Bring the knob under the pointer."""
+        if event.button() == Qt.MouseButton.LeftButton:
+            self._dragged = True
+            self._move(self._at(event.position().x()), held=True)
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:  # noqa: N802 - Qt's name
+        """Follow the pointer."""
+        if self._dragged:
+            self._move(self._at(event.position().x()), held=True)
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:  # noqa: N802 - Qt's name
+        """Let the knob go where it is."""
+        if event.button() == Qt.MouseButton.LeftButton and self._dragged:
+            self._dragged = False
+            self.slid.emit(self._value, False)
+            self.update()
+
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:  # noqa: N802 - Qt's name
+        """Go back to the tick."""
+        if event.button() == Qt.MouseButton.LeftButton and self._tick is not None:
+            self._move(self._tick, held=False)
+
+    def wheelEvent(self, event: QWheelEvent) -> None:  # noqa: N802 - Qt's name
+        """Leave the wheel to what scrolls."""
+        event.ignore()
+
+    def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+        """Paint track, the part up to the knob, tick and knob."""
+        t = self.theme
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        middle, x = self.height() / 2, self._x(self._value)
+        painter.setPen(Qt.PenStyle.NoPen)
+        for colour, end in ((t.border, self.width() - MARGIN + KNOB), (t.accent if self.isEnabled() else t.ctl, x)):
+            painter.setBrush(QColor(colour))
+            track = QRectF(MARGIN - KNOB, middle - TRACK / 2, end - MARGIN + KNOB, TRACK)
+            painter.drawRoundedRect(track, TRACK / 2, TRACK / 2)
+        if self._tick is not None:
+            at = self._x(self._tick)
+            painter.setPen(QPen(QColor(t.text3), 1.6))
+            painter.drawLine(QPointF(at, middle - 8), QPointF(at, middle + 8))
+        painter.setPen(QPen(QColor(t.accent if self.isEnabled() else t.ctl), 2))
+        painter.setBrush(QColor(t.selected if self._dragged else t.surface))
+        painter.drawEllipse(QPointF(x, middle), KNOB - 1, KNOB - 1)
+        if self.hasFocus():
+            painter.setBrush(Qt.BrushStyle.NoBrush)
+            painter.drawEllipse(QPointF(x, middle), KNOB + 2.5, KNOB + 2.5)
+
+    def _x(self, value: float) -> float:
+        return MARGIN + self._span.share(value) * (self.width() - 2 * MARGIN)
+
+    def _at(self, x: float) -> float:
+        return self._span.value((x - MARGIN) / max(1.0, self.width() - 2 * MARGIN))
+
+    def _stepped(self, steps: int) -> float:
+        """Return the number some steps on: always another one, unless the end is reached."""
+        share = self._span.share(self._value)
+        found = self._span.value(share + steps / self._span.steps)
+        if self._span.whole and found == self._value:
+            found = min(max(self._value + math.copysign(1, steps), self._span.least), self._span.most)
+        return found
+
+    def _move(self, value: float, *, held: bool) -> None:
+        if value == self._value:
+            return
+        self._value = value
+        self._tell()
+        self.update()
+        self.slid.emit(value, held)
+
+    def _set(self, step: int) -> None:
+        """Go where something else than mouse and keys put the slider, such as a screen reader."""
+        self._move(self._span.value(step / self._span.steps), held=False)
+
+    def _tell(self) -> None:
+        """Give the slider's own place what screen readers read of it."""
+        self.blockSignals(True)
+        self.setRange(0, self._span.steps)
+        self.setValue(round(self._span.share(self._value) * self._span.steps))
+        self.blockSignals(False)

@@ -1,0 +1,200 @@
+"""What the liquid lab shows, as one frozen value: widgets only draw it. No Qt here.
+
+Everything is in SI units and the scene frame unless said otherwise; a parameter's own ``factor`` and ``shown_unit`` say
+how it is written.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study_app.lab.ab_comparison import Setting, Side, Workbench
+from study_app.lab.parameters import Parameter, Value, sections
+
+Floats: TypeAlias = NDArray[np.float64]
+Point: TypeAlias = tuple[float, float, float]
+Choices: TypeAlias = tuple[tuple[str, str], ...]
+"""Pairs of what is chosen and the words for it."""
+
+SPAN_S = 2.5
+SIDES: tuple[Side, Side] = ("A", "B")
+
+
+class TailShown(Protocol):
+    """The wake's elements as places the body was at (see ``lab.shadow.Tail``), from the oldest to the newest.
+
+    ``positions_m`` (n, 3) [m, hand frame]; ``breaks`` (n,) bool, true where a segment begins; ``ages`` (n,) from 0, the
+    newest, to 1, the oldest; ``alive`` of ``elements`` are held now, in ``segments`` segments.
+    """
+
+    @property
+    def positions_m(self) -> Floats: ...  # noqa: D102
+    @property
+    def breaks(self) -> NDArray[np.bool_]: ...  # noqa: D102
+    @property
+    def ages(self) -> Floats: ...  # noqa: D102
+    @property
+    def elements(self) -> int: ...  # noqa: D102
+    @property
+    def alive(self) -> int: ...  # noqa: D102
+    @property
+    def segments(self) -> int: ...  # noqa: D102
+
+
+class TraceShown(Protocol):
+    """The last 2.5 s of one motion as A and as B have it (see ``lab.shadow.Trace``); ``t_s`` (n,) ends at 0, now.
+
+    ``force_a_n``, ``force_b_n`` (n, 3) are forces as sent, or as they would be, on the hand; ``body_mps``,
+    ``wake_a_mps`` and ``wake_b_mps`` (n,) speeds.
+    """
+
+    @property
+    def t_s(self) -> Floats: ...  # noqa: D102
+    @property
+    def force_a_n(self) -> Floats: ...  # noqa: D102
+    @property
+    def force_b_n(self) -> Floats: ...  # noqa: D102
+    @property
+    def body_mps(self) -> Floats: ...  # noqa: D102
+    @property
+    def wake_a_mps(self) -> Floats: ...  # noqa: D102
+    @property
+    def wake_b_mps(self) -> Floats: ...  # noqa: D102
+
+
+class LiquidShown(Protocol):
+    """A liquid that a side can be set to (see ``lab.presets.Choice``); ``title`` names it among the others."""
+
+    @property
+    def title(self) -> str: ...  # noqa: D102
+
+
+class LimiterShown(Protocol):
+    """A limiter, how many ticks of the last 10 s it acted in, and whether it does now (see ``lab.live.Limiter``)."""
+
+    @property
+    def name(self) -> str: ...  # noqa: D102
+    @property
+    def ticks(self) -> int: ...  # noqa: D102
+    @property
+    def acting(self) -> bool: ...  # noqa: D102
+
+
+@dataclass(frozen=True, slots=True)
+class Now:
+    """Where the hand is [m, hand frame], the force felt on it [N], the wake that the body meets [m/s, scene]."""
+
+    position_m: Point
+    force_n: Point = (0.0, 0.0, 0.0)
+    wake_mps: Point = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class CostRow:
+    """An effect and the ns it takes of a tick; ``ns`` None where it is not there, and ``why`` not ("not asked for")."""
+
+    effect: str
+    ns: float | None
+    why: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorRow:
+    """A measure of how far the felt setting is from its reference, written out: ("Force, largest", "< 0.001 N")."""
+
+    measure: str
+    value: str
+    note: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceShown:
+    """Which devices can be chosen, which is, and how it is: ``state`` is one or two words."""
+
+    choices: Choices
+    chosen: str
+    state: str = ""
+    ready: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class LabView:
+    """Everything on the liquid lab's place.
+
+    ``liquids`` are what a side can be set to, ``paths`` the programmed motions; ``path`` is the one that runs, None for
+    live motion alone. ``busy`` says what is waited for ("Opening the Falcon"); ``refused`` is the parameter that could
+    not be changed and one line why, a new pair for every refusal; ``said`` tells what was saved or opened last.
+    ``tail_a``, ``tail_b``, ``trace`` and ``now`` are None where nothing has moved yet, a tail also where the setting
+    has no wake. ``cost`` and ``errors`` are of the felt setting, empty until they are measured; ``measuring`` while
+    they are measured anew.
+    """
+
+    workbench: Workbench
+    liquids: tuple[LiquidShown, ...]
+    device: DeviceShown
+    paths: Choices = ()
+    path: str | None = None
+    trace: TraceShown | None = None
+    tail_a: TailShown | None = None
+    tail_b: TailShown | None = None
+    now: Now | None = None
+    limiters: tuple[LimiterShown, ...] = ()
+    cost: tuple[CostRow, ...] = ()
+    tick_ns: float | None = None
+    errors: tuple[ErrorRow, ...] = ()
+    measuring: bool = False
+    force_on: bool = True
+    may_fade_in: bool = True
+    busy: str = ""
+    trouble: str = ""
+    refused: tuple[str, str] | None = None
+    said: str = ""
+    workspace_m: Point = (0.1, 0.06, 0.06)
+    body_radius_m: float = 0.0034
+
+    @property
+    def felt(self) -> Side:
+        """The side that is felt."""
+        return self.workbench.felt
+
+    @property
+    def tail(self) -> TailShown | None:
+        """The tail of the side that is felt."""
+        return self.tail_a if self.felt == "A" else self.tail_b
+
+
+@dataclass(frozen=True, slots=True)
+class FormRow:
+    """A parameter as it is, and as it was when the liquid was chosen."""
+
+    parameter: Parameter
+    value: Value
+    preset: Value
+
+    @property
+    def changed(self) -> bool:
+        """Whether it is something else than it was."""
+        return self.value != self.preset
+
+
+@dataclass(frozen=True, slots=True)
+class FormSection:
+    """Parameters that stand under one heading."""
+
+    title: str
+    rows: tuple[FormRow, ...]
+
+
+def form(setting: Setting) -> tuple[FormSection, ...]:
+    """Return every parameter of a setting with its value."""
+    return tuple(
+        FormSection(
+            section.title,
+            tuple(FormRow(it, setting.value(it.name), setting.chosen_value(it.name)) for it in section.parameters),
+        )
+        for section in sections(setting.scene)
+    )

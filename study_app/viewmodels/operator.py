@@ -1,0 +1,436 @@
+"""What the operator's window shows, as one frozen value: widgets only draw it. No Qt here.
+
+Nothing here says a liquid, a parameter or a delay; nor, in a double-blind study, a force or what a limiter did.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+from study_app.protocol.model import Explore, Protocol, Reach
+from study_app.protocol.orders.schedule import Trial
+from study_app.viewmodels.force_traces import ForceFigures
+from study_app.viewmodels.servo_health import Vitals
+from study_app.viewmodels.session_stages import NoteLine, SessionProgress, Stage, operator_language
+
+State = Literal["preparing", "running", "paused", "force off", "trouble", "ended"]
+Verdict = Literal["ok", "late", "open"]
+StepState = Literal["done", "now", "open"]
+
+MEASURES = {
+    "lateness_p99_ms": "servo lateness, p99,",
+    "worst_gap_ms": "longest gap of the servo",
+    "delay_error_p95_ms": "delay error, p95,",
+    "targets_reached": "targets reached, at least,",
+    "first_frame_gap_ms": "time to the first frame",
+    "worst_frame_gap_ms": "longest gap between frames",
+    "withheld_share": "force withheld",
+}
+"""What is judged in a trial, as the operator's window calls it."""
+
+THIN_SPACE = "\u2009"
+NOTES_SHOWN = 3
+
+
+@dataclass(frozen=True, slots=True)
+class StepRow:
+    """A row of the rail; ``note`` is its duration, "now" or how far it is."""
+
+    label: str
+    state: StepState
+    note: str
+
+
+@dataclass(frozen=True, slots=True)
+class Tile:
+    """A number with its unit, a verdict and a line that says what the verdict compares with."""
+
+    title: str
+    value: str
+    unit: str
+    verdict: Verdict
+    line: str
+
+
+@dataclass(frozen=True, slots=True)
+class TrialTime:
+    """Time in the task: ``most_s`` None where the task has no end of its own."""
+
+    elapsed_s: float
+    least_s: float | None
+    most_s: float | None
+
+    @property
+    def words(self) -> str:
+        """Return "1:08 of 2:00", or "1:08"."""
+        elapsed = minutes(self.elapsed_s)
+        return f"{elapsed} of {minutes(self.most_s)}" if self.most_s else elapsed
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceView:
+    """The device's card: its name, whether it answers, and rows of (label, value), the most important ones first."""
+
+    name: str
+    kind: Literal["falcon", "mouse", "simulated"]
+    ready: bool
+    rows: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class OperatorView:
+    """Everything on the operator's window except the two plots' points.
+
+    ``elapsed_s`` is the time that was worked: not the gap before a session was resumed. ``main_trials`` has a pair for
+    each part, of its main trials left behind and of all. ``trial`` is the number of the trial under way or answered.
+    ``waits`` says that the trouble is a disk that takes
+    nothing: the session goes on when it does again. ``beyond`` says which recordings were lost, then of each trial out
+    of limits which it broke, the newest first. ``may_reconnect`` says that the trouble is a device that can be
+    connected again, ``reconnects`` that it is being so, ``reconnection`` how far that is, or why it failed.
+    """
+
+    study: str
+    who: str
+    state: State
+    state_word: str
+    trouble: str
+    saved_ago_s: float | None
+    elapsed_s: float
+    expected_s: float
+    main_trials: tuple[tuple[int, int], ...]
+    part_line: str
+    heading: str
+    setting_line: str
+    trial_time: TrialTime | None
+    steps: tuple[StepRow, ...]
+    counts: tuple[tuple[str, str], ...]
+    tiles: tuple[Tile, ...]
+    device: DeviceView
+    notes: tuple[NoteLine, ...]
+    force_on: bool
+    may_pause: bool
+    may_resume: bool
+    may_repeat: bool
+    over: bool
+    trial: int | None = None
+    waits: bool = False
+    beyond: tuple[str, ...] = ()
+    blinding: Literal["double", "single"] = "double"
+    may_reconnect: bool = False
+    reconnects: bool = False
+    reconnection: str = ""
+
+    @property
+    def trials_line(self) -> str:
+        """How far the session is: "2 of 10 trials"."""
+        done, of = (sum(counts) for counts in zip(*self.main_trials, strict=True)) if self.main_trials else (0, 0)
+        return f"{done} of {of} {'trial' if of == 1 else 'trials'}"
+
+
+@dataclass(frozen=True, slots=True)
+class Session:
+    """What stays the same through a session and is shown: who, with what, by which limits."""
+
+    protocol: Protocol
+    stages: tuple[Stage, ...]
+    who: str
+    expected_s: float
+    answers_of: int
+    lateness_limit_s: float
+    device_name: str
+    device_kind: Literal["falcon", "mouse", "simulated"]
+    device_rows: tuple[tuple[str, str], ...]
+
+    @property
+    def language(self) -> str:
+        """The language of the operator's window, English, where the study has it; else the study's first."""
+        return operator_language(self.protocol)
+
+
+def operator_view(
+    session: Session,
+    progress: SessionProgress,
+    vitals: Vitals,
+    *,
+    now_s: float,
+    force_on: bool,
+    trouble: str = "",
+    waits: bool = False,
+    device_ready: bool = True,
+    faults: int = 0,
+    rate_hz: float = 1000.0,
+    forces: ForceFigures | None = None,
+    lost: Mapping[int, str] | None = None,
+    dropped: int = 0,
+) -> OperatorView:
+    """Return what the operator sees at ``now_s`` on the session's clock.
+
+    ``trouble`` is what no journal could say; ``device_ready`` and ``faults`` (how many there were since the program
+    was started) are the servo's own, whatever other trouble there is; ``forces`` are shown where a study is
+    single-blind; ``lost`` says of trials why their recordings were lost, also where no journal tells it yet;
+    ``dropped`` counts the samples that the recording of the trial under way lacks by now.
+    """
+    trouble = progress.broke or trouble
+    state = _state(progress, force_on=force_on, trouble=trouble)
+    waits = waits and not progress.broke
+    trial = progress.trial
+    answering = trial is not None and progress.trial_lasted_s is not None
+    return OperatorView(
+        study=session.protocol.study.name,
+        who=session.who,
+        state=state,
+        state_word="Waiting for the disk" if waits and state == "trouble" else _state_word(state, progress),
+        trouble=trouble,
+        saved_ago_s=None if progress.saved_s is None else max(0.0, now_s - progress.saved_s),
+        elapsed_s=(progress.ended_s if progress.ended else now_s) - progress.away_s,
+        expected_s=session.expected_s,
+        main_trials=progress.main_trials,
+        part_line=_part_line(session, trial),
+        heading=_heading(session, progress),
+        setting_line=_setting_line(session, progress, answering=answering),
+        trial_time=_trial_time(session, progress, now_s),
+        steps=tuple(_step_row(stage, progress) for stage in session.stages),
+        counts=_counts(session, progress),
+        tiles=_tiles(vitals, rate_hz, session.lateness_limit_s),
+        device=DeviceView(
+            session.device_name,
+            session.device_kind,
+            device_ready,
+            (*_force_rows(session, forces), ("Safety faults", str(faults)), *session.device_rows),
+        ),
+        notes=progress.notes[-NOTES_SHOWN:][::-1],
+        force_on=force_on,
+        may_pause=state == "running" and progress.step >= 0,
+        may_resume=state in {"paused", "force off"},
+        may_repeat=trial is not None and state == "running",
+        over=state == "ended",
+        trial=None if trial is None else trial.number,
+        waits=waits,
+        beyond=(
+            *_lost(session, progress, {**progress.lost, **(lost or {})}),
+            *_lacking(session, progress, {trial.number: dropped} if trial is not None and dropped else {}),
+            *_beyond(session, progress),
+        ),
+        blinding=session.protocol.study.blinding,
+    )
+
+
+def minutes(seconds: float) -> str:
+    """Return 68 s as "1:08"; an hour and more as "1:02:03"."""
+    whole = max(0, int(seconds))
+    hours, rest = divmod(whole, 3600)
+    if hours:
+        return f"{hours}:{rest // 60:02d}:{rest % 60:02d}"
+    return f"{rest // 60}:{rest % 60:02d}"
+
+
+def grouped(number: int) -> str:
+    """Return 45918 as "45 918" with a thin space."""
+    return f"{number:,}".replace(",", THIN_SPACE)
+
+
+def duration_words(seconds: float) -> str:
+    """Return a lateness or age with the unit that suits it: "62 µs", "1.4 ms"."""
+    micros = seconds * 1e6
+    return f"{micros:.0f} µs" if micros < 1000 else f"{micros / 1000:.2g} ms"
+
+
+def _state(progress: SessionProgress, *, force_on: bool, trouble: str) -> State:
+    if progress.ended:
+        return "ended"
+    if trouble:
+        return "trouble"
+    if progress.step < 0:
+        return "preparing"
+    if not force_on:
+        return "force off"
+    return "paused" if progress.paused else "running"
+
+
+def _state_word(state: State, progress: SessionProgress) -> str:
+    if state == "ended":
+        return {
+            "completed": "Complete",
+            "withdrawn": "Withdrawn",
+            "aborted": "Ended early",
+            "broken": "Ended after a fault",
+        }.get(progress.ended, progress.ended.capitalize())
+    return {
+        "preparing": "Preparing",
+        "running": "Running",
+        "paused": "Paused",
+        "force off": "Paused, force is off",
+        "trouble": "Stopped by a fault",
+    }[state]
+
+
+def _part_line(session: Session, trial: Trial | None) -> str:
+    if trial is None:
+        return session.protocol.text(session.protocol.study.title, session.language)
+    block = session.protocol.blocks[trial.block]
+    title = session.protocol.text(block.title, session.language)
+    parts = session.protocol.parts
+    return f"Part {trial.part} of {parts}  ·  {title}" if trial.part and parts > 1 else title
+
+
+def _heading(session: Session, progress: SessionProgress) -> str:
+    if progress.ended:
+        return {"completed": "Session complete"}.get(progress.ended, "Session ended")
+    if progress.step < 0:
+        return "Getting ready"
+    trial = progress.trial
+    if trial is None:
+        return next(s.label for s in session.stages if s.first <= progress.step <= s.last)
+    if trial.phase != "main":
+        return trial.label(session.protocol, session.language)
+    main = [other.number for other in progress.schedule.trials if other.phase == "main"]
+    return f"Trial {main.index(trial.number) + 1} of {len(main)}"
+
+
+def _setting_line(session: Session, progress: SessionProgress, *, answering: bool) -> str:
+    if progress.ended:
+        shown = f"  ·  Fingerprint {progress.fingerprint}" if progress.fingerprint else ""
+        return f"Everything answered is on disk{shown}"
+    trial = progress.trial
+    if trial is None:
+        return "The participant reads" if progress.step >= 0 else "The first page opens in a moment"
+    block = session.protocol.blocks[trial.block]
+    task = session.protocol.tasks[block.task]
+    doing = "free exploration" if isinstance(task, Explore) else "reaching targets"
+    if progress.broke:
+        doing = "stopped by a fault"
+    elif progress.paused:
+        doing = "paused"
+    elif answering:
+        doing = "answering"
+    if isinstance(task, Reach):
+        doing += f"  ·  {progress.targets} {'targets' if task.count is None else f'of {task.count} targets'}"
+    if trial.phase != "main":
+        return doing.capitalize()
+    return f"{trial.label(session.protocol, session.language)}  ·  {doing}"
+
+
+def _trial_time(session: Session, progress: SessionProgress, now_s: float) -> TrialTime | None:
+    trial = progress.trial
+    if trial is None or progress.ended:
+        return None
+    block = session.protocol.blocks[trial.block]
+    task = session.protocol.tasks[block.task]
+    elapsed = progress.trial_lasted_s
+    if elapsed is None:
+        elapsed = now_s - (progress.trial_since_s if progress.trial_since_s is not None else now_s)
+    return TrialTime(elapsed, task.min_s if isinstance(task, Explore) else None, task.limit_s)
+
+
+def _step_row(stage: Stage, progress: SessionProgress) -> StepRow:
+    many = stage.last - stage.first + 1
+    spent = sum(progress.durations_s.get(step, 0.0) for step in range(stage.first, stage.last + 1))
+    if progress.step > stage.last or progress.ended == "completed":
+        return StepRow(stage.label, "done", minutes(spent))
+    if stage.first <= progress.step <= stage.last:
+        place = f"{progress.step - stage.first + 1} of {many}" if many > 1 else "now"
+        return StepRow(stage.label, "now", "" if progress.ended else place)
+    return StepRow(stage.label, "open", "")
+
+
+def _counts(session: Session, progress: SessionProgress) -> tuple[tuple[str, str], ...]:
+    return (
+        ("Answers on disk", f"{sum(progress.answers.values())} of {session.answers_of}"),
+        ("Trials within limits", f"{progress.trials_within_limits} of {len(progress.trials_done)}"),
+        ("Marks, repeats", f"{progress.marks}, {progress.repeats}"),
+    )
+
+
+def _lost(session: Session, progress: SessionProgress, lost: Mapping[int, str]) -> tuple[str, ...]:
+    """Return a sentence for every trial whose recording could not be kept, the newest first."""
+    trials = {trial.number: trial for trial in progress.schedule.trials}
+    return tuple(
+        f"Recording of {trials[number].label(session.protocol, session.language)} lost: {reason}"
+        for number, reason in sorted(lost.items(), reverse=True)
+    )
+
+
+def _lacking(session: Session, progress: SessionProgress, now: Mapping[int, int]) -> tuple[str, ...]:
+    """Return a sentence for every trial whose recording lacks samples, the newest first."""
+    labels = {trial.number: trial.label(session.protocol, session.language) for trial in progress.schedule.trials}
+    return tuple(
+        f"Recording of {labels[number]} lacks {grouped(count)} samples: the disk does not keep up"
+        for number, count in sorted({**progress.lacking, **now}.items(), reverse=True)
+    )
+
+
+def _beyond(session: Session, progress: SessionProgress) -> tuple[str, ...]:
+    """Return a sentence for every finished trial that broke a limit, the newest first."""
+    labels = {trial.number: trial.label(session.protocol, session.language) for trial in progress.schedule.trials}
+    return tuple(
+        f"{labels[number]} out of limits: "
+        + "; ".join(
+            f"{MEASURES[measure]} {value:.3g} {_unit(measure)}, limit {limit:g} {_unit(measure)}"
+            for measure, value, limit in beyond
+        )
+        for number, beyond in reversed(tuple(progress.trials_done.items()))
+        if beyond
+    )
+
+
+def _unit(measure: str) -> str:
+    return "%" if measure in {"withheld_share", "targets_reached"} else "ms"
+
+
+def _force_rows(session: Session, forces: ForceFigures | None) -> tuple[tuple[str, str], ...]:
+    """Return share of the limit, limiters and force withheld, or that they are hidden; as many rows in either case."""
+    share, limiters = f"Force, share of {session.protocol.device.force_limit_n:g} N", "Limiters acted"
+    withheld = f"Force withheld, limit {session.protocol.limits.withheld_percent:g}{THIN_SPACE}%"
+    if session.protocol.study.blinding == "double":
+        return (share, "hidden"), (limiters, "hidden"), (withheld, "hidden")
+    if forces is None:
+        return (share, "–"), (limiters, "–"), (withheld, "–")
+    most_first = sorted(forces.limiters, key=lambda counted: -counted[1])
+    return (
+        (share, f"{forces.share:.0%}, most {forces.most:.0%}".replace("%", f"{THIN_SPACE}%")),
+        (limiters, ", ".join(f"{name} {grouped(ticks)}" for name, ticks in most_first) or "none"),
+        (withheld, f"{forces.withheld:.1%}".replace("%", f"{THIN_SPACE}%")),
+    )
+
+
+def _tiles(vitals: Vitals, rate_hz: float, limit_s: float) -> tuple[Tile, ...]:
+    rate = vitals.rate_hz
+    p99 = vitals.lateness_p99_s
+    p99_value, _, p99_unit = duration_words(p99).partition(" ") if p99 is not None else ("–", "", "")
+    screen = f", {vitals.frame_rate_hz:.1f} Hz" if vitals.frame_rate_hz else ""
+    return (
+        Tile(
+            "Servo rate",
+            "–" if rate is None else f"{rate:.1f}",
+            "Hz",
+            "open" if rate is None else _verdict(abs(rate - rate_hz) <= 0.01 * rate_hz),
+            f"asked for {rate_hz:.0f} Hz",
+        ),
+        Tile(
+            "Lateness, p99",
+            p99_value,
+            p99_unit,
+            "open" if p99 is None else _verdict(p99 <= limit_s),
+            f"limit {duration_words(limit_s)}",
+        ),
+        Tile(
+            "Overruns",
+            grouped(vitals.overruns),
+            "",
+            "open" if vitals.ticks == 0 else _verdict(vitals.overruns <= vitals.ticks * 1e-4),
+            f"of {grouped(vitals.ticks)} ticks",
+        ),
+        Tile(
+            "Refreshes missed",
+            grouped(vitals.refreshes_missed),
+            "",
+            "open" if vitals.refreshes == 0 else _verdict(vitals.refreshes_missed <= 0.01 * vitals.refreshes),
+            f"of {grouped(vitals.refreshes)}{screen}",
+        ),
+    )
+
+
+def _verdict(within: bool) -> Verdict:
+    return "ok" if within else "late"

@@ -1,0 +1,142 @@
+"""What the window before a session shows, as one frozen value. No Qt here.
+
+Nothing here says a liquid, a parameter or a delay: costs and errors are those of the dearest and the least true scene.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study_app.protocol.describe import expected_duration_s
+from study_app.protocol.model import Protocol
+from study_app.protocol.orders.schedule import Schedule, Trial
+from study_app.session.preflight import Check, Facts
+from study_app.session.resume import resume_at
+from study_app.store.journals.journal import Line
+from study_app.viewmodels.session_stages import SessionProgress, operator_language, progress_after
+
+WAITING = "measuring …"
+BINS_PER_DECADE = 10
+
+
+@dataclass(frozen=True, slots=True)
+class PreflightView:
+    """Everything on the window.
+
+    ``rows`` are (label, value) of what will run; ``lateness_us`` is what was measured of the servo's turns (n,), and
+    ``limit_us`` what the protocol allows. While it is ``busy`` nothing can be begun.
+    """
+
+    study: str
+    who: str
+    checks: tuple[Check, ...]
+    rows: tuple[tuple[str, str], ...]
+    lateness_us: NDArray[np.float64]
+    limit_us: float
+    busy: bool = False
+
+    @property
+    def warnings(self) -> int:
+        """How many checks warn."""
+        return sum(check.verdict == "warning" for check in self.checks)
+
+    @property
+    def failures(self) -> int:
+        """How many checks forbid the session."""
+        return sum(check.verdict == "failure" for check in self.checks)
+
+    @property
+    def passed(self) -> str:
+        """How many passed: "8 of 9 passed"."""
+        well = len(self.checks) - self.warnings - self.failures
+        return f"{well} of {len(self.checks)} passed"
+
+    @property
+    def start_words(self) -> str:
+        """What the button says: that warnings are accepted by pressing it, or that it cannot be pressed."""
+        if self.failures:
+            return "Cannot start"
+        if self.warnings:
+            return f"Start with {self.warnings} warning{'s' if self.warnings > 1 else ''}"
+        return "Start"
+
+
+def preflight_view(
+    protocol: Protocol,
+    facts: Facts,
+    found: tuple[Check, ...],
+    who: str,
+    *,
+    error_n: float | None = None,
+    asked_error: bool = True,
+    now: datetime,
+    busy: bool = False,
+    goes_on: tuple[tuple[str, str], ...] = (),
+) -> PreflightView:
+    """Return what to show of ``facts``; ``goes_on`` are the rows of a session that goes on (`resumed_rows`).
+
+    ``error_n`` is the largest difference of a scene's force from the definition by the letter [N], None while it is not
+    known; where nobody was asked (``asked_error``) its line is left out.
+    """
+    return PreflightView(
+        study=protocol.study.name,
+        who=who,
+        checks=found,
+        rows=(*goes_on, *_rows(protocol, now, error_n, asked_error=asked_error)),
+        lateness_us=facts.lateness_ns / 1e3,
+        limit_us=protocol.limits.lateness_ms * 1e3,
+        busy=busy,
+    )
+
+
+def resumed_rows(protocol: Protocol, schedule: Schedule, lines: Iterable[Line]) -> tuple[tuple[str, str], ...]:
+    """Return where the session with these journal lines goes on, and how much of it is kept.
+
+    Raises
+    ------
+    SessionError
+        The journal is not of this schedule.
+    """
+    told = list(lines)
+    start = resume_at(protocol, schedule, told)
+    language = operator_language(protocol)
+    step = schedule.steps[start.step] if start.step < len(schedule.steps) else None
+    if isinstance(step, Trial):
+        attempt = start.presented.get(step.number, 0) + 1
+        here = step.label(protocol, language) + (f", attempt\u00a0{attempt}" if attempt > 1 else "")
+    else:
+        here = "the end" if step is None else protocol.text(protocol.pages[step.page_id].title, language)
+    answers = progress_after(SessionProgress(protocol, schedule), told).answers
+    kept = f"{sum(answers.values())} of {protocol.responses_per_participant()} answers"
+    return ("Goes on at", here), ("Kept", kept)
+
+
+def histogram(lateness_us: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64], float | None]:
+    """Return edges [µs], counts and the 99th percentile [µs] of latenesses; what is below 1 µs counts as 1 µs."""
+    highest = max(1e3, float(lateness_us.max(initial=0.0)))
+    edges = np.logspace(0, np.ceil(np.log10(highest) + 1e-9), int(3 * BINS_PER_DECADE) + 1)
+    counts, _ = np.histogram(np.maximum(lateness_us, 1.0), edges)
+    return edges, counts.astype(np.int64), float(np.percentile(lateness_us, 99)) if len(lateness_us) else None
+
+
+def _rows(
+    protocol: Protocol, now: datetime, error_n: float | None, *, asked_error: bool
+) -> tuple[tuple[str, str], ...]:
+    settings = sum(len(block.conditions) * block.repetitions for block in protocol.main_blocks)
+    expected_s = expected_duration_s(protocol)
+    ends = now + timedelta(seconds=expected_s)
+    error = WAITING if error_n is None else "< 0.01 N" if error_n < 0.01 else f"{error_n:.2f} N"
+    return (
+        ("Parts", str(protocol.parts)),
+        ("Settings", str(settings)),
+        ("Answers", str(protocol.responses_per_participant())),
+        ("Expected time", f"{max(1, round(expected_s / 60))} min"),
+        ("Force limit", f"{protocol.device.force_limit_n:g} N"),
+        *((("Force off the definition", error),) if asked_error else ()),
+        ("Ends about", f"{ends:%H:%M}"),
+    )

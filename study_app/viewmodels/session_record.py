@@ -1,0 +1,228 @@
+"""What a session's page says: its trials, limits, notes, files and exclusions, read from its folder. No Qt here."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from study_app.devices import is_falcon
+from study_app.errors import StoreError
+from study_app.store.blinded.sealing import opened, opened_key
+from study_app.store.exclusions import Exclusion, exclusions
+from study_app.store.folders import SessionFolder, locate
+from study_app.store.journals import journal
+from study_app.store.journals.journal import Line
+from study_app.store.tables import session_tables
+from study_app.store.tables.participants import row_of
+from study_app.viewmodels.sessions import SessionFacts, counted, session_facts
+
+MOST_POINTS = 2000  # of a drawn curve
+LIMIT_WORDS: Mapping[str, tuple[str, str]] = {
+    "lateness_p99_ms": ("lateness of ticks (99th percentile)", "ms"),
+    "worst_gap_ms": ("longest time between two ticks", "ms"),
+    "delay_error_p95_ms": ("error of the delay (95th percentile)", "ms"),
+    "first_frame_gap_ms": ("time before the first frame", "ms"),
+    "worst_frame_gap_ms": ("longest time between two frames", "ms"),
+    "withheld_share": ("share of the force withheld", "%"),
+    "targets_reached": ("targets reached, at least", "%"),
+}
+"""Of every measure that a limit judges: what it is, and its unit."""
+MOTION_HIDDEN = "Hidden while the study is blinded: with this device, the recorded motion shows how the liquid resists."
+NO_MOTION = "No recording of this trial."
+
+
+@dataclass(frozen=True, slots=True)
+class TrialRecord:
+    """One presentation of a trial.
+
+    ``broken`` has a sentence for each limit that was broken; ``valid`` is None where nothing was measured; ``excluded``
+    is why it is left out of the analysis, None where it is not. ``unconfirmed`` are choices on a page that was left
+    before they were confirmed, as "item: value": they are in no table.
+    """
+
+    number: int
+    attempt: int
+    words: str
+    outcome: str
+    valid: bool | None
+    broken: tuple[str, ...]
+    answers: int
+    unconfirmed: tuple[str, ...]
+    notes: str
+    recording: Path | None
+    excluded: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class SessionRecord:
+    """A session's page; ``motion_hidden`` is why no motion is shown, "" where it may be."""
+
+    facts: SessionFacts
+    about: str
+    limits: str
+    trials: tuple[TrialRecord, ...]
+    notes: tuple[str, ...]
+    files: tuple[tuple[str, int], ...]
+    left_out: tuple[Exclusion, ...]
+    motion_hidden: str
+
+
+def read_record(folder: Path) -> SessionRecord:
+    """Return what a session's folder holds.
+
+    Raises
+    ------
+    StoreError
+        It is no session's folder, or its journal or the list of exclusions cannot be read.
+    """
+    study, session = locate(folder)
+    key = opened_key(study)
+    lines = opened(journal.read(session.journal), key)
+    if not lines:
+        raise StoreError(f"{session.journal} has no line: nothing was begun")
+    listed = exclusions(study.path)
+    (facts,) = session_facts(study.path, row_of(session, key), listed, {})
+    own = tuple(one for one in listed if one.what[:2] == (facts.participant, facts.session))
+    start = lines[0]
+    rows = session_tables.trials(lines)
+    trials = _trials(session, rows, lines, start.get("limits", {}), own)
+    felt = is_falcon(str(start.get("device")))
+    return SessionRecord(
+        facts=facts,
+        about=_about(lines),
+        limits=limits_sentence(trials, sealed=key is None and bool(start.get("measures_sealed"))),
+        trials=trials,
+        notes=tuple(_notes(lines)),
+        files=tuple((name, (session.path / name).stat().st_size) for name in _files(session)),
+        left_out=own,
+        motion_hidden="" if felt or key is not None else MOTION_HIDDEN,
+    )
+
+
+def limits_sentence(trials: Sequence[TrialRecord], *, sealed: bool) -> str:
+    """Return how many trials kept the study's limits, and what that means."""
+    judged = [one for one in trials if one.valid is not None]
+    outside = [one for one in judged if not one.valid]
+    later = " Delay error, withheld force and targets reached are judged once the study is unblinded." if sealed else ""
+    if not judged:
+        return f"No trial was measured yet.{later}"
+    if not outside:
+        return f"All {counted(len(judged), 'measured trial')} kept the limits of the study.{later}"
+    return (
+        f"Out of limits: {len(outside)} of {counted(len(judged), 'measured trial')} broke a limit of the study. The "
+        "answers are kept and still count; leave out what you do not trust. The column “Limits” and the line below "
+        f"the table say which limit.{later}"
+    )
+
+
+def motion(recording: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return times (n,) [s] and positions of the hand (n, 3) [m] of a recording, thinned to at most `MOST_POINTS`.
+
+    Raises
+    ------
+    StoreError
+        It cannot be read.
+    """
+    from study_app.store.recording_files import read_samples  # noqa: PLC0415 - pyarrow: only once it is needed
+
+    samples = read_samples(recording)
+    thinned = samples[:: max(1, -(-len(samples) // MOST_POINTS))]
+    times_s = (thinned["time_ns"] - (thinned["time_ns"][0] if len(thinned) else 0)) * 1e-9
+    return np.asarray(times_s, np.float64), np.array(thinned["position_m"], np.float64)
+
+
+def _trials(
+    session: SessionFolder,
+    rows: Sequence[Mapping[str, Any]],
+    lines: Sequence[Line],
+    limits: Mapping[str, float],
+    own: Sequence[Exclusion],
+) -> tuple[TrialRecord, ...]:
+    reasons = {one.trial: one.reason for one in own}
+    answered: dict[tuple[int, int], int] = {}
+    open_choices = _unconfirmed(lines)
+    for row in session_tables.responses(lines):
+        which = (row["trial"], row["attempt"])
+        answered[which] = answered.get(which, 0) + (row["first_choice_s"] is not None)
+    return tuple(
+        TrialRecord(
+            number=row["trial"],
+            attempt=row["attempt"],
+            words=_words(row),
+            outcome=row["outcome"] or "running",
+            valid=row["valid"],
+            broken=tuple(broken_words(*one) for one in session_tables.beyond_limits(row, limits)),
+            answers=answered.get((row["trial"], row["attempt"]), 0),
+            unconfirmed=tuple(open_choices.get((row["trial"], row["attempt"]), ())),
+            notes=" · ".join((["marked"] if row["marked"] else []) + (row["notes"] or "").splitlines()),
+            recording=session.path / row["recording"] if row["recording"] else None,
+            excluded=reasons.get(row["trial"]),
+        )
+        for row in rows
+    )
+
+
+def _unconfirmed(lines: Sequence[Line]) -> dict[tuple[int, int], list[str]]:
+    """Return trial and attempt → choices that no confirmation followed, as "item: value"."""
+    found: dict[tuple[int, int], dict[str, str]] = {}
+    which = (0, 0)
+    for line in lines:
+        match line["event"]:
+            case "trial_started":
+                which = (line["trial"], line["attempt"])
+            case "choice":
+                value = line["value"]
+                found.setdefault(which, {})[line["item"]] = "cannot judge" if value is None else str(value)
+            case "responses":
+                found.pop((line["trial"], line["attempt"]), None)
+    return {which: [f"{item}: {value}" for item, value in chosen.items()] for which, chosen in found.items()}
+
+
+def broken_words(measure: str, value: float, limit: float) -> str:
+    """Return a sentence on a limit that was broken."""
+    what, unit = LIMIT_WORDS[measure]
+    return f"{what}: {value:.3g} {unit}, limit {limit:g} {unit}"
+
+
+def _words(row: Mapping[str, Any]) -> str:
+    """Return what was presented without a condition: "Part 1, L2", "practice, 2nd attempt"."""
+    phase = f"Part {row['part']}" if row["part"] is not None else str(row["phase"]).capitalize()
+    again = "" if row["attempt"] == 1 else f", attempt {row['attempt']}"
+    return f"{phase}, {row['code']}{again}"
+
+
+def _about(lines: Sequence[Line]) -> str:
+    start, row = lines[0], session_tables.participant(lines)
+    ended = row["session_ended_at"]
+    said = [
+        f"Device {start['device']}",
+        f"language {row['language']}",
+        f"operator {start['operator']}" if start["operator"] else "",
+        f"seed {start['seed']}",
+        f"ended {datetime.fromisoformat(ended):%H:%M}" if ended else "not ended",
+        counted(row["resumed"], "resume") if row["resumed"] else "",
+    ]
+    return "  ·  ".join(filter(None, said))
+
+
+def _notes(lines: Sequence[Line]) -> list[str]:
+    trial, found = None, []
+    for line in lines:
+        trial = line.get("trial", trial)
+        if line["event"] not in {"note", "repeat"}:
+            continue
+        text = line.get("text") or line.get("reason") or "marked"
+        what = "repeated: " if line["event"] == "repeat" else ""
+        where = "before the first trial" if trial is None else f"trial {trial}"
+        found.append(f"{datetime.fromisoformat(line['at']):%H:%M}, {where}: {what}{text}")
+    return found
+
+
+def _files(session: SessionFolder) -> list[str]:
+    return sorted(path.relative_to(session.path).as_posix() for path in session.path.rglob("*") if path.is_file())

@@ -1,0 +1,98 @@
+"""Frames come once a refresh: none twice, none never, in step with a surface that tells when it swapped."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from study_app.gui.display.frame_clock import LEAD_NS, STALE_REFRESHES, Frames
+
+MS = 1_000_000
+
+
+class Screen:
+    """A clock that is turned by hand; timers go off when their time has come."""
+
+    def __init__(self, refresh_hz):
+        self.now_ns = 10**9
+        self.frames = Frames(refresh_hz, now_ns=lambda: self.now_ns)
+        self.drawn_ns = []
+        self.takes_ns = 0
+        self.frames.due.connect(self.draw)
+
+    def draw(self):
+        self.drawn_ns.append(self.now_ns)
+        self.now_ns += self.takes_ns
+
+    def run(self, seconds, early_ns=0, late_ns=0):
+        """Let time pass; the timer goes off so early or late."""
+        end_ns = self.now_ns + round(seconds * 1e9)
+        while self.frames.next_ns < end_ns:
+            self.now_ns = max(self.now_ns, self.frames.next_ns - early_ns + late_ns)
+            self.frames._timer.stop()
+            self.frames._draw()
+        self.now_ns = max(self.now_ns, end_ns)
+
+
+@pytest.fixture(params=[60.0, 59.94, 144.0])
+def screen(request, qapp):
+    made = Screen(request.param)
+    made.frames.start()
+    return made
+
+
+@pytest.mark.parametrize(("early_ns", "late_ns"), [(0, 0), (MS // 2, 0), (0, 3 * MS)])
+def test_a_frame_for_every_refresh_and_no_drift(screen, early_ns, late_ns):
+    began_ns = screen.now_ns
+    screen.run(10.0, early_ns, late_ns)
+    period_ns = screen.frames.period_ns
+    places = (np.array(screen.drawn_ns) - began_ns) / period_ns
+    assert np.array_equal(np.rint(places - late_ns / period_ns), np.arange(1, len(places) + 1))
+
+
+def test_a_slow_frame_costs_its_own_refreshes_and_no_more(screen):
+    screen.run(1.0)
+    before = len(screen.drawn_ns)
+    screen.takes_ns = round(2.4 * screen.frames.period_ns)
+    screen.run(screen.frames.period_ns * 1e-9)
+    screen.takes_ns = 0
+    screen.run(1.0)
+    gaps = np.diff(screen.drawn_ns[before:]) / screen.frames.period_ns
+    assert gaps[0] == pytest.approx(2.4, abs=0.01)
+    assert np.rint(gaps[1:].sum() + gaps[0]) == pytest.approx(gaps.sum(), abs=0.01)
+    assert np.allclose(gaps[2:], 1.0, atol=1e-3)
+
+
+def test_frames_follow_the_swaps_of_a_surface(screen):
+    screen.run(1.0)
+    assert not screen.frames.locked
+    period_ns = screen.frames.period_ns
+    swap_ns = screen.now_ns + period_ns // 3
+    for _ in range(30):
+        screen.run((swap_ns - screen.now_ns) * 1e-9)
+        screen.now_ns = swap_ns
+        screen.frames.swapped()
+        swap_ns += period_ns
+    assert screen.frames.locked
+    lead_ns = min(LEAD_NS, period_ns // 2)
+    ahead_ns = [(swap_ns - drawn_ns) % period_ns for drawn_ns in screen.drawn_ns[-20:]]
+    assert ahead_ns == pytest.approx([lead_ns] * 20, abs=2)
+    assert np.diff(screen.drawn_ns[-20:]) == pytest.approx(period_ns, abs=2)
+
+
+def test_without_swaps_the_clock_goes_on(screen):
+    screen.frames.swapped()
+    assert screen.frames.locked
+    screen.run(2 * STALE_REFRESHES * screen.frames.period_ns * 1e-9)
+    assert not screen.frames.locked
+    assert len(screen.drawn_ns) >= 2 * STALE_REFRESHES - 1
+
+
+def test_stopped_frames_ask_for_nothing(qtbot):
+    frames = Frames(200.0)
+    frames.start()
+    with qtbot.waitSignal(frames.due):
+        pass
+    frames.stop()
+    with qtbot.assertNotEmitted(frames.due, wait=30):
+        pass

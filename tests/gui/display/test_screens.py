@@ -1,0 +1,43 @@
+"""A window stands on its screen with its frame."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QSize, Qt
+from PySide6.QtGui import QGuiApplication
+from PySide6.QtWidgets import QWidget
+
+from study_app.gui.display.screens import place
+
+
+def shown_in(qtbot, size, least):
+    window = QWidget()
+    qtbot.addWidget(window)
+    window.setMinimumSize(least)
+    window.resize(size)
+    place(window, window.screen(), corner=True)
+    window.show()
+    qtbot.waitExposed(window)
+    return window
+
+
+def test_window_as_large_as_the_screen_makes_room_for_its_frame(qtbot) -> None:
+    room = QGuiApplication.primaryScreen().availableGeometry()
+    window = shown_in(qtbot, room.size(), QSize(room.width(), 400))
+    assert window.frameGeometry() != window.geometry()
+    qtbot.waitUntil(lambda: room.contains(window.frameGeometry()))
+    assert window.frameGeometry().size() == room.size()
+
+
+def test_window_that_fits_keeps_size_and_least_size(qtbot) -> None:
+    window = shown_in(qtbot, QSize(500, 400), QSize(300, 200))
+    qtbot.wait(400)
+    assert window.size() == QSize(500, 400)
+    assert window.minimumSize() == QSize(300, 200)
+
+
+def test_full_screen_window_is_left_alone(qtbot) -> None:
+    window = shown_in(qtbot, QSize(500, 400), QSize(300, 200))
+    window.showFullScreen()
+    qtbot.wait(400)
+    assert window.windowState() & Qt.WindowState.WindowFullScreen
+    assert window.size() == window.screen().size()

@@ -1,0 +1,142 @@
+"""The main window: places are made when one goes there, entered and left; the rail tells where one is."""
+
+from __future__ import annotations
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QFontMetrics
+from PySide6.QtWidgets import QPushButton, QVBoxLayout
+
+from study_app.gui.home.main_window import FULL, LEAST, MainWindow
+from study_app.gui.home.navigation import DESTINATIONS, NARROW_RAIL, WIDE_RAIL
+from study_app.gui.theme.theme import DARK, font
+from study_app.gui.widgets.main_view import Place
+
+
+class Room(Place):
+    """A place that remembers when it was entered and left."""
+
+    def __init__(self, name, log):
+        super().__init__()
+        self.name, self.log = name, log
+        QVBoxLayout(self).addWidget(QPushButton(name))
+
+    def enter(self):
+        self.log.append(f"enter {self.name}")
+
+    def leave(self):
+        self.log.append(f"leave {self.name}")
+
+    def wants_narrow_rail(self):
+        return self.name == "lab"
+
+
+@pytest.fixture
+def log():
+    return []
+
+
+@pytest.fixture
+def main(qtbot, log):
+    names = [place.name for place in DESTINATIONS]
+    window = MainWindow({name: lambda name=name: Room(name, log) for name in names})
+    qtbot.addWidget(window)
+    window.show()
+    return window
+
+
+def test_one_begins_at_the_first_place_and_goes_by_the_rail(main, log, qtbot):
+    assert (main.here, log) == ("home", ["enter home"])
+    qtbot.mouseClick(main.rail.buttons["lab"], Qt.MouseButton.LeftButton)
+    assert (main.here, log[1:]) == ("lab", ["leave home", "enter lab"])
+    assert [name for name, button in main.rail.buttons.items() if button.here] == ["lab"]
+
+
+def test_places_are_reached_by_the_keyboard_alone(main, qtbot):
+    main.rail.buttons["home"].setFocus()
+    for key, place in ((Qt.Key.Key_Space, "results"), (Qt.Key.Key_Return, "lab")):
+        qtbot.keyClick(main.focusWidget(), Qt.Key.Key_Tab)
+        qtbot.keyClick(main.focusWidget(), key)
+        assert main.here == place
+
+
+def test_the_window_closes_by_the_keyboard_where_no_frame_has_a_way(main, qtbot):
+    with qtbot.waitSignal(main.closed):
+        qtbot.keyClick(main, Qt.Key.Key_Q, Qt.KeyboardModifier.ControlModifier)
+    assert not main.isVisible()
+
+
+def test_a_place_may_ask_for_another_and_have_something_said(main):
+    main.place("home").go_asked.emit("devices")
+    assert main.here == "devices"
+    main.place("devices").told.emit("It did not work", "The cable is out.")
+    assert main.notice.isVisible()
+    main.notice.accept()
+
+
+def test_a_session_and_the_end_leave_the_place(main, log):
+    main.go("lab")
+    main.rest()
+    assert (main.isVisible(), log[-1]) == (False, "leave lab")
+    main.come_back()
+    assert (main.isVisible(), log[-1]) == (True, "enter lab")
+    main.close()
+    assert log[-1].startswith("leave")
+    assert "leave lab" in log[-2:]
+
+
+def test_what_was_said_goes_with_the_window(main):
+    main.tell("It did not work", "The cable is out.")
+    assert main.notice.isVisible()
+    main.close()
+    assert not main.notice.isVisible()
+
+
+def test_a_place_made_later_wears_the_theme(main):
+    main.rail.theme_asked.emit()
+    main.go("results")
+    assert main.place("results").theme is DARK
+
+
+@pytest.mark.parametrize(
+    ("size", "place", "width"), [(FULL, "home", WIDE_RAIL), (LEAST, "home", NARROW_RAIL), (FULL, "lab", NARROW_RAIL)]
+)
+def test_the_rail_gives_way(main, size, place, width):
+    main.resize(size)
+    main.go(place)
+    assert main.rail.width() == width
+
+
+def test_the_words_of_a_narrow_rail_stay_whole_in_another_theme(main, qtbot):
+    main.resize(LEAST)
+    main.rail.theme_asked.emit()
+    for button in (*main.rail.buttons.values(), main.rail.switch):
+        qtbot.waitUntil(lambda button=button: button.height() == 58)
+        assert QFontMetrics(font("key")).horizontalAdvance(button.text()) <= button.width()
+
+
+def test_a_place_that_is_not_prepared_never_freezes_the_window(qtbot):
+    ready, made = [], []
+
+    def make():
+        made.append("lab")
+        return Place()
+
+    window = MainWindow({"home": Place, "lab": make}, prepares={"lab": lambda: bool(ready)})
+    qtbot.addWidget(window)
+    window.show()
+    window.go("lab")
+    assert (window.here, made) == ("lab", [])
+    waits = window.stack.currentWidget()
+    window.go("home")
+    window.prepared("lab")
+    assert (window.here, made) == ("home", []), "nobody waits for it any more"
+    window.go("lab")
+    ready.append(True)
+    window.prepared("lab")
+    assert made == ["lab"]
+    assert window.stack.currentWidget() is window.place("lab") is not waits
+    window.go("home")
+    window.rest()
+    window.come_back()
+    window.close()

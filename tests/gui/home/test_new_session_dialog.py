@@ -1,0 +1,271 @@
+"""The questions before a session: checked as they are answered, and nothing created before Begin."""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QSize, Qt
+from PySide6.QtWidgets import QApplication
+
+from study_app.gui.display.screens import ScreenShown
+from study_app.gui.home import new_session_dialog
+from study_app.gui.home.new_session_dialog import NewSessionDialog
+from study_app.session.request import MAX_SEED, draw_seed
+from study_app.store.workstation import MachineSettings
+from study_app.viewmodels.home import study_facts
+
+# The platform without a screen cannot limit or raise windows, and says so.
+
+
+@pytest.fixture
+def results(tmp_path: Path) -> Path:
+    return tmp_path / "results"
+
+
+@pytest.fixture
+def dialog(qtbot, results):
+    made = NewSessionDialog(study_facts("rek2024"), results)
+    qtbot.addWidget(made)
+    made.open()
+    return made
+
+
+def use(results: Path, participant: str, session: int = 1) -> None:
+    folder = results / "rek2024" / "data" / f"sub-{participant}" / f"ses-{session:02d}"
+    folder.mkdir(parents=True)
+    (folder / "checksums.sha256").touch()  # something that comes after a session's beginning
+
+
+def test_a_key_in_a_field_reads_no_folder_in_the_windows_thread(dialog, qtbot, monkeypatch):
+    threads, read = [], new_session_dialog._state_of
+
+    def noted(*arguments):
+        threads.append(threading.current_thread())
+        return read(*arguments)
+
+    monkeypatch.setattr(new_session_dialog, "_state_of", noted)
+    dialog.participant.clear()
+    qtbot.keyClicks(dialog.participant, "P0042")
+    dialog.session.setValue(3)
+    settle(qtbot, dialog)
+    assert threads
+    assert threading.main_thread() not in threads
+
+
+def test_what_another_program_began_meanwhile_is_refused(dialog, results, qtbot):
+    settle(qtbot, dialog)
+    use(results, "P001")
+    dialog.seed.setText("7")
+    qtbot.waitUntil(lambda: not dialog.begin.isEnabled())
+    assert "already has session 1" in dialog.verdict.text()
+
+
+def settle(qtbot, dialog):
+    """Wait until the folder was read again."""
+    qtbot.waitUntil(lambda: not dialog._reader.busy)
+
+
+def files(folder: Path) -> list[Path]:
+    return sorted(folder.rglob("*"))
+
+
+def test_a_free_id_is_suggested(qtbot, results):
+    use(results, "P001")
+    use(results, "P004")
+    made = NewSessionDialog(study_facts("rek2024"), results)
+    qtbot.addWidget(made)
+    assert made.participant.text() == "P005"
+    assert made.begin.isEnabled()
+    assert "free" in made.verdict.text()
+
+
+@pytest.mark.parametrize("wrong", ["P-007", "P 7", "", "P_7", "Zoë", "x" * 33])
+def test_an_id_no_file_name_can_take_is_refused_as_it_is_typed(dialog, wrong):
+    dialog.participant.setText(wrong)
+    assert not dialog.begin.isEnabled()
+    assert repr(wrong) in dialog.verdict.text()
+    assert "P007" in dialog.verdict.text()
+
+
+@pytest.mark.parametrize("kept", ["test", "Pilot"])
+def test_ids_kept_for_pilots_are_refused(dialog, kept):
+    dialog.participant.setText(kept)
+    assert not dialog.begin.isEnabled()
+
+
+def test_a_used_id_is_refused_with_the_ways_to_go_on_until_one_is_taken(dialog, results, qtbot):
+    use(results, "P007")
+    dialog.participant.setText("P007")
+    settle(qtbot, dialog)
+    assert not dialog.begin.isEnabled()
+    for way in ("new session number (2)", "resume", "another id"):
+        assert way in dialog.verdict.text()
+    dialog.session.setValue(2)
+    assert dialog.begin.isEnabled()
+    dialog.session.setValue(1)
+    before = {path: path.read_bytes() for path in results.rglob("*") if path.is_file()}
+    another, new = dialog.ways
+    another.click()
+    assert (dialog.participant.text(), dialog.session.value()) == ("P007", 2)
+    assert dialog.begin.isEnabled()
+    dialog.session.setValue(1)
+    new.click()
+    assert (dialog.participant.text(), dialog.session.value()) == ("P008", 1)
+    assert dialog.begin.isEnabled()
+    assert not dialog.ways[0].isVisibleTo(dialog)
+    assert before == {path: path.read_bytes() for path in results.rglob("*") if path.is_file()}
+
+
+def test_a_pilot_is_in_a_window_apart_and_may_have_an_id_kept_for_it(dialog, results):
+    dialog.participant.setText("test")
+    dialog.pilot.setChecked(True)
+    assert dialog.begin.isEnabled()
+    chosen = dialog.chosen()
+    assert (chosen.pilot, chosen.windowed) == (True, True)
+    assert chosen.results.name == f"{dialog.facts.protocol.study.name}-pilot"
+    dialog.pilot.setChecked(False)
+    assert not dialog.begin.isEnabled()
+
+
+def test_a_folder_of_another_study_is_refused(dialog, tmp_path):
+    other = tmp_path / "other"
+    other.mkdir()
+    (other / "dataset_description.json").write_text('{"name": "otherstudy"}')
+    dialog.results.setText(str(other))
+    assert not dialog.begin.isEnabled()
+    assert "otherstudy" in dialog.verdict.text()
+
+
+def test_no_seed_no_session(dialog):
+    dialog.seed.setText("")
+    assert not dialog.begin.isEnabled()
+    dialog.seed.setText("12")
+    assert dialog.begin.isEnabled()
+
+
+def test_seeds_are_drawn_anew(dialog):
+    seen = {draw_seed() for _ in range(50)}
+    assert len(seen) > 40
+    assert all(1 <= seed <= MAX_SEED for seed in seen)
+    assert int(dialog.seed.text()) in range(1, MAX_SEED + 1)
+
+
+def test_cancel_creates_nothing(dialog, results, qtbot):
+    dialog.participant.setText("P009")
+    with qtbot.waitSignal(dialog.rejected):
+        qtbot.mouseClick(dialog.cancel, Qt.MouseButton.LeftButton)
+    assert files(results.parent) == []
+
+
+def test_begin_creates_nothing_by_itself_and_gives_what_was_chosen(dialog, results, qtbot):
+    dialog.participant.setText(" P009 ")
+    dialog.session.setValue(3)
+    dialog.seed.setText("4711")
+    dialog.operator.setText("AK")
+    dialog.language.setCurrentIndex(dialog.language.findData("nl"))
+    dialog.device.setCurrentIndex(dialog.device.findData("scripted"))
+    dialog.windowed.setChecked(True)
+    with qtbot.waitSignal(dialog.accepted):
+        qtbot.mouseClick(dialog.begin, Qt.MouseButton.LeftButton)
+    chosen = dialog.chosen()
+    assert (chosen.participant, chosen.session, chosen.seed, chosen.operator) == ("P009", 3, 4711, "AK")
+    assert (chosen.language, chosen.device, chosen.windowed, chosen.screen) == ("nl", "scripted", True, 1)
+    assert chosen.results == results / "rek2024-scripted"
+    assert files(results.parent) == []
+
+
+def test_a_simulated_hand_is_kept_apart_unless_a_folder_was_chosen(dialog, tmp_path):
+    scripted, mouse = dialog.device.findData("scripted"), dialog.device.findData("mouse")
+    dialog.device.setCurrentIndex(scripted)
+    assert dialog.results.text().endswith("rek2024-scripted")
+    dialog.device.setCurrentIndex(mouse)
+    assert dialog.results.text().endswith("rek2024")
+    dialog.results.setText(str(tmp_path / "mine"))
+    dialog.device.setCurrentIndex(scripted)
+    assert dialog.results.text() == str(tmp_path / "mine")
+
+
+def test_enter_begins_only_what_can_begin(dialog, qtbot):
+    dialog.participant.setText("P-9")
+    with qtbot.assertNotEmitted(dialog.accepted):
+        qtbot.keyClick(dialog.participant, Qt.Key.Key_Return)
+    dialog.participant.setText("P9")
+    with qtbot.waitSignal(dialog.accepted):
+        qtbot.keyClick(dialog.participant, Qt.Key.Key_Return)
+
+
+def test_every_field_has_a_name_for_those_who_cannot_see_it(dialog):
+    fields = (dialog.participant, dialog.session, dialog.seed, dialog.operator, dialog.language, dialog.device)
+    assert all(field.accessibleName() for field in (*fields, dialog.screen_choice, dialog.results))
+
+
+def begun_with(qtbot, results, **settings):
+    made = NewSessionDialog(study_facts("rek2024"), results, machine=MachineSettings(**settings))
+    qtbot.addWidget(made)
+    made.open()
+    return made
+
+
+def test_a_session_begins_with_what_is_set_for_this_machine(qtbot, results, tmp_path, monkeypatch):
+    screens = tuple(ScreenShown(n, name, 1920, 1080, 60.0, 1.0, 0, 0) for n, name in ((1, "A"), (2, "B"), (3, "C")))
+    monkeypatch.setattr(new_session_dialog, "screens_shown", lambda: screens)
+    firmware = tmp_path / "firmware.bin"
+    firmware.write_bytes(b"x")
+    set_here = {"device": "falcon", "screen": "B", "screen_number": 2, "firmware": str(firmware), "operator": "AK"}
+    made = begun_with(qtbot, results, **set_here)
+    assert made.chosen().operator == "AK"
+    assert made.firmware.isVisible()
+    chosen = made.chosen()
+    assert (chosen.device, chosen.screen, chosen.firmware) == ("falcon", 2, firmware)
+    made.device.setCurrentIndex(made.device.findData("mouse"))
+    assert not made.firmware.isVisible()
+    assert made.chosen().firmware is None
+
+
+def test_a_falcon_by_its_serial_number_can_be_preferred_and_nobody_knows_a_hammer(qtbot, results):
+    assert begun_with(qtbot, results, device="falcon:FT123").chosen().device == "falcon:FT123"
+    assert begun_with(qtbot, results, device="scripted").chosen().results.name == "rek2024-scripted"
+    assert begun_with(qtbot, results, device="hammer").chosen().device == "mouse"
+
+
+def test_firmware_that_is_not_there_is_refused_as_it_is_typed(qtbot, results, tmp_path):
+    made = begun_with(qtbot, results, device="falcon", firmware=str(tmp_path / "gone.bin"))
+    assert not made.begin.isEnabled()
+    assert "gone.bin" in made.verdict.text()
+    made.firmware.clear()
+    assert made.begin.isEnabled()
+    assert made.chosen().firmware is None
+
+
+def test_enter_presses_the_button_that_has_the_keyboard_and_no_other(dialog, qtbot):
+    dialog.cancel.setFocus()
+    with qtbot.waitSignal(dialog.rejected):
+        qtbot.keyClick(dialog.cancel, Qt.Key.Key_Return)
+
+
+def test_enter_in_a_field_begins(dialog, qtbot):
+    with qtbot.waitSignal(dialog.accepted):
+        qtbot.keyClick(dialog.participant, Qt.Key.Key_Return)
+
+
+def test_the_foot_stays_on_a_small_screen_and_every_question_is_reached(dialog, results, qtbot):
+    class Small:
+        def availableSize(self):  # noqa: N802 - Qt's name
+            return QSize(1024, 640)
+
+    dialog.screen = Small
+    use(results, "P001")
+    dialog.device.setCurrentIndex(dialog.device.findData("falcon"))
+    dialog.participant.setText("P001")
+    settle(qtbot, dialog)
+    dialog.show()
+    QApplication.processEvents()
+    assert dialog.height() <= 640 - 60
+    assert dialog.rect().contains(dialog.begin.mapTo(dialog, dialog.begin.rect().bottomRight()))
+    dialog.seed.setFocus()
+    for _ in range(12):
+        qtbot.keyClick(QApplication.focusWidget(), Qt.Key.Key_Tab)
+        at = QApplication.focusWidget()
+        assert at.visibleRegion().boundingRect() == at.rect()

@@ -1,0 +1,348 @@
+"""Home: cards, sessions, and the ways into a session or a rehearsal."""
+
+from __future__ import annotations
+
+import pytest
+from PySide6.QtCore import QProcess, Qt
+from PySide6.QtGui import QAccessible, QFontMetrics
+from PySide6.QtWidgets import QPushButton
+
+from study_app.devices.backends import NONE, Backend
+from study_app.gui.home.main_window import LEAST, MainWindow
+from study_app.gui.home.rehearsal_dialog import RehearsalDialog
+from study_app.gui.home.study_cards import BrokenCard, StudyCard
+from study_app.gui.home.view import HomePlace
+from study_app.gui.theme.theme import DARK, font
+from study_app.gui.widgets.row_table import GAP
+from study_app.protocol.load import load, source_bytes
+from study_app.store.exclusions import exclude
+from study_app.store.folders import rehearsal_folder
+from study_app.store.sessions.begin import begin
+from study_app.store.workstation import MachineSettings
+from study_app.viewmodels.device_list import devices_shown
+from study_app.viewmodels.home import study_facts
+
+# The platform without a screen cannot limit or raise windows, and says so.
+
+
+def hold(folder, participant, *, simulated=False):
+    with begin(
+        folder,
+        load("demo"),
+        source_bytes("demo"),
+        participant,
+        seed=1,
+        operator="",
+        language="en",
+        device={"name": "mouse"},
+        screens={},
+        simulated=simulated,
+    ) as store:
+        store.finish("completed")
+
+
+@pytest.fixture
+def results(tmp_path):
+    folder = tmp_path / "results"
+    hold(folder / "demo", "P001")
+    return folder
+
+
+def open_home(qtbot, results, size=None):
+    window = MainWindow({"home": lambda: HomePlace(results)})
+    qtbot.addWidget(window)
+    if size is not None:
+        window.resize(size)
+    window.show()
+    home = window.place("home")
+    home.main = window  # or it would be collected here
+    qtbot.waitUntil(lambda: not home.reading and home.sessions.where.text() != "")
+    return home
+
+
+@pytest.fixture
+def home(qtbot, results):
+    return open_home(qtbot, results)
+
+
+def cell(home, row, heading, role=Qt.ItemDataRole.AccessibleTextRole):
+    """Return what a cell of the table of sessions says."""
+    model = home.sessions.rows.table.model()
+    across = Qt.Orientation.Horizontal
+    column = [model.headerData(at, across) for at in range(model.columnCount())].index(heading)
+    return model.index(row, column).data(role)
+
+
+def study_cards(home):
+    return [card for card in home.grid.cards if isinstance(card, StudyCard)]
+
+
+def test_every_protocol_has_a_card_and_one_is_the_next_step(home):
+    cards = study_cards(home)
+    assert {card.facts.protocol.study.name for card in cards} >= {"rek2024", "demo"}
+    assert [card.new.property("role") for card in cards].count("primary") == 1
+
+
+def test_sessions_are_listed_with_status_and_answers(home):
+    assert cell(home, 0, "Status") == "Complete"
+    assert cell(home, 0, "Answers") == "0 of 8"
+    demo = next(card for card in study_cards(home) if card.facts.protocol.study.name == "demo")
+    assert demo.held.text() == "1 session, 1 complete"
+
+
+def test_participants_pilots_simulated_and_sample_sessions_are_shown_apart(qtbot, tmp_path):
+    hold(tmp_path / "demo", "P001")
+    hold(tmp_path / "demo-rehearsal-1", "P002", simulated=True)
+    hold(tmp_path / "sample-demo", "P003", simulated=True)
+    home = open_home(qtbot, tmp_path)
+    kinds = home.sessions.kind
+    said = [kinds.itemText(at) for at in range(kinds.count())]
+    assert said == ["Participants (1)", "Pilot (0)", "Simulated (1)", "Sample (1)", "All (3)"]
+    shown = {}
+    for at, words in enumerate(said):
+        kinds.setCurrentIndex(at)
+        shown[words.split()[0]] = sorted(one.participant for one in home.sessions.shown)
+    ids = {"Participants": ["P001"], "Pilot": [], "Simulated": ["P002"], "Sample": ["P003"]}
+    assert shown == ids | {"All": ["P001", "P002", "P003"]}
+
+
+def test_a_fresh_clone_greets_with_no_session_and_says_what_is_not_shown(qtbot, tmp_path):
+    hold(tmp_path / "sample-demo", "P001", simulated=True)
+    home = open_home(qtbot, tmp_path)
+    assert home.sessions.shown == ()
+    assert home.sessions.none.isVisible()
+    assert home.sessions.none.text().endswith("Not shown: 1 sample session.")
+
+
+def test_the_sessions_are_a_table_to_a_screen_reader(home):
+    table = QAccessible.queryAccessibleInterface(home.sessions.rows.table)
+    assert table.role() == QAccessible.Role.Table
+    assert table.text(QAccessible.Text.Name) == "Sessions"
+    inside = [table.child(at) for at in range(table.childCount())]
+    roles = {QAccessible.Role.ColumnHeader: [], QAccessible.Role.Cell: []}
+    for part in inside:
+        if part.role() in roles:
+            roles[part.role()].append(part.text(QAccessible.Text.Name))
+    heads, cells = roles.values()
+    assert heads == ["Participant", "Study", "Started", "Status", "Validity", "Answers"]
+    assert (cells[0], *cells[3:]) == ("P001", "Complete", "Open", "0 of 8")
+
+
+def test_a_session_is_opened_by_the_keyboard_a_double_click_and_a_button(home, qtbot):
+    table, asked = home.sessions.rows.table, []
+    home.sessions.open_asked.connect(lambda facts: asked.append(facts.participant))
+    assert not home.sessions.details.isEnabled()
+    table.setFocus()
+    qtbot.keyClick(table, Qt.Key.Key_Down)
+    qtbot.keyClick(table, Qt.Key.Key_Return)
+    middle = table.visualRect(table.model().index(0, 1)).center()
+    qtbot.mouseClick(table.viewport(), Qt.MouseButton.LeftButton, pos=middle)
+    qtbot.mouseDClick(table.viewport(), Qt.MouseButton.LeftButton, pos=middle)
+    qtbot.mouseClick(home.sessions.details, Qt.MouseButton.LeftButton)
+    assert asked == ["P001"] * 3
+
+
+def test_a_simulated_session_says_so_in_full_in_the_smallest_window(qtbot, tmp_path):
+    hold(tmp_path / "demo", "P001", simulated=True)
+    home = open_home(qtbot, tmp_path, LEAST)
+    home.sessions.show_kind("simulated")
+    assert cell(home, 0, "Study") == "demo, simulated"
+    table = home.sessions.rows.table
+
+    def whole():
+        room = table.columnWidth(1) - 2 * GAP
+        for words, face in (("demo", font("label", weight=400)), ("simulated", font("small"))):
+            assert QFontMetrics(face).horizontalAdvance(words) <= room
+        assert sum(table.columnWidth(at) for at in range(6)) <= table.viewport().width()
+
+    qtbot.waitUntil(whole)
+
+
+def test_an_excluded_session_is_not_called_valid(qtbot, tmp_path):
+    hold(tmp_path / "demo", "P001")
+    hold(tmp_path / "demo", "P002")
+    exclude(tmp_path / "demo", "P001", 1, by="AB", reason="fell asleep")
+    home = open_home(qtbot, tmp_path)
+    rows = {one.participant: row for row, one in enumerate(home.sessions.shown)}
+    assert (cell(home, rows["P001"], "Validity"), cell(home, rows["P002"], "Validity")) == ("Excluded", "Open")
+    assert "fell asleep" in cell(home, rows["P001"], "Validity", Qt.ItemDataRole.ToolTipRole)
+
+
+def test_an_empty_results_folder_says_so(qtbot, tmp_path):
+    home = open_home(qtbot, tmp_path / "none")
+    home.show_sessions()
+    assert not home.sessions.none.isHidden()
+    assert home.sessions.shown == ()
+    assert not (tmp_path / "none").exists()
+
+
+def test_new_session_opens_the_questions_and_passes_the_answers_on(home, qtbot):
+    card = study_cards(home)[0]
+    qtbot.mouseClick(card.new, Qt.MouseButton.LeftButton)
+    with qtbot.waitSignal(home.session_asked) as asked:
+        qtbot.mouseClick(home.dialog.begin, Qt.MouseButton.LeftButton)
+    assert asked.args[0].source == card.facts.source
+    assert asked.args[0].participant == "P001"
+
+
+def test_a_protocol_opened_from_elsewhere_gets_a_card(home, tmp_path, monkeypatch):
+    own = tmp_path / "own.toml"
+    own.write_bytes(source_bytes("demo").replace(b'name = "demo"', b'name = "own"'))
+    chosen = [(str(own), ""), (str(tmp_path / "broken.toml"), "")]
+    (tmp_path / "broken.toml").write_text("format = 1\n")
+    monkeypatch.setattr("study_app.gui.home.view.QFileDialog.getOpenFileName", lambda *_arguments: chosen.pop(0))
+    home.open_protocol.click()
+    assert study_cards(home)[0].facts.protocol.study.name == "own"
+    home.open_protocol.click()
+    assert isinstance(home.grid.cards[0], BrokenCard)
+
+
+def test_the_theme_changes(home, qtbot):
+    rail = home.main.rail
+    qtbot.mouseClick(rail.switch, Qt.MouseButton.LeftButton)
+    assert home.sessions.rows.table.theme is DARK
+    assert rail.switch.text() == "Light theme"
+
+
+def test_a_small_window_cuts_nothing_off_sideways(home, qtbot):
+    window = home.main
+    window.resize(LEAST)
+    inside, seen = home._area.widget(), home._area.viewport()
+
+    def fits():
+        """One round of events need not lay out what the new size asks for: other events may come first."""
+        assert window.size() == LEAST
+        assert inside.width() <= seen.width()
+        assert inside.minimumSizeHint().width() <= seen.width()
+
+    qtbot.waitUntil(fits)
+
+
+def test_no_button_is_dead(home):
+    home.show_studies()
+    for button in home.main.findChildren(QPushButton):
+        assert button.receivers("2clicked(bool)") or button.receivers("2clicked()"), button.text()
+
+
+def test_rehearsals_get_a_folder_of_their_own(tmp_path):
+    assert rehearsal_folder(tmp_path, "demo").name == "demo-rehearsal-1"
+    (tmp_path / "demo-rehearsal-1").mkdir()
+    assert rehearsal_folder(tmp_path, "demo").name == "demo-rehearsal-2"
+
+
+def test_a_failed_rehearsal_says_why_and_stays(qtbot, tmp_path, monkeypatch):
+    dialog = RehearsalDialog(study_facts("demo"), tmp_path)
+    qtbot.addWidget(dialog)
+    dialog.open()
+    monkeypatch.setattr("study_app.gui.home.rehearsal_dialog.ARGUMENTS", ("-c", "import sys; sys.exit('no room left')"))
+    with qtbot.waitSignal(dialog.process.finished, timeout=20_000):
+        qtbot.mouseClick(dialog.start, Qt.MouseButton.LeftButton)
+    assert dialog.isVisible()
+    assert dialog.said.text() == "no room left"
+
+
+def test_a_rehearsal_counts_participants_and_leads_to_its_results(qtbot, tmp_path, monkeypatch):
+    dialog = RehearsalDialog(study_facts("demo"), tmp_path)
+    qtbot.addWidget(dialog)
+    dialog.open()
+    dialog.participants.setValue(2)
+    said = "print('R1: 8 responses (simulated)', flush=True); input(); print('R2: 8 responses (simulated)')"
+    monkeypatch.setattr("study_app.gui.home.rehearsal_dialog.ARGUMENTS", ("-c", said))
+    qtbot.mouseClick(dialog.start, Qt.MouseButton.LeftButton)
+    qtbot.waitUntil(lambda: dialog.progress.value() == 1, timeout=20_000)
+    assert dialog.said.text() == "1 of 2: R1: 8 responses (simulated)"
+    assert (dialog.progress.minimum(), dialog.progress.maximum()) == (0, 2)
+    with qtbot.waitSignal(dialog.process.finished, timeout=20_000):
+        dialog.process.write(b"\n")
+    assert dialog.isVisible()
+    assert str(dialog.folder) in dialog.said.text()
+    assert dialog.start.text() == "Open results"
+    with qtbot.waitSignal(dialog.accepted):
+        qtbot.mouseClick(dialog.start, Qt.MouseButton.LeftButton)
+
+
+@pytest.mark.parametrize("at", ["participants", "seed", "start", "dialog"])
+def test_enter_begins_the_rehearsal_wherever_the_keyboard_is(qtbot, tmp_path, monkeypatch, at):
+    dialog = RehearsalDialog(study_facts("demo"), tmp_path)
+    qtbot.addWidget(dialog)
+    dialog.open()
+    qtbot.waitUntil(dialog.isActiveWindow)
+    monkeypatch.setattr("study_app.gui.home.rehearsal_dialog.ARGUMENTS", ("-c", "import time; time.sleep(600)"))
+    pressed = dialog if at == "dialog" else getattr(dialog, at)
+    pressed.setFocus()
+    with qtbot.waitSignal(dialog.process.started, timeout=20_000):
+        qtbot.keyClick(pressed, Qt.Key.Key_Return)
+    dialog.end()
+    assert dialog.process.state() == QProcess.ProcessState.NotRunning
+
+
+def test_enter_on_cancel_cancels(qtbot, tmp_path):
+    dialog = RehearsalDialog(study_facts("demo"), tmp_path)
+    qtbot.addWidget(dialog)
+    dialog.open()
+    qtbot.waitUntil(dialog.isActiveWindow)
+    dialog.cancel.setFocus()
+    qtbot.keyClick(dialog.cancel, Qt.Key.Key_Return)
+    assert not dialog.isVisible()
+    assert dialog.process.state() == QProcess.ProcessState.NotRunning
+
+
+def test_cancelling_a_rehearsal_stops_it(qtbot, tmp_path, monkeypatch):
+    dialog = RehearsalDialog(study_facts("demo"), tmp_path)
+    qtbot.addWidget(dialog)
+    dialog.open()
+    monkeypatch.setattr("study_app.gui.home.rehearsal_dialog.ARGUMENTS", ("-c", "import time; time.sleep(600)"))
+    with qtbot.waitSignal(dialog.process.started, timeout=20_000):
+        qtbot.mouseClick(dialog.start, Qt.MouseButton.LeftButton)
+    with qtbot.waitSignal(dialog.rejected):
+        qtbot.mouseClick(dialog.cancel, Qt.MouseButton.LeftButton)
+        assert dialog.isVisible()  # and nobody waits
+    assert dialog.process.state() == QProcess.ProcessState.NotRunning
+    assert not dialog.isVisible()
+
+
+def test_a_rehearsal_that_does_not_listen_is_killed(qtbot, tmp_path, monkeypatch):
+    dialog = RehearsalDialog(study_facts("demo"), tmp_path)
+    qtbot.addWidget(dialog)
+    dialog.open()
+    deaf = (
+        "import signal, time; signal.signal(signal.SIGTERM, signal.SIG_IGN); print('deaf', flush=True); time.sleep(600)"
+    )
+    monkeypatch.setattr("study_app.gui.home.rehearsal_dialog.ARGUMENTS", ("-c", deaf))
+    monkeypatch.setattr("study_app.gui.home.rehearsal_dialog.PATIENCE_MS", 50)
+    dialog.start.click()
+    qtbot.waitUntil(lambda: dialog.said.text() == "0 of 5: deaf", timeout=20_000)
+    with qtbot.waitSignal(dialog.rejected):
+        dialog.close()
+    assert dialog.process.state() == QProcess.ProcessState.NotRunning
+
+
+def test_a_rehearsal_that_cannot_be_run_says_so(qtbot, tmp_path, monkeypatch):
+    dialog = RehearsalDialog(study_facts("demo"), tmp_path)
+    qtbot.addWidget(dialog)
+    dialog.open()
+    monkeypatch.setattr("study_app.gui.home.rehearsal_dialog.sys.executable", str(tmp_path / "nothing"))
+    dialog.start.click()
+    qtbot.waitUntil(lambda: dialog.cancel.text() == "Close")
+    assert dialog.said.text() not in ("", "Rehearsing …")
+
+
+def test_the_end_of_the_program_ends_a_rehearsal(home, qtbot, monkeypatch):
+    monkeypatch.setattr("study_app.gui.home.rehearsal_dialog.ARGUMENTS", ("-c", "import time; time.sleep(600)"))
+    home.ask_for_rehearsal(study_facts("demo"))
+    dialog = home.dialog
+    with qtbot.waitSignal(dialog.process.started, timeout=20_000):
+        dialog.start.click()
+    home.end()
+    assert dialog.process.state() == QProcess.ProcessState.NotRunning
+
+
+def test_the_preferred_device_is_shown_as_it_was_found_and_sessions_begin_with_it(home, qtbot):
+    (falcon,) = devices_shown([Backend("falcon", "libusb 1.0", NONE, "felt, up to 8 N", "plug its cable in")])
+    home.show_machine(MachineSettings(device="falcon"), falcon)
+    card = home.device
+    assert (card.name.text(), card.icon.name, card.state.word) == ("Novint Falcon", "device", "Not connected")
+    assert (card.about.text(), card.why.text()) == ("Felt, up to 8 N.", "Plug its cable in.")
+    qtbot.mouseClick(study_cards(home)[0].new, Qt.MouseButton.LeftButton)
+    assert home.dialog.chosen().device == "falcon"
+    home.dialog.reject()

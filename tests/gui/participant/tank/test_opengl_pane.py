@@ -1,0 +1,102 @@
+"""The tank on an OpenGL surface, on a virtual display: the same picture, a swap for every frame, frames in step."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from study_app.gui.display.opengl import IN_SOFTWARE, has_card, renderer
+from tests.real_windows import needs_display, virtual_display
+
+ROOT = Path(__file__).resolve().parents[4]
+FRAMES = 30
+
+# Shows the same views in a window with and one without the surface, and prints what came of it.
+SCRIPT = f"""
+import json, os, sys
+import numpy as np
+from PySide6.QtCore import QEventLoop, QTimer
+from PySide6.QtWidgets import QApplication
+from study_app.gui.display.frame_clock import Frames
+from study_app.gui.display.opengl import has_card, renderer
+from study_app.gui.participant.tank_widget import TankWidget
+from study_app.protocol.wording.languages import words
+from tests.gui.small import task_page, view
+from tests.gui.participant.test_tank_widget import pixels
+
+sys.excepthook = lambda *error: (sys.__excepthook__(*error), os._exit(1))
+app = QApplication([])
+told = {{"renderer": renderer(), "card": has_card(), "painted": [], "swaps": 0}}
+if told["renderer"] is None:
+    print(json.dumps(told)); sys.exit()
+tanks = [TankWidget(task_page(), words("en"), on_card=on_card) for on_card in (False, True)]
+plain, tank = tanks
+for one in tanks:
+    one.resize(960, 640)
+    one.show()
+frames = Frames(60.0)
+loop = QEventLoop()
+tank.painted.connect(told["painted"].append)
+tank.swapped.connect(frames.swapped)
+def swapped():
+    told["swaps"] += 1
+tank.swapped.connect(swapped)
+shown = []
+def due():
+    told["locked"] = frames.locked
+    if len(told["painted"]) == {FRAMES}:
+        frames.stop(); loop.quit(); return
+    place = (0.001 * len(told["painted"]), 0.0, 0.0)
+    for one in tanks:
+        one.show_view(view(place, sample_ns=len(told["painted"])))
+frames.due.connect(due)
+frames.start()
+QTimer.singleShot(60_000, loop.quit)
+loop.exec()
+seen, drawn = pixels(tank.grab().toImage()).astype(int), pixels(plain.grab().toImage()).astype(int)
+told["apart"] = [float((np.abs(seen - drawn) > 60).any(2).mean()), float(np.abs(seen - drawn).mean())]
+print(json.dumps(told))
+"""
+
+
+@pytest.fixture(scope="module")
+def told():
+    with virtual_display() as display:
+        environment = os.environ | {"DISPLAY": display, "QT_QPA_PLATFORM": "xcb", "PYTHONPATH": str(ROOT)}
+        done = subprocess.run(
+            [sys.executable, "-c", SCRIPT], env=environment, cwd=ROOT, capture_output=True, text=True, check=False
+        )
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout.splitlines()[-1])
+    if found["renderer"] is None:
+        pytest.skip("no OpenGL on this display")
+    return found
+
+
+@needs_display
+@pytest.mark.xvfb
+class TestOnASurface:
+    def test_the_picture_is_the_same(self, told):
+        share, mean = told["apart"]
+        assert mean < 1.0
+        assert share < 0.005  # edges may be smoothed differently
+
+    def test_every_view_is_told_of_once_after_its_swap(self, told):
+        assert told["painted"] == list(range(FRAMES))
+        assert told["swaps"] >= FRAMES
+
+    def test_frames_follow_the_swaps(self, told):
+        assert told["locked"]
+
+    def test_what_draws_in_software_is_no_card(self, told):
+        assert told["card"] == (not any(word in told["renderer"].lower() for word in IN_SOFTWARE))
+
+
+def test_without_a_screen_there_is_no_card(qapp):
+    assert renderer() is None
+    assert not has_card()

@@ -1,0 +1,33 @@
+"""The note while a session is being made ready."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+
+from study_app.gui.preflight.startup_window import OpeningWindow
+
+
+@pytest.fixture
+def opening(qtbot: Any) -> OpeningWindow:
+    made = OpeningWindow("A first look", "Participant P001")
+    qtbot.addWidget(made)
+    made.show()
+    qtbot.waitExposed(made)
+    return made
+
+
+def test_escape_goes_back_whichever_part_has_the_keyboard(opening: OpeningWindow, qtbot: Any) -> None:
+    opening.cancel.setFocus()
+    with qtbot.waitSignal(opening.cancelled):
+        QTest.keyPress(opening.windowHandle(), Qt.Key.Key_Escape)
+    assert not opening.isVisible()
+
+
+def test_what_is_ready_is_not_cancelled(opening: OpeningWindow, qtbot: Any) -> None:
+    with qtbot.assertNotEmitted(opening.cancelled):
+        opening.finish()
+    assert not opening.isVisible()

@@ -1,0 +1,163 @@
+"""A session's page: what it reads of a folder, what it shows, and what leaving out does there."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QLabel, QPushButton, QWidget
+
+from study_app.gui.sessions.session_page import SessionPage
+from study_app.gui.theme.theme import LIGHT
+from study_app.protocol.load import load, source_bytes
+from study_app.session.simulated.rehearsal import rehearse
+from study_app.store.blinded.unblinding import unblind
+from study_app.store.exclusions import exclusions
+from study_app.store.folders import StudyFolder
+from study_app.store.sessions.begin import begin
+from study_app.viewmodels.session_record import MOTION_HIDDEN, read_record
+from study_app.viewmodels.sessions import sessions
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """A rehearsed session of the demo with its recordings."""
+    folder = tmp_path_factory.mktemp("whole") / "demo"
+    rehearse("demo", participants=1, seed=1, results=folder)
+    return folder
+
+
+@pytest.fixture
+def study(whole, tmp_path):
+    return Path(shutil.copytree(whole, tmp_path / "results" / "demo"))
+
+
+def measured(study):
+    """Hold a session with a trial that kept the limits and one that broke two, and a note on it."""
+    with begin(
+        study, load("demo"), source_bytes("demo"), "P007", seed=1, operator="AK", language="en",
+        device={"name": "mouse"}, screens={}, simulated=False,
+    ) as store:  # fmt: skip
+        which = {"block": "feeling", "phase": "main", "part": 1, "of": 2}
+        for trial, (gap_ms, late_ms) in enumerate(((3.0, 0.2), (41.26, 2.5)), start=1):
+            store.append("trial_started", trial=trial, attempt=1, index=trial, code=f"L{trial}", **which)
+            fields = {"worst_gap_ms": gap_ms, "lateness_p99_ms": late_ms, "first_frame_gap_ms": 12.0}
+            store.append("trial_ended", trial=trial, attempt=1, outcome="complete", **fields)
+        store.append("note", kind="note", text="phone rang")
+        store.finish("completed")
+    return StudyFolder(study).session("P007", 1).path
+
+
+def page_of(qtbot, study, participant=None):
+    window = QWidget()
+    qtbot.addWidget(window)
+    facts = next(one for one in sessions(study.parent, {}) if participant in (None, one.participant))
+    opened = []
+    page = SessionPage(window, LIGHT, facts, opened.append)
+    page.opened, page.window_below = opened, window
+    page.show()
+    qtbot.addWidget(page)
+    qtbot.waitUntil(lambda: page.record is not None)
+    return page
+
+
+def said(page, row, column):
+    return page.model.index(row, column).data()
+
+
+def test_a_page_says_which_trial_broke_which_limit_and_what_out_of_limits_means(qtbot, tmp_path):
+    measured(tmp_path / "demo")
+    page = page_of(qtbot, tmp_path / "demo")
+    assert page.validity.word == "Out of limits"
+    assert page.limits.text().startswith("Out of limits: 1 of 2 measured trials broke a limit of the study.")
+    assert "still count" in page.limits.text()
+    assert [said(page, row, 3) for row in range(2)] == ["Valid", "Out of limits"]
+    page.trials.selectRow(1)
+    assert page.trial.text() == (
+        "Trial 2: lateness of ticks (99th percentile): 2.5 ms, limit 2 ms; "
+        "longest time between two ticks: 41.3 ms, limit 20 ms."
+    )
+    assert page.notes.text().endswith("trial 2: phone rang")
+    assert "journal.jsonl" in page.files.text()
+    page.folder.click()
+    assert page.opened == [page.facts.folder]
+
+
+def test_choices_that_were_not_confirmed_stay_visible(qtbot, tmp_path):
+    with begin(
+        tmp_path / "demo", load("demo"), source_bytes("demo"), "P007", seed=1, operator="", language="en",
+        device={"name": "mouse"}, screens={}, simulated=False,
+    ) as store:  # fmt: skip
+        which = {"block": "feeling", "phase": "main", "part": 1, "of": 2}
+        for trial in (1, 2):
+            store.append("trial_started", trial=trial, attempt=1, index=trial, code=f"L{trial}", **which)
+            store.append("trial_ended", trial=trial, attempt=1, outcome="complete")
+            store.append("choice", trial=trial, item="feels_liquid", value=3)
+            store.append("choice", trial=trial, item="feels_liquid", value=5)
+            if trial == 1:
+                given = {"item": "feels_liquid", "number": 1, "value": 5, "changes": 1}
+                times = {"onset_s": 0.0, "first_s": 0.1, "last_s": 0.2}
+                store.append("responses", trial=1, attempt=1, items=[given | times])
+        store.finish("aborted")
+    page = page_of(qtbot, tmp_path / "demo")
+    assert [said(page, row, 4) for row in range(2)] == ["1", "0 + 1?"]
+    page.trials.selectRow(1)
+    assert page.trial.text().endswith("Chosen and not confirmed, so in no table: feels_liquid: 5.")
+
+
+def test_a_page_shows_the_motion_of_a_trial_once_it_may_be_seen(qtbot, study):
+    sealed = page_of(qtbot, study)
+    assert sealed.motion.accessibleDescription() == MOTION_HIDDEN
+    assert "once the study is unblinded" in sealed.limits.text()
+    unblind(study, by="AK", reason="over")
+    page = page_of(qtbot, study)
+    qtbot.waitUntil(lambda: page.motion.points > 100)
+    assert page.motion.accessibleDescription().startswith("Position of the hand over ")
+    row = next(row for row, one in enumerate(page.model.trials) if one.number != page.chosen.number)
+    page.trials.selectRow(row)
+    assert page.motion.points == 0, "another trial's motion is not shown meanwhile"
+    qtbot.waitUntil(lambda: page.motion.points > 100)
+
+
+def test_no_page_names_a_condition_of_a_sealed_study(study):
+    text = repr(read_record(next(iter(StudyFolder(study).sessions())).path))
+    protocol = load("demo")
+    assert [name for name in protocol.conditions if re.search(rf"\b{name}\b", text)] == []
+
+
+def test_a_trial_is_left_out_and_taken_back(qtbot, study):
+    page = page_of(qtbot, study)
+    changed = []
+    page.changed.connect(lambda: changed.append(True))
+    page.leave_out.click()
+    dialog = page.decision
+    dialog.trial.setCurrentIndex(1)
+    number = dialog.trial.currentData()
+    dialog.by.setText("AK")
+    dialog.reason.setText("phone rang")
+    qtbot.mouseClick(dialog.go_on, Qt.MouseButton.LeftButton)
+    qtbot.waitUntil(lambda: bool(changed))
+    (one,) = exclusions(study)
+    assert (one.trial, one.reason) == (number, "phone rang")
+    assert "phone rang" in page.lines[0].findChild(QLabel).text()
+    row = next(row for row, trial in enumerate(page.model.trials) if trial.number == number)
+    assert said(page, row, 3) == "Excluded"
+    qtbot.mouseClick(page.lines[0].findChild(QPushButton), Qt.MouseButton.LeftButton)
+    page.decision.by.setText("BC")
+    page.decision.reason.setText("it was another phone")
+    qtbot.mouseClick(page.decision.go_on, Qt.MouseButton.LeftButton)
+    qtbot.waitUntil(lambda: len(changed) == 2)
+    assert exclusions(study) == ()
+    assert page.lines == []
+    assert said(page, row, 3) != "Excluded"
+
+
+def test_a_session_that_cannot_be_read_says_why(qtbot, tmp_path):
+    folder = measured(tmp_path / "demo")
+    page = page_of(qtbot, tmp_path / "demo")
+    (folder / "journal.jsonl").unlink()
+    page.read()
+    qtbot.waitUntil(lambda: "journal" in page.limits.text())

@@ -1,0 +1,196 @@
+"""The machine's place: it shows what is set, says what is to be changed, and changes nothing itself."""
+
+from __future__ import annotations
+
+import pytest
+from PySide6.QtCore import QPoint, QSize, Qt
+from PySide6.QtGui import QFontMetricsF
+from PySide6.QtWidgets import QAbstractButton, QFileDialog, QLabel
+
+from study_app.gui.display.screens import ScreenShown
+from study_app.gui.settings import view as module
+from study_app.gui.settings.view import MachinePlace
+from study_app.gui.theme.theme import DARK, font
+from study_app.gui.theme.themed import wear
+from study_app.store.workstation import DEFAULTS, STATEMENT_X_HEIGHT_PX, DisplayOffset, MachineSettings
+
+ONE = ScreenShown(1, "eDP-1", 1366, 768, 60.0, 1.0, 344.0, 194.0)
+TWO = ScreenShown(2, "DP-1", 1920, 1080, 144.0, 1.0, 527.0, 296.0)
+
+
+@pytest.fixture
+def place(qtbot, monkeypatch):
+    monkeypatch.setattr(module, "screens_shown", lambda: (ONE, TWO))
+    made = MachinePlace()
+    qtbot.addWidget(made)
+    made.resize(1300, 760)
+    show(made, DEFAULTS)
+    made.show()
+    return made
+
+
+def show(place, settings, undo=""):
+    place.show_settings(settings, folder="/there", undo=undo, kept_in="/there/machine.json")
+
+
+def type_into(qtbot, field, text):
+    field.setFocus()
+    field.selectAll()
+    qtbot.keyClicks(field, text)
+    qtbot.keyClick(field, Qt.Key.Key_Return)
+
+
+def test_screens_are_listed_with_size_rate_and_scaling_and_the_last_is_the_participants(place):
+    assert [radio.isChecked() for radio in place.screens.radios] == [False, True]
+    said = [one.text() for one in place.screens.findChildren(QLabel)]
+    assert any("1920 × 1080, 144 Hz, 100\u202f%" in words and "527 × 296 mm" in words for words in said)
+    assert not place.screens.note.isVisible()
+
+
+def test_another_screen_is_chosen_by_name_and_number(place, qtbot):
+    with qtbot.waitSignal(place.changed) as changed:
+        qtbot.keyClick(place.screens.radios[0], Qt.Key.Key_Space)
+    assert changed.args == [{"screen": "eDP-1", "screen_number": 1}]
+    show(place, MachineSettings(screen="eDP-1", screen_number=1))
+    assert [radio.isChecked() for radio in place.screens.radios] == [True, False]
+    assert place.participants is ONE
+
+
+def test_a_screen_that_is_gone_is_named(place):
+    show(place, MachineSettings(screen="HDMI-7", screen_number=2))
+    assert "HDMI-7 is not connected" in place.screens.note.text()
+    assert place.participants is TWO
+
+
+def test_the_distance_is_typed_and_the_words_grow(place, qtbot):
+    with qtbot.waitSignal(place.changed) as changed:
+        type_into(qtbot, place.seen.distance.field, "600")
+    assert changed.args == [{"viewing_distance_mm": 600.0}]
+    assert place.seen.sample.scale == 1.0
+    show(place, MachineSettings(viewing_distance_mm=600))
+    assert place.seen.sample.scale == pytest.approx(1.747, abs=0.001)
+    assert "1.75 times as designed" in place.seen.said.text()
+
+
+def test_an_x_of_the_sample_is_as_high_as_the_settings_reckon(qapp):
+    measured = QFontMetricsF(font("statement")).xHeight()
+    assert measured == pytest.approx(STATEMENT_X_HEIGHT_PX, abs=0.3)  # px: the font engine's rounding
+
+
+def test_a_distance_out_of_range_is_refused_and_an_empty_one_forgotten(place, qtbot):
+    show(place, MachineSettings(viewing_distance_mm=600))
+    field = place.seen.distance.field
+    with qtbot.assertNotEmitted(place.changed):
+        type_into(qtbot, field, "6")
+    assert field.state == "refused"
+    assert "200 to 3000 mm" in place.seen.distance.below.text()
+    field.clear()
+    with qtbot.waitSignal(place.changed) as changed:
+        field.setModified(True)
+        qtbot.keyClick(field, Qt.Key.Key_Return)
+    assert changed.args == [{"viewing_distance_mm": None}]
+    assert field.state == ""
+
+
+def test_an_offset_is_that_of_the_participants_screen(place, qtbot):
+    form = place.offset.form
+    qtbot.keyClicks(form.mean, "23.5")
+    with qtbot.waitSignal(place.offset_measured) as measured:
+        qtbot.mouseClick(form.keep, Qt.MouseButton.LeftButton)
+    assert measured.args == [23.5, 0.0, "photodiode", "DP-1"]
+    show(place, MachineSettings(display_offset=DisplayOffset(mean_ms=23.5, screen="DP-1")))
+    with qtbot.waitSignal(place.changed) as changed:
+        qtbot.mouseClick(form.forget, Qt.MouseButton.LeftButton)
+    assert changed.args == [{"display_offset": None}]
+
+
+def test_device_folder_theme_and_sound_are_chosen(place, qtbot, monkeypatch, tmp_path):
+    assert not place.windows.sound.isChecked()
+    with qtbot.waitSignal(place.changed) as changed:
+        qtbot.mouseClick(place.windows.sound, Qt.MouseButton.LeftButton)
+    assert changed.args == [{"sound": True}]
+    assert place.offset.patch.isChecked()
+    with qtbot.waitSignal(place.changed) as changed:
+        qtbot.mouseClick(place.offset.patch, Qt.MouseButton.LeftButton)
+    assert changed.args == [{"photodiode": False}]
+    for choice, value, name in (
+        (place.sessions.device, "falcon", "device"),
+        (place.windows.theme_choice, "dark", "theme"),
+    ):
+        with qtbot.waitSignal(place.changed) as changed:
+            choice.setCurrentIndex(choice.findData(value))
+            choice.activated.emit(choice.currentIndex())
+        assert changed.args == [{name: value}]
+    monkeypatch.setattr(QFileDialog, "getExistingDirectory", lambda *_: str(tmp_path))
+    with qtbot.waitSignal(place.changed) as changed:
+        qtbot.mouseClick(place.sessions.change, Qt.MouseButton.LeftButton)
+    assert changed.args == [{"workspace": str(tmp_path)}]
+    with qtbot.waitSignal(place.go_asked) as going:
+        qtbot.mouseClick(place.sessions.devices, Qt.MouseButton.LeftButton)
+    assert going.args == ["devices"]
+
+
+def test_undo_names_what_it_takes_back(place, qtbot):
+    assert not place.undo.isEnabled()
+    show(place, MachineSettings(sound=True), undo="sound")
+    assert place.undo.text() == "Undo sound"
+    with qtbot.waitSignal(place.undo_asked):
+        qtbot.keyClick(place, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+
+
+@pytest.fixture
+def real_place(qtbot):
+    made = MachinePlace()
+    qtbot.addWidget(made)
+    show(made, DEFAULTS)
+    made.show()
+    yield made
+    made.leave()
+
+
+def test_numbers_come_on_every_screen_and_go_with_the_place(real_place, qtbot):
+    qtbot.mouseClick(real_place.screens.identify, Qt.MouseButton.LeftButton)
+    (number,) = real_place.numbers
+    assert number.isVisible()
+    qtbot.keyClick(number, Qt.Key.Key_Space)
+    assert not number.isVisible()
+    with qtbot.waitSignal(number.destroyed):
+        real_place.leave()
+    assert real_place.numbers == []
+
+
+def test_the_display_test_is_opened_once_and_left_by_esc(real_place, qtbot):
+    qtbot.mouseClick(real_place.screens.test, Qt.MouseButton.LeftButton)
+    test = real_place.test
+    assert test.isVisible()
+    real_place.open_test()
+    assert real_place.test is test
+    qtbot.keyClicks(test.offset.mean, "20")
+    with qtbot.waitSignal(real_place.offset_measured):
+        qtbot.mouseClick(test.offset.keep, Qt.MouseButton.LeftButton)
+    with qtbot.waitSignal(test.left):
+        qtbot.keyClick(test, Qt.Key.Key_Escape)
+    assert real_place.test is None
+
+
+@pytest.mark.parametrize("size", [QSize(952, 640), QSize(1294, 768), QSize(1704, 1080)])
+def test_no_button_is_cut_at_any_size(place, qtbot, size):
+    wear(place, DARK)
+    show(place, MachineSettings(viewing_distance_mm=600), undo="width of the screen")
+    place.resize(size)
+
+    def whole():
+        for one in place.findChildren(QAbstractButton):
+            if one.isVisible() and one.text():
+                assert one.width() >= one.fontMetrics().horizontalAdvance(one.text()), one.text()
+                assert 0 <= one.mapTo(place, QPoint()).x() <= size.width() - one.width()
+
+    qtbot.waitUntil(whole)
+
+
+def test_every_field_has_a_name_for_those_who_cannot_see_it(place):
+    fields = (
+        place.seen.distance.field, place.seen.width_mm.field, place.offset.form.mean, place.offset.form.spread,
+        place.offset.form.how, place.sessions.device, place.windows.theme_choice, *place.screens.radios,
+    )  # fmt: skip
+    assert all(field.accessibleName() for field in fields)

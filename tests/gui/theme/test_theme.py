@@ -1,0 +1,120 @@
+"""Contrast computed by WCAG 2.2, fonts that really are there, icons that paint."""
+
+from __future__ import annotations
+
+import itertools
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QColor, QFontInfo, QFontMetricsF
+from PySide6.QtWidgets import QWidget
+
+from study_app.gui.theme import icons
+from study_app.gui.theme.theme import DARK, LIGHT, PARTICIPANT, TANK, TYPE, Theme, font, load_fonts, stylesheet
+
+THEMES = [LIGHT, DARK, PARTICIPANT]
+
+
+def luminance(colour: str) -> float:
+    """Return the relative luminance of WCAG 2.2."""
+    shares = (QColor(colour).redF(), QColor(colour).greenF(), QColor(colour).blueF())
+    red, green, blue = (s / 12.92 if s <= 0.04045 else ((s + 0.055) / 1.055) ** 2.4 for s in shares)
+    return 0.2126 * red + 0.7152 * green + 0.0722 * blue
+
+
+def contrast(one: str, other: str) -> float:
+    lighter, darker = sorted((luminance(one), luminance(other)), reverse=True)
+    return (lighter + 0.05) / (darker + 0.05)
+
+
+def test_contrast_of_black_and_white_is_21() -> None:
+    assert contrast("#000000", "#FFFFFF") == pytest.approx(21.0)
+
+
+@pytest.mark.parametrize("theme", THEMES, ids=lambda theme: theme.name)
+@pytest.mark.parametrize(
+    ("ink", "ground"),
+    [
+        *itertools.product(("text", "text2", "text3"), ("window", "surface")),
+        *itertools.product(("text", "text2"), ("hover", "selected")),
+        ("accent", "surface"),
+        ("accent", "window"),
+        ("on_accent", "accent"),
+        ("on_accent", "accent_hover"),
+        ("on_stop", "stop"),
+        *itertools.product(("ok", "warn", "bad"), ("surface",)),
+        ("ok", "ok_bg"),
+        ("warn", "warn_bg"),
+        ("bad", "bad_bg"),
+        ("text", "warn_bg"),
+        ("text2", "warn_bg"),
+    ],
+)
+def test_text_reaches_4_5(theme: Theme, ink: str, ground: str) -> None:
+    assert contrast(getattr(theme, ink), getattr(theme, ground)) >= 4.5
+
+
+@pytest.mark.parametrize("theme", THEMES, ids=lambda theme: theme.name)
+@pytest.mark.parametrize("role", ["ctl", "trace_x", "trace_y", "trace_z", "accent"])
+@pytest.mark.parametrize("ground", ["surface", "window"])
+def test_edges_of_controls_and_traces_reach_3(theme: Theme, role: str, ground: str) -> None:
+    assert contrast(getattr(theme, role), getattr(theme, ground)) >= 3.0
+
+
+@pytest.mark.parametrize("role", ["lit", "proxy_light"])
+def test_ring_and_ball_stand_out_from_the_lightest_water(role: str) -> None:
+    assert contrast(getattr(TANK, role), TANK.water_light) >= 3.0
+
+
+def test_participant_values_are_those_that_were_computed() -> None:
+    assert contrast(PARTICIPANT.text, PARTICIPANT.window) == pytest.approx(16.6, abs=0.1)
+    assert contrast(PARTICIPANT.text2, PARTICIPANT.window) == pytest.approx(10.6, abs=0.1)
+    assert contrast(PARTICIPANT.on_accent, PARTICIPANT.accent) == pytest.approx(8.0, abs=0.1)
+
+
+def test_inter_is_the_packages_own_and_has_its_four_weights(qapp: object) -> None:
+    assert "Inter" in load_fonts()
+    for weight in (400, 500, 600, 700):
+        found = QFontInfo(font("body", weight=weight))
+        assert (found.family(), found.weight()) == ("Inter", weight)
+
+
+def test_every_role_of_the_type_scale_has_its_size_and_weight(qapp: object) -> None:
+    for role, step in TYPE.items():
+        made = font(role)
+        assert (made.pixelSize(), made.weight()) == (step.size, step.weight)
+        assert font(role, scale=2).pixelSize() == 2 * step.size
+
+
+def test_tabular_figures_are_equally_wide(qapp: object) -> None:
+    metrics = QFontMetricsF(font("number"))
+    widths = [metrics.horizontalAdvance(digit) for digit in "0123456789"]
+    assert max(widths) - min(widths) < 0.1  # px: the glyphs' own rounding
+    proportional = QFontMetricsF(font("number", tabular=False))
+    assert proportional.horizontalAdvance("11111111") < proportional.horizontalAdvance("00000000")
+
+
+@pytest.mark.parametrize("theme", THEMES, ids=lambda theme: theme.name)
+def test_stylesheet_is_understood_by_qt(qtbot: object, theme: Theme) -> None:
+    widget = QWidget()
+    qtbot.addWidget(widget)  # type: ignore[attr-defined]
+    widget.setProperty("role", "window")
+    widget.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
+    widget.setStyleSheet(stylesheet(theme))
+    assert widget.grab().toImage().pixelColor(5, 5) == QColor(theme.window)
+
+
+@pytest.mark.parametrize("name", sorted(icons.PATHS))
+def test_every_icon_paints_inside_its_square(qapp: object, name: str) -> None:
+    image = icons.icon_pixmap(name, "#FF0000", 24, ratio=2.0).toImage()
+    inked = [
+        (x, y) for x in range(image.width()) for y in range(image.height()) if image.pixelColor(x, y).alpha() > 128
+    ]
+    assert len(inked) > 40
+    assert all(0 < x < 47 and 0 < y < 47 for x, y in inked)
+    assert image.pixelColor(*inked[0]).red() == 255
+
+
+def test_icon_is_sharp_at_150_percent(qapp: object) -> None:
+    made = icons.icon("check", "#000000", 20)
+    assert made.pixmap(made.availableSizes()[0], 1.5).devicePixelRatio() == 1.5

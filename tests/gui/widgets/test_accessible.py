@@ -1,0 +1,116 @@
+"""What a screen reader finds: the participant's window, headings, plots, and the answer that was just chosen."""
+
+from __future__ import annotations
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QAccessible
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QLabel, QWidget
+
+from study_app.gui.lab.plots import ForceCard as LabForceCard
+from study_app.gui.lab.plots import SpeedCard
+from study_app.gui.operator.force_plots import ForceCard
+from study_app.gui.operator.plot_cards import LatenessCard, PositionCard
+from study_app.gui.participant.pages import screen_reader
+from study_app.gui.participant.window import ParticipantWindow
+from study_app.gui.preflight.window import PreflightWindow
+from study_app.gui.sessions.motion_plots import MotionPlot
+from study_app.gui.widgets.labels import label
+from study_app.gui.widgets.plots import Plot
+from study_app.protocol.wording.languages import words
+from tests.gui.small import ManualClock, questionnaire, text_page
+
+
+def told_of(widget):
+    return QAccessible.queryAccessibleInterface(widget)
+
+
+@pytest.fixture
+def participant(qtbot):
+    window = ParticipantWindow(words("en"), clock=ManualClock(), windowed=True)
+    qtbot.addWidget(window)
+    window.may_close = True
+    return window
+
+
+def test_the_participants_window_has_the_role_and_name_of_a_window(participant):
+    window = told_of(participant)
+    assert window.role() == QAccessible.Role.Window
+    assert window.text(QAccessible.Text.Name) == participant.windowTitle()
+
+
+def test_titles_are_headings_and_other_labels_are_not(qtbot, participant):
+    for role in ("display", "title", "title_dense", "card"):
+        made = label("First", role)
+        qtbot.addWidget(made)
+        made.setText("Second")
+        heading = told_of(made)
+        assert (heading.role(), heading.text(QAccessible.Text.Name)) == (QAccessible.Role.Heading, "Second")
+    body = label("Text", "body")
+    qtbot.addWidget(body)
+    assert told_of(body).role() == QAccessible.Role.StaticText
+    participant.show_page(text_page("instructions"))
+    titles = [one for one in participant.findChildren(QLabel) if told_of(one).role() == QAccessible.Role.Heading]
+    assert titles[-1].text() == "Before you begin"
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: LatenessCard(0.002),
+        lambda: PositionCard(0.05, pointer=True),
+        lambda: ForceCard(8.0),
+        lambda: PreflightWindow(2000.0),
+        LabForceCard,
+        SpeedCard,
+    ],
+)
+def test_every_plot_has_a_name_and_a_sentence(qtbot, make):
+    made = make()
+    qtbot.addWidget(made)
+    plots = made.findChildren(Plot)
+    assert plots
+    for plot in plots:
+        told = told_of(plot)
+        assert told.role() == QAccessible.Role.Chart
+        assert told.text(QAccessible.Text.Name)
+        sentence = told.text(QAccessible.Text.Description)
+        assert sentence.endswith(".")
+        assert len(sentence.split()) > 5
+
+
+def test_a_motion_says_its_range(qtbot):
+    plot = MotionPlot()
+    qtbot.addWidget(plot)
+    plot.show_sentence("No recording of this trial.")
+    assert told_of(plot).text(QAccessible.Text.Description) == "No recording of this trial."
+
+
+def test_a_chosen_answer_is_announced_as_checked(participant, monkeypatch):
+    told = []
+
+    def update(event):
+        interface = told_of(event.object())
+        told.append((event.type(), interface.text(QAccessible.Text.Name), bool(interface.state().checked)))
+
+    monkeypatch.setattr(screen_reader.QAccessible, "isActive", lambda: True)
+    monkeypatch.setattr(screen_reader.QAccessible, "updateAccessibility", update)
+    participant.open_on()
+    participant.show_page(questionnaire())
+    row = participant.widget.rows[0]
+    QTest.keyClick(row, Qt.Key.Key_3)
+    assert (QAccessible.Event.Focus, "3 Somewhat disagree", True) in told
+    participant.close()
+
+
+def test_a_role_goes_with_its_widget(qtbot):
+    window = QWidget()
+    qtbot.addWidget(window)
+    for number in range(600):
+        made = label(f"Heading {number}", "card")
+        made.setParent(window)
+        assert told_of(window).child(0).role() == QAccessible.Role.Heading
+        made.setParent(None)
+        made.deleteLater()
+        QTest.qWait(0)

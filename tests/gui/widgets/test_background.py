@@ -1,0 +1,44 @@
+"""Jobs beside the window's thread."""
+
+from __future__ import annotations
+
+import threading
+
+from PySide6.QtCore import QObject
+from PySide6.QtWidgets import QApplication
+
+from study_app.gui.lab import lab_tank
+from study_app.gui.lab.lab_tank import LabTank
+from study_app.gui.widgets.background import Background
+
+
+def test_only_the_newest_of_what_was_asked_for_comes(qtbot):
+    parent = QObject()
+    background, came, go_on = Background(parent), [], threading.Event()
+    background.done.connect(came.append)
+    background.run(lambda: go_on.wait(10) and "first")
+    background.run(lambda: "second")
+    background.run(lambda: "third")
+    assert background.busy
+    assert came == []
+    go_on.set()
+    qtbot.waitUntil(lambda: not background.busy)
+    assert came == ["third"]
+
+
+def test_the_labs_tank_is_painted_beside_the_window(qtbot, monkeypatch):
+    threads, paint = [], lab_tank.backdrop
+
+    def noted(*arguments):
+        threads.append(threading.current_thread())
+        return paint(*arguments)
+
+    monkeypatch.setattr(lab_tank, "backdrop", noted)
+    tank = LabTank()
+    qtbot.addWidget(tank)
+    tank.resize(500, 301)
+    tank.show()
+    qtbot.waitUntil(lambda: tank._still is not None)
+    QApplication.processEvents()
+    assert threads
+    assert threading.main_thread() not in threads

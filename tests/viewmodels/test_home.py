@@ -1,0 +1,193 @@
+"""What the home window says of protocols and sessions."""
+
+from __future__ import annotations
+
+from datetime import datetime, timedelta
+
+import pytest
+
+from study_app.protocol.load import load, source_bytes
+from study_app.protocol.orders.schedule import PageStep, build_schedule
+from study_app.session.resume import REHEARSED_SCREENS
+from study_app.store.exclusions import exclude
+from study_app.store.sessions.begin import begin
+from study_app.store.sessions.folder_lock import open_alone
+from study_app.viewmodels.home import BrokenFacts, StudyFacts, held, interrupted, sources, study_facts
+from study_app.viewmodels.sessions import sessions, started_words
+
+
+def start(results, participant, status=None, *, simulated=False):
+    protocol = load("demo")
+    store = begin(
+        results / "demo",
+        protocol,
+        source_bytes("demo"),
+        participant,
+        seed=1,
+        operator="AK",
+        language="en",
+        device={"name": "scripted"},
+        screens={},
+        simulated=simulated,
+    )
+    if status is None:
+        store.close()
+    else:
+        store.finish(status)
+
+
+def stop_at(results, participant, steps, *, screens=None):
+    """Leave a session unfinished after so many steps of its schedule, or in the middle of the next one."""
+    protocol = load("demo")
+    store = begin(
+        results / "demo",
+        protocol,
+        source_bytes("demo"),
+        participant,
+        seed=1,
+        operator="AK",
+        language="en",
+        device={"name": "mouse"},
+        screens=screens or {"participant": {}},
+        simulated=False,
+    )
+    schedule = build_schedule(protocol, participant, 1)
+    for step in schedule.steps[:steps]:
+        if isinstance(step, PageStep):
+            store.append("page_shown", page=step.page_id)
+            store.append("page_left", page=step.page_id)
+            continue
+        told = {name: getattr(step, name) for name in ("block", "phase", "part", "index", "of", "code")}
+        store.append("trial_started", trial=step.number, attempt=1, **told)
+        store.append("trial_ended", trial=step.number, attempt=1, outcome="complete")
+        rows = [
+            {"item": item, "number": n, "value": 4, "onset_s": 1, "first_s": 1, "last_s": 1, "changes": 0}
+            for n, item in enumerate(step.items, 1)
+        ]
+        store.append("responses", trial=step.number, attempt=1, items=rows)
+    store.close()
+
+
+@pytest.mark.parametrize(
+    ("steps", "where", "answers"),
+    [
+        (0, "before “A first look”", 0),
+        (1, "in part 1, liquid setting 1 of 2", 0),
+        (2, "in part 1, liquid setting 2 of 2", 2),
+        (4, "in part 2, delay setting 1 of 2", 4),
+        (7, "after its last page", 8),
+    ],
+)
+def test_an_interrupted_session_is_told_by_where_it_stopped_and_what_is_on_disk(tmp_path, steps, where, answers):
+    stop_at(tmp_path, "P006", steps)
+    now = datetime.now().astimezone()
+    told = interrupted(sessions(tmp_path, {"demo": 8}), [study_facts("rek2024"), study_facts("demo")], now)
+    assert told.heading == f"P006, session 1 stopped {where}"
+    assert f"{answers} of 8 answers are on disk" in told.line
+    assert told.source == "demo"
+    assert told.folder == tmp_path / "demo" / "data" / "sub-P006" / "ses-01"
+
+
+def test_only_what_can_go_on_here_is_offered(tmp_path):
+    now = datetime.now().astimezone()
+    studies = [study_facts("demo")]
+    start(tmp_path, "P001", "completed")
+    stop_at(tmp_path, "P002", 2, screens=dict(REHEARSED_SCREENS))
+    assert interrupted(sessions(tmp_path, {}), studies, now) is None
+    stop_at(tmp_path, "P003", 2)
+    assert interrupted(sessions(tmp_path, {}), [], now) is None
+    assert interrupted(sessions(tmp_path, {}), studies, now).participant == "P003"
+    opening = open_alone(tmp_path / "demo" / "data" / "sub-P003" / "ses-01")
+    assert interrupted(sessions(tmp_path, {}), studies, now) is None
+    opening.release()
+
+
+def test_the_shipped_protocols_are_at_hand_the_demo_last():
+    assert sources()[-1] == "demo"
+    assert "rek2024" in sources()
+
+
+def test_a_protocol_is_told_by_what_one_chooses_by():
+    facts = study_facts("rek2024")
+    assert isinstance(facts, StudyFacts)
+    assert facts.extent == "2 parts, 10 settings, 62 answers"
+    assert facts.languages == "Dutch, English"
+    assert "8 N" in facts.needs
+    assert facts.duration.startswith("about ")
+
+
+def test_a_broken_protocol_names_its_first_problem(tmp_path):
+    broken = tmp_path / "own.toml"
+    broken.write_text("format = 1\nsequence = [")
+    facts = study_facts(str(broken))
+    assert isinstance(facts, BrokenFacts)
+    assert "line 2" in facts.problem
+
+
+def test_sessions_that_need_care_stand_first_then_the_newest(tmp_path):
+    start(tmp_path, "P001", "completed")
+    start(tmp_path, "P002")
+    start(tmp_path, "P003", "withdrawn")
+    found = sessions(tmp_path, {"demo": 8})
+    assert [(row.participant, row.status) for row in found] == [
+        ("P002", "unfinished"),
+        ("P003", "withdrawn"),
+        ("P001", "completed"),
+    ]
+    assert (found[0].answers, found[0].answers_of) == (0, 8)
+
+
+def test_simulated_sessions_are_not_counted_as_held(tmp_path):
+    start(tmp_path, "P001", "completed", simulated=True)
+    found = sessions(tmp_path, {})
+    assert held(found, "demo") == "no participant yet"
+    assert found[0].simulated
+
+
+def test_held_sessions_are_counted_with_their_ends(tmp_path):
+    start(tmp_path, "P001", "completed")
+    start(tmp_path, "P002")
+    found = sessions(tmp_path, {})
+    assert held(found, "demo") == "2 sessions, 1 complete"
+    assert held(found, "rek2024") == "no participant yet"
+
+
+def test_a_session_that_is_left_out_says_why(tmp_path):
+    for participant in ("P001", "P002"):
+        start(tmp_path, participant, "completed")
+    exclude(tmp_path / "demo", "P001", 1, by="AB", reason="fell asleep")
+    found = sessions(tmp_path, {})
+    assert {row.participant: row.excluded for row in found} == {"P001": "fell asleep", "P002": None}
+    assert held(found, "demo") == "2 sessions, 2 complete, 1 excluded"
+    (tmp_path / "demo" / "exclusions.csv").write_text("nonsense")
+    assert [row.excluded for row in sessions(tmp_path, {})] == [None, None]
+
+
+def test_a_folder_that_holds_something_else_is_passed_over(tmp_path):
+    start(tmp_path, "P001", "completed")
+    (tmp_path / "holiday" / "data" / "sub-x" / "ses-01").mkdir(parents=True)
+    (tmp_path / "holiday" / "data" / "sub-x" / "ses-01" / "journal.jsonl").write_text("[]\nno journal\n")
+    assert [row.participant for row in sessions(tmp_path, {}) if row.study == "demo"] == ["P001"]
+
+
+def test_no_folder_no_sessions(tmp_path):
+    assert sessions(tmp_path / "none", {}) == ()
+
+
+def test_times_are_said_as_people_say_them():
+    now = datetime(2024, 11, 20, 15, 0).astimezone()
+    assert started_words(now, now) == "Today 15:00"
+    assert started_words(now - timedelta(hours=20), now) == "Yesterday 19:00"
+    assert started_words(datetime(2024, 11, 18, 9, 5).astimezone(), now) == "18 Nov 09:05"
+    assert started_words(datetime(2023, 3, 1, 9, 5).astimezone(), now) == "1 Mar 2023 09:05"
+
+
+def test_a_session_whose_journal_tells_nothing_is_still_listed(tmp_path):
+    start(tmp_path, "P001", "completed")
+    start(tmp_path, "P002", "completed")
+    journal = tmp_path / "demo" / "data" / "sub-P001" / "ses-01" / "journal.jsonl"
+    first = journal.read_text().splitlines()[0]
+    journal.write_text(first.replace('"at":', '"once":').replace('"event":"session_started"', '"event":"tired"') + "\n")
+    found = sessions(tmp_path, {})
+    assert [(one.participant, one.status) for one in found] == [("P001", "damaged"), ("P002", "completed")]
+    assert found[0].answers == 0

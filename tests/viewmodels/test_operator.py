@@ -1,0 +1,285 @@
+"""The operator's view as a value: pure, neutral, and true to the journal."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import pytest
+
+from study_app.protocol.model import Limits
+from study_app.store.tables.columns import TRIALS, header
+from study_app.store.tables.session_tables import beyond_limits
+from study_app.viewmodels.operator import MEASURES, duration_words, grouped, minutes
+
+SECRETS = ("thin", "thick", "prompt", "200")
+
+
+def words(view):
+    """Return every text of a view, its notes left out."""
+    found = []
+
+    def walk(value):
+        if isinstance(value, str):
+            found.append(value)
+        elif isinstance(value, tuple):
+            for part in value:
+                walk(part)
+        elif dataclasses.is_dataclass(value):
+            for part in dataclasses.fields(value):
+                walk(getattr(value, part.name))
+
+    walk(view)
+    return found
+
+
+def test_a_session_starts_by_preparing(told):
+    view = told.view()
+    assert view.state == "preparing"
+    assert not view.may_pause
+    assert not view.may_repeat
+
+
+def test_a_trial_is_counted_among_the_main_ones_with_its_neutral_name(told):
+    told.welcome()
+    told.start(1)
+    view = told.view()
+    assert view.heading == "Trial 1 of 4"
+    assert view.setting_line.startswith("Liquid setting 1")
+    assert view.part_line.startswith("Part 1 of 2")
+    assert view.state == "running"
+    assert view.may_pause
+    assert view.may_repeat
+
+
+def test_the_steps_show_what_is_done_now_and_open(told):
+    told.welcome()
+    told.start(1)
+    states = [row.state for row in told.view().steps]
+    assert states[:2] == ["done", "now"]
+    assert set(states[2:]) == {"open"}
+
+
+def test_time_in_the_trial_stands_still_while_statements_are_answered(told):
+    told.welcome()
+    told.start(1)
+    told.end(1)
+    told.now_s += 33.0
+    view = told.view()
+    assert view.trial_time.elapsed_s == 20.0
+    assert "answering" in view.setting_line
+
+
+def test_exploring_shows_least_and_most_time(told):
+    told.welcome()
+    told.start(1)
+    told.now_s += 12.0
+    time = told.view().trial_time
+    assert (time.least_s, time.most_s) == (5.0, 30.0)
+    assert time.words == "0:12 of 0:30"
+
+
+def test_reaching_shows_targets_reached_while_they_are_and_after(told):
+    (first, *_) = (trial.number for trial in told.schedule.trials if trial.code.startswith("D"))
+    told.welcome()
+    told.start(first)
+    assert told.view().setting_line.endswith("reaching targets  ·  0 of 6 targets")
+    for target in (0, 1):
+        told.tell("target_reached", 1.0, trial=first, target=target, t_task_s=1.0)
+    assert told.view().setting_line.endswith("reaching targets  ·  2 of 6 targets")
+    told.end(first, "timeout")
+    assert told.view().setting_line.endswith("answering  ·  2 of 6 targets")
+    told.start(first, 2)
+    assert told.view().setting_line.endswith("0 of 6 targets")
+
+
+def test_a_lost_recording_is_told_first_by_the_recorder_or_the_journal(told):
+    told.welcome()
+    told.start(1)
+    told.end(1, lateness_p99_ms=99.0)
+    assert told.view().beyond[0].startswith("Liquid setting 1 out of limits")
+    line = "Recording of Liquid setting 1 lost: No space left on device"
+    assert told.view(lost={1: "No space left on device"}).beyond[0] == line
+    told.tell("recording_lost", trial=1, attempt=1, reason="No space left on device")
+    assert told.view().beyond[0] == line
+    assert len(told.view(lost={1: "No space left on device"}).beyond) == 2
+
+
+def test_a_paused_session_can_resume_but_not_repeat(told):
+    told.welcome()
+    told.start(1)
+    told.end(1, outcome="interrupted")
+    told.tell("paused", by="participant")
+    view = told.view()
+    assert view.state == "paused"
+    assert view.may_resume
+    assert not view.may_repeat
+
+
+def test_a_stopped_force_is_a_state_of_its_own(told):
+    told.welcome()
+    told.start(1)
+    told.tell("force_stopped", by="operator")
+    told.tell("paused", by="operator")
+    view = told.view(force_on=False)
+    assert view.state == "force off"
+    assert view.may_resume
+
+
+def test_trouble_is_said_and_nothing_but_the_end_is_offered(told):
+    told.welcome()
+    told.tell("broke", what="the device 'mouse' stopped answering")
+    view = told.view(force_on=False)
+    assert view.state == "trouble"
+    assert "stopped answering" in view.trouble
+    assert [view.may_pause, view.may_resume, view.may_repeat] == [False, False, False]
+
+
+def test_the_device_is_what_the_servo_says_whatever_else_is_wrong(told):
+    told.welcome()
+    told.tell("broke", what="the disk is full")
+    view = told.view()
+    assert view.device.ready
+    assert dict(view.device.rows)["Safety faults"] == "0"
+    view = told.view(device_ready=False, faults=2)
+    assert not view.device.ready
+    assert dict(view.device.rows)["Safety faults"] == "2"
+
+
+def test_trouble_that_no_journal_could_keep_is_said_too(told):
+    told.welcome()
+    assert told.view(trouble="no space left").state == "trouble"
+
+
+def test_the_end_is_said_with_its_status(told):
+    told.welcome()
+    told.tell("session_ended", 4.0, status="withdrawn", reason="")
+    told.now_s += 100.0
+    view = told.view()
+    assert view.over
+    assert view.state_word == "Withdrawn"
+    assert view.elapsed_s == 5.0
+
+
+def test_a_complete_session_has_every_step_done(told):
+    told.welcome()
+    told.tell("session_ended", 4.0, status="completed", reason="", fingerprint="k3vq-7m2p-xw4d")
+    assert {row.state for row in told.view().steps} == {"done"}
+    assert told.view().trials_line == "4 of 4 trials"
+    assert told.view().setting_line.endswith("Fingerprint k3vq-7m2p-xw4d")
+
+
+def test_progress_counts_trials_that_were_left_behind_part_by_part(told):
+    told.welcome()
+    told.now_s += 3600.0  # however long it took
+    assert (told.view().main_trials, told.view().trials_line) == (((0, 2), (0, 2)), "0 of 4 trials")
+    told.start(1)
+    told.end(1)
+    assert told.view().trials_line == "0 of 4 trials"
+    told.answer(1)
+    told.start(2)
+    assert (told.view().main_trials, told.view().trials_line) == (((1, 2), (0, 2)), "1 of 4 trials")
+    told.end(2)
+    told.answer(2)
+    told.tell("page_shown", 1.0, page="reaching")
+    told.start(3)
+    told.end(3)
+    told.answer(3)
+    told.tell("repeat", trial=3, reason="phone rang")
+    assert (told.view().main_trials, told.view().trials_line) == (((2, 2), (0, 2)), "2 of 4 trials")
+    told.tell("session_ended", 1.0, status="withdrawn", reason="")
+    assert told.view().trials_line == "2 of 4 trials"
+
+
+def test_a_resumed_session_counts_what_was_worked_and_not_the_gap(told):
+    told.welcome()  # at 1 s
+    told.tell("note", 2.0, kind="note", text="before")
+    told.tell("session_resumed", 1020.0, gap_s=1020.0)
+    told.tell("page_shown", 0.5, page="welcome")
+    told.tell("note", 0.5, kind="mark", text="")
+    told.now_s += 1.0
+    view = told.view()
+    assert view.elapsed_s == 5.0
+    assert [note.at_s for note in view.notes] == [4.0, 3.0]
+    told.start(1)  # at 15 s of work; the page was there since 1 s
+    assert told.view().steps[0].note == "0:14"
+    told.tell("session_resumed", 300.0)
+    told.tell("session_ended", 2.0, status="aborted", reason="")
+    told.now_s += 60.0
+    assert told.view().elapsed_s == 17.0
+
+
+def test_counts_are_of_what_is_on_disk(told):
+    told.welcome()
+    told.start(1)
+    told.end(1)
+    told.answer(1)
+    told.tell("note", kind="mark", text="")
+    counts = dict(told.view().counts)
+    assert counts["Answers on disk"] == "2 of 8"
+    assert counts["Trials within limits"] == "1 of 1"
+    assert counts["Marks, repeats"] == "1, 0"
+
+
+def test_a_trial_out_of_limits_says_which_and_by_how_much_the_newest_first(told):
+    told.welcome()
+    told.start(1)
+    told.end(1, lateness_p99_ms=1.0, worst_gap_ms=31.25)
+    told.start(2)
+    told.end(2, lateness_p99_ms=1.0)
+    told.start(3)
+    told.end(3, first_frame_gap_ms=327.211752, worst_frame_gap_ms=300.0)
+    assert told.view().beyond == (
+        "Delay setting 1 out of limits: time to the first frame 327 ms, limit 250 ms; longest gap between frames "
+        "300 ms, limit 250 ms",
+        "Liquid setting 1 out of limits: longest gap of the servo 31.2 ms, limit 20 ms",
+    )
+
+
+@pytest.mark.parametrize("blinding", ["double", "single"])
+def test_what_tells_a_condition_is_judged_before_an_operator_who_sees_forces_alone(told, blinding):
+    if blinding == "single":
+        told.make_single_blind()
+    told.start(1)
+    told.end(1, withheld_share=0.0712, delay_error_p95_ms=27.211752)
+    said = [line.partition(" out of limits: ")[2] for line in told.view().beyond]
+    single = "delay error, p95, 27.2 ms, limit 25 ms; force withheld 7.12 %, limit 5 %"
+    assert said == ([] if blinding == "double" else [single])
+    assert dict(told.view().counts)["Trials within limits"] == ("1 of 1" if blinding == "double" else "0 of 1")
+
+
+def test_every_limit_of_a_trial_has_a_name_for_the_operator(told):
+    bad = dict.fromkeys(header(TRIALS), 1000000000.0) | {"targets_reached": 0.0}
+    limits = Limits(targets_percent=50).model_dump()
+    judged = {measure for measure, _, _ in beyond_limits(bad, limits)}
+    assert judged == set(MEASURES)
+
+
+def test_tiles_judge_by_the_asked_rate_and_the_protocols_limit(told, health):
+    tiles = told.view(health).tiles
+    assert [tile.verdict for tile in tiles] == ["ok", "ok", "ok", "ok"]
+    assert tiles[0].value == "1000.0"
+    assert (tiles[1].value, tiles[1].unit) == ("15", "µs")
+
+
+def test_unmeasured_tiles_claim_nothing(told):
+    assert {tile.verdict for tile in told.view().tiles} == {"open"}
+
+
+def test_no_word_of_a_view_names_a_condition_a_force_or_a_limiter(told, health):
+    told.welcome()
+    for trial in told.schedule.trials:
+        told.start(trial.number)
+        said = " ".join(words(told.view(health))).lower().split()
+        for secret in SECRETS:
+            assert secret not in said
+        told.end(trial.number)
+        told.answer(trial.number)
+    assert "hidden" in " ".join(words(told.view(health)))
+
+
+def test_times_and_numbers_read_as_people_write_them():
+    assert minutes(68) == "1:08"
+    assert minutes(3723) == "1:02:03"
+    assert grouped(45918) == "45\u2009918"
+    assert duration_words(62e-6) == "62 µs"
+    assert duration_words(1.4e-3) == "1.4 ms"

@@ -1,0 +1,87 @@
+"""What the results window says in words, and a figure in the colours of a theme."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QSize
+
+from study_app.gui.results.figure_view import drawn, themed_svg
+from study_app.gui.theme.theme import DARK, LIGHT
+from study_app.viewmodels.results import Opened, StudyChoice, in_figures
+from study_app.viewmodels.session_columns import matching, states_of
+from tests.gui.results.sample import COLOURS, SVG, facts
+
+
+def test_who_is_in_the_figures_and_why_the_others_are_not():
+    held = [facts(f"P{number:03d}") for number in range(1, 13)]
+    assert in_figures(held) == ("12 of 12 sessions in the figures", "")
+    held += [facts("P013", status="unfinished"), facts("P014", excluded="asleep")]
+    assert in_figures(held) == ("12 of 14 sessions in the figures", "P013 is not complete; P014 is excluded.")
+    assert in_figures([]) == ("No session yet", "")
+    assert in_figures(held[:1])[0] == "1 of 1 session in the figures"
+
+
+def test_many_that_are_not_are_counted():
+    held = [facts(f"P{number:03d}", status="withdrawn") for number in range(1, 10)]
+    assert in_figures(held)[1] == "P001, P002, P003, P004 and 5 others are not complete."
+
+
+def test_an_excluded_session_that_was_not_complete_is_told_once():
+    assert in_figures([facts("P001", status="withdrawn", excluded="left")])[1] == "P001 is excluded."
+
+
+def test_who_opened_the_key_is_told_with_day_and_reason():
+    opened = Opened(datetime(2026, 11, 19, tzinfo=UTC), "AK", "collection closed")
+    assert opened.words == "Unblinded 19 Nov by AK: collection closed"
+    assert Opened(None, "AK", "x").words == "Unblinded by AK: x"
+
+
+def test_a_study_says_what_it_is():
+    assert StudyChoice(Path("r/rek2024")).name == "rek2024"
+    assert StudyChoice(Path("r/rek2024"), "pilot").name == "rek2024  ·  pilot"
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "found"),
+    [
+        ("", "", ["P001", "P002", "Q003"]),
+        (" p00", "", ["P001", "P002"]),
+        ("", "unfinished", ["P002"]),
+        ("", "excluded", ["Q003"]),
+        ("", "invalid", ["P001"]),
+        ("q", "unfinished", []),
+    ],
+)
+def test_sessions_are_found_by_participant_and_state(words, status, found):
+    held = [facts("P001", validity="invalid"), facts("P002", status="unfinished"), facts("Q003", excluded="x")]
+    assert [one.participant for one in held if matching(words, status)(one)] == found
+    assert [state for state, _ in states_of(held)] == ["completed", "unfinished", "invalid", "excluded"]
+
+
+def test_in_the_light_theme_a_figure_looks_as_in_print():
+    made = themed_svg(SVG, COLOURS, LIGHT)
+    for role in ("text", "accent", "grid"):
+        assert getattr(LIGHT, role).encode().lower() in made.lower()
+    assert b"#02256d" in made
+
+
+def test_in_the_dark_theme_paper_and_letters_change_and_levels_do_not():
+    made = themed_svg(SVG, COLOURS, DARK)
+    assert COLOURS["text"].encode() not in made
+    assert f'id="paper" style="fill: {DARK.surface}"'.encode() in made
+    assert f'id="level7" style="fill: #02256d; stroke: {DARK.ctl}"'.encode() in made
+    assert b'fill: #ffffff" id="white">7<' in made, "letters on a dark level stay white"
+    assert f'fill: {DARK.text}" id="ink"'.encode() in made
+    assert b'id="shade" style="fill: #0b65a3; fill-opacity: 0.3"' in made, "a shade under light letters stays deep"
+    assert b"font-family: Inter;" in made
+    assert b"sans-serif" not in made
+
+
+def test_a_figure_is_drawn_at_the_screens_resolution(qapp):
+    image = drawn(themed_svg(SVG, COLOURS, DARK), QSize(200, 100), 2.0)
+    assert (image.width(), image.height(), image.devicePixelRatio()) == (400, 200, 2.0)
+    assert image.pixelColor(2, 2).name() == DARK.surface.lower()
+    assert image.pixelColor(200, 100).name() == "#02256d"

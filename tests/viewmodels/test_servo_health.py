@@ -1,0 +1,93 @@
+"""Figures of the tiles and the points of the plots."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from study_app.haptics.model.layout import SAMPLE, records
+from study_app.viewmodels.servo_health import LATENESS_WINDOW_S, TRACE_WINDOW_S, ServoHealth
+
+
+def samples(count, first=0, lateness_ns=15_000, period_ns=1_000_000):
+    made = records(SAMPLE, count)
+    made.tick = np.arange(first, first + count)
+    made.time_ns = made.tick * period_ns
+    made.lateness_ns = lateness_ns
+    return made
+
+
+def test_rate_is_ticks_over_time():
+    health = ServoHealth(1000.0)
+    health.take(samples(2500, period_ns=1_250_000))
+    assert health.vitals().rate_hz == pytest.approx(800.0)
+
+
+def test_nothing_measured_gives_no_figures():
+    vitals = ServoHealth(1000.0).vitals()
+    assert vitals.rate_hz is None
+    assert vitals.lateness_p99_s is None
+    assert vitals.frame_rate_hz is None
+
+
+def test_lateness_is_of_the_last_minute_however_it_came_in():
+    health = ServoHealth(1000.0)
+    health.take(samples(1000, lateness_ns=9_000_000))
+    for first in range(1000, 1000 + LATENESS_WINDOW_S * 1000, 777):
+        health.take(samples(777, first=first, lateness_ns=20_000))
+    assert health.vitals().lateness_p99_s == pytest.approx(20e-6)
+
+
+def test_a_batch_longer_than_the_ring_keeps_its_newest():
+    health = ServoHealth(10.0)
+    late = np.arange(5000)
+    health.take(samples(5000, lateness_ns=late))
+    kept = np.sort(health._lateness_ns)
+    assert kept.tolist() == late[-LATENESS_WINDOW_S * 10 :].tolist()
+
+
+def test_the_histogram_counts_every_tick_kept_once():
+    health = ServoHealth(1000.0)
+    health.take(samples(3000, lateness_ns=np.random.default_rng(1).integers(-500, 80_000_000, 3000)))
+    edges, counts = health.lateness_histogram()
+    assert counts.sum() == 3000
+    assert edges[0] == 1.0
+    assert edges[-1] >= 80_000.0 * 0.99
+
+
+def test_a_refresh_is_missed_from_a_gap_of_one_and_a_half_on():
+    health = ServoHealth(1000.0, refresh_hz=60.0)
+    at = 1
+    for gap_ms in (16, 17, 24, 26, 51, 2):
+        health.frame(at)
+        at += gap_ms * 1_000_000
+    health.frame(at)
+    vitals = health.vitals()
+    assert (vitals.refreshes, vitals.refreshes_missed) == (6 + 1 + 2, 1 + 2)
+
+
+def test_a_page_between_two_tanks_misses_no_refresh():
+    health = ServoHealth(1000.0)
+    health.frame(1)
+    health.frames_rest()
+    health.frame(60_000_000_000)
+    health.frame(60_016_666_667)
+    assert health.vitals().refreshes_missed == 0
+
+
+def test_the_trace_is_in_order_and_no_longer_than_its_window():
+    health = ServoHealth(1000.0)
+    for step in range(1600):
+        health.hand(step * 0.0213, (step, 0.0, 0.0))
+    now = 1600 * 0.0213
+    times, places = health.trace(now)
+    assert np.all(np.diff(times) > 0)
+    assert times[0] >= -TRACE_WINDOW_S
+    assert times[0] < -TRACE_WINDOW_S + 0.1
+    assert np.all(np.diff(places[:, 0]) == 1)
+
+
+def test_an_empty_trace_has_no_points():
+    times, places = ServoHealth(1000.0).trace(1.0)
+    assert times.shape == (0,)
+    assert places.shape == (0, 3)
