@@ -15,7 +15,7 @@ pytest.importorskip("PySide6.QtWidgets", reason="Qt's system libraries are missi
 from PySide6.QtCore import QPoint
 from PySide6.QtWidgets import QApplication, QWidget
 
-from study_app.app.visit import Visit
+from study_app.app.main_controller import Visit
 from study_app.gui.home.study_cards import StudyCard
 from study_app.gui.operator.strip import Strip
 from study_app.gui.participant.pages.questionnaire import QuestionnaireWidget

@@ -16,7 +16,7 @@ pytest.importorskip("PySide6.QtWidgets", reason="Qt's system libraries are missi
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QWidget
 
-from study_app.app.visit import Visit
+from study_app.app.main_controller import Visit
 from study_app.gui.home.main_window import FULL as HOME
 from study_app.gui.home.new_session_dialog import NewSessionDialog
 from study_app.gui.home.study_cards import StudyCard

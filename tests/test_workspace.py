@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from study_app import workspace as workspaces
-from study_app.app.entry import run
-from study_app.app.visit import Visit
+from study_app.app.main_controller import Visit
+from study_app.app.session.entry import run
 from study_app.cli.words import keep_offered_workspace
 from study_app.errors import StoreError
 from study_app.protocol.load import load as load_protocol
@@ -181,7 +181,7 @@ def test_a_protocol_file_of_a_command_is_among_the_recent_ones_and_its_results_i
     start_folder(tmp_path / "start", monkeypatch)
     keep_workspace(Workspace(tmp_path / "kept"))
     held = []
-    monkeypatch.setattr("study_app.app.entry.hold", lambda chosen, _tell: held.append(chosen) or 0)
+    monkeypatch.setattr("study_app.app.session.entry.hold", lambda chosen, _tell: held.append(chosen) or 0)
     Path("mine.toml").write_bytes(source_bytes("demo"))
     assert run("mine.toml", participant="P001") == 0
     assert held[0].results == tmp_path / "kept" / "results" / "demo"

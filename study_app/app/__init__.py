@@ -7,9 +7,9 @@ on with one by command.
 from study_app.gui.display.display_check import missing_library
 
 try:
-    from study_app.app.entry import resume, run
-    from study_app.app.live_session import BUG, CANCELLED, LiveSession
-    from study_app.app.visit import home
+    from study_app.app.main_controller import home
+    from study_app.app.session.entry import resume, run
+    from study_app.app.session.live_session import BUG, CANCELLED, LiveSession
 except ImportError as missing:
     raise missing_library(missing) from missing
 

@@ -18,7 +18,7 @@ from study_app.cli.words import Target
 from study_app.errors import DisplayError, StudyError
 
 if TYPE_CHECKING:
-    from study_app.app.timing import WindowsThread
+    from study_app.app.windows_load import WindowsThread
     from study_app.validation.timing.machine_load import LoadName
 
 LOAD = click.Choice(("none", "gui", "gui+cpu"))
@@ -83,7 +83,7 @@ def time_delays(seconds: float, load: LoadName, to: Path | None) -> None:
         os.environ["QT_QPA_PLATFORM"] = "offscreen"
     if to is not None:
         make_folder(to)
-    from study_app.app.delays import delays
+    from study_app.app.delay_session import delays
 
     found = delays(seconds, load, tell=lambda line: click.echo(line, err=True))
     click.echo(text(found), nl=False)
@@ -94,7 +94,7 @@ def time_delays(seconds: float, load: LoadName, to: Path | None) -> None:
 def windows_thread(load: LoadName) -> WindowsThread | None:
     """Return the windows' thread; None where there is no Qt and nothing is to be painted."""
     try:
-        from study_app.app.timing import lend
+        from study_app.app.windows_load import lend
     except DisplayError:
         if load != "none":
             raise

@@ -9,15 +9,15 @@ import pytest
 from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QApplication, QLabel
 
-from study_app.app.screenshots import camera, screenshots, session
-from study_app.app.screenshots.camera import Camera
+from study_app.app.screenshots import capture, screenshots, session_pictures
+from study_app.app.screenshots.capture import Camera
 from study_app.errors import StudyError
 from tests.compiled import needs_servo
 
 
 @needs_servo
 def test_a_session_is_held_and_its_cockpit_taken_in_both_themes(qapp, tmp_path, monkeypatch):
-    monkeypatch.setattr(session, "TRACED_MS", 500)
+    monkeypatch.setattr(session_pictures, "TRACED_MS", 500)
     monkeypatch.setattr("study_app.session.start.MEASURED_S", 0.1)
     here, told = Path.cwd(), []
     taken = screenshots(tmp_path, only="single-blind", tell=told.append)
@@ -29,7 +29,7 @@ def test_a_session_is_held_and_its_cockpit_taken_in_both_themes(qapp, tmp_path, 
     assert told == [str(path) for path in taken]
     dark, light = (QImage(str(path)) for path in taken[-3:-1])
     assert dark.size() == light.size()
-    assert (dark.width(), dark.height()) == session.COCKPIT
+    assert (dark.width(), dark.height()) == session_pictures.COCKPIT
     lightness = [image.scaled(1, 1).pixelColor(0, 0).lightness() for image in (dark, light)]
     assert lightness[0] < 60
     assert lightness[1] > 180
@@ -44,8 +44,8 @@ def test_a_session_that_cannot_be_taken_is_let_go_of(qapp, tmp_path, monkeypatch
         assert [thread for thread in threading.enumerate() if thread.name == "servo"]
         raise StudyError("no picture")
 
-    monkeypatch.setattr(session, "TRACED_MS", 0)
-    monkeypatch.setattr(session._Session, "take_cockpit", fails)
+    monkeypatch.setattr(session_pictures, "TRACED_MS", 0)
+    monkeypatch.setattr(session_pictures._Session, "take_cockpit", fails)
     monkeypatch.setattr("study_app.session.start.MEASURED_S", 0.1)
     with pytest.raises(StudyError, match="no picture"):
         screenshots(tmp_path, only="single-blind", tell=lambda _line: None)
@@ -54,7 +54,7 @@ def test_a_session_that_cannot_be_taken_is_let_go_of(qapp, tmp_path, monkeypatch
 
 
 def test_what_does_not_come_is_named(qapp, tmp_path, monkeypatch):
-    monkeypatch.setattr(camera, "PATIENCE_S", 0.1)
+    monkeypatch.setattr(capture, "PATIENCE_S", 0.1)
     with pytest.raises(StudyError, match="in vain for the figures"):
         Camera(tmp_path, print).until(lambda: None, "the figures")
 

@@ -13,7 +13,7 @@ HOME = """
 import sys
 from pathlib import Path
 from PySide6.QtWidgets import QApplication
-from study_app.app.visit import Visit
+from study_app.app.main_controller import Visit
 from study_app.gui.application import application_here
 
 application = application_here()
@@ -28,7 +28,7 @@ NOTE = """
 import sys, threading
 from pathlib import Path
 from PySide6.QtWidgets import QApplication
-from study_app.app.live_session import LiveSession
+from study_app.app.session.live_session import LiveSession
 from study_app.gui.application import application_here
 from study_app.session.request import NewSession
 from study_app.gui.theme.theme import LIGHT
@@ -51,7 +51,7 @@ print(sorted({name.partition(".")[0] for name in sys.modules}))
 BESIDE = """
 import gc, threading
 from PySide6.QtCore import QObject
-from study_app.app.live_session import load_windows
+from study_app.app.session.live_session import load_windows
 from study_app.gui.application import application_here
 
 application = application_here()

@@ -14,7 +14,7 @@ from pathlib import Path
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
-from study_app.app.visit import Visit
+from study_app.app.main_controller import Visit
 from study_app.gui.application import application_here
 from study_app.gui.home.new_session_dialog import NewSessionDialog
 from study_app.protocol.load import load, source_bytes

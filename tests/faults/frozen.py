@@ -16,7 +16,7 @@ import time
 from pathlib import Path
 
 from study_app import app
-from study_app.app import live_session
+from study_app.app.session import live_session
 from study_app.devices.rig import Machine
 from study_app.gui.application import application_here
 from study_app.gui.operator import OperatorWindow

@@ -18,7 +18,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLabel
 
 from study_app import app
-from study_app.app import live_session
+from study_app.app.session import live_session
 from study_app.devices.rig import Machine
 from study_app.gui.application import application_here
 from study_app.gui.operator import OperatorWindow

@@ -12,7 +12,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 
 from study_app import app
-from study_app.app import live_session
+from study_app.app.session import live_session
 from study_app.devices.rig import Machine
 from study_app.errors import StudyError
 from study_app.gui.operator import OperatorWindow

@@ -7,7 +7,7 @@ import threading
 import pytest
 from PySide6.QtWidgets import QApplication
 
-from study_app.app.timing import lend
+from study_app.app.windows_load import lend
 from study_app.protocol.load import load_scenes
 from study_app.validation.soak.soak import soak
 from study_app.validation.timing.loops import LEAD_IN, PERIOD_NS

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from study_app import app
-from study_app.app import entry
+from study_app.app.session import entry
 from study_app.errors import StoreError
 from study_app.protocol.load import load, source_bytes
 from study_app.session.request import NewSession, resumed

@@ -4,6 +4,6 @@ Windows are opened without a screen, sessions are held with the scripted hand, a
 painted. Everything lies in a folder that is gone afterwards; the user's settings are not touched.
 """
 
-from study_app.app.screenshots.run import screenshots
+from study_app.app.screenshots.screenshots import screenshots
 
 __all__ = ["screenshots"]

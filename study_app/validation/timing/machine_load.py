@@ -1,4 +1,4 @@
-"""What else the machine does while the loops are timed; windows are lent by ``app.timing``."""
+"""What else the machine does while the loops are timed; windows are lent by ``app.windows_load``."""
 
 from __future__ import annotations
 

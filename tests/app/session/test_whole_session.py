@@ -18,8 +18,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
 from study_app import app
-from study_app.app import live_session
-from study_app.app.session import termination
+from study_app.app.session import live_session, termination
 from study_app.errors import DeviceNotFound, DisplayError, SessionError, StoreError, StudyError
 from study_app.gui.home.main_window import MainWindow
 from study_app.gui.operator import OperatorWindow

@@ -14,8 +14,8 @@ import pytest
 from PySide6.QtCore import QEvent
 from PySide6.QtWidgets import QApplication, QMainWindow
 
-from study_app.app.lab import LabVisit, compose_lab
-from study_app.app.lab_opening import LabOpening
+from study_app.app.lab.controller import LabVisit, compose_lab
+from study_app.app.lab.device_opening import LabOpening
 from study_app.errors import DeviceNotFound, ServoFault
 from study_app.evaluation.appraisal import Costs, EffectCost, Errors
 from study_app.evaluation.appraisal_worker import Told
@@ -338,7 +338,7 @@ def test_a_preset_is_on_the_disk_before_the_program_ends(visit: LabVisit, monkey
         ended.wait(30.0)
         save(path, text)
 
-    monkeypatch.setattr("study_app.app.lab_saving.save", slowly)
+    monkeypatch.setattr("study_app.app.lab.preset_saving.save", slowly)
     for name in ("one.toml", "two.toml"):
         visit.place.save_asked.emit(tmp_path / name, visit.bench.a)
     assert not list(tmp_path.iterdir())

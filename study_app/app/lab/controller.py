@@ -19,11 +19,11 @@ from typing import TYPE_CHECKING, Any, Final
 
 from PySide6.QtCore import QObject, Qt, QTimer
 
-from study_app.app.guarded import guarded
-from study_app.app.lab_opening import LabOpening
-from study_app.app.lab_prices import AsksPrice, Prices
+from study_app.app.lab.costs import AsksPrice, Prices
+from study_app.app.lab.device_opening import LabOpening
+from study_app.app.lab.guarded_slots import guarded
+from study_app.app.lab.preset_saving import LabSaving
 from study_app.app.lab_rows import cost_rows, device_choices, error_rows, title_of
-from study_app.app.lab_saving import LabSaving
 from study_app.errors import StudyError
 from study_app.evaluation.appraisal_worker import Appraiser
 from study_app.gui.lab.view import LabPlace

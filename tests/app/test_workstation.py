@@ -14,9 +14,9 @@ from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QApplication, QMainWindow
 
 from study_app.app.devices import DevicesDesk
-from study_app.app.live_session import LiveSession
-from study_app.app.machine import MachineDesk, described, settings_here, text_scale_on
-from study_app.app.visit import Visit
+from study_app.app.main_controller import Visit
+from study_app.app.session.live_session import LiveSession
+from study_app.app.workstation import MachineDesk, described, settings_here, text_scale_on
 from study_app.devices.backends import NONE, READY, Backend
 from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.gui.widgets.dialogs import Notice
@@ -253,7 +253,7 @@ def test_from_the_cockpit_a_falcon_is_examined_and_of_what_is_none_it_is_said(qt
         asked.append((name, held))
         return SimpleNamespace(show=lambda: None)
 
-    monkeypatch.setattr("study_app.app.live_session.diagnosis", diagnosis)
+    monkeypatch.setattr("study_app.app.session.live_session.diagnosis", diagnosis)
     live = LiveSession(NewSession("demo", "P001", 1, 7, "", "en", device, True, None, Path("nowhere")), LIGHT)
     operator = QMainWindow()
     operator.theme = DARK
@@ -268,8 +268,8 @@ def test_from_the_cockpit_a_falcon_is_examined_and_of_what_is_none_it_is_said(qt
 
 
 def test_a_session_opens_on_the_screen_that_is_set_unless_another_was_chosen(qapp, monkeypatch):
-    monkeypatch.setattr("study_app.app.live_session.choose_screens", lambda number: number)
-    monkeypatch.setattr("study_app.app.live_session.screen_number", lambda _settings: 2)
+    monkeypatch.setattr("study_app.app.session.live_session.choose_screens", lambda number: number)
+    monkeypatch.setattr("study_app.app.session.live_session.screen_number", lambda _settings: 2)
     chosen = NewSession("demo", "P001", 1, 7, "", "en", "mouse", True, None, Path("nowhere"))
     assert LiveSession(chosen, LIGHT)._screens() == 2
     assert LiveSession(replace(chosen, screen=1), LIGHT)._screens() == 1

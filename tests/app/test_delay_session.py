@@ -8,7 +8,7 @@ from PySide6.QtCore import QEvent
 from PySide6.QtWidgets import QApplication
 from shiboken6 import isValid
 
-from study_app.app import delays as held
+from study_app.app import delay_session as held
 from study_app.app.session.bridge import SessionBridge
 from study_app.app.session.parts import Parts
 from study_app.devices.scripted import ScriptedDevice

@@ -12,10 +12,10 @@ from typing import Final
 
 from PySide6.QtCore import QtMsgType, qInstallMessageHandler
 
-from study_app.app.screenshots.camera import Camera
-from study_app.app.screenshots.places import take_places
-from study_app.app.screenshots.session import take_session, take_single_blind
-from study_app.app.screenshots.stage import STUDY, quick, rehearsed
+from study_app.app.screenshots.capture import Camera
+from study_app.app.screenshots.example_study import STUDY, quick, rehearsed
+from study_app.app.screenshots.main_views import take_places
+from study_app.app.screenshots.session_pictures import take_session, take_single_blind
 from study_app.app.session.garbage_collection import collecting_here
 from study_app.gui.application import application_here
 from study_app.gui.theme.theme import DARK, LIGHT

@@ -10,10 +10,10 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QWidget
 
-from study_app.app.live_session import LiveSession
-from study_app.app.screenshots.camera import Camera, shown
-from study_app.app.screenshots.stage import SEED
+from study_app.app.screenshots.capture import Camera, shown
+from study_app.app.screenshots.example_study import SEED
 from study_app.app.session.bridge import SessionBridge
+from study_app.app.session.live_session import LiveSession
 from study_app.gui.preflight import PreflightWindow
 from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.gui.theme.themed import wear

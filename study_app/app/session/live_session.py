@@ -20,9 +20,9 @@ from PySide6.QtWidgets import QApplication
 
 from study_app.app.crash_trace import CrashTrace
 from study_app.app.devices import diagnosis
-from study_app.app.machine import described, screen_number, settings_here, text_scale_on
 from study_app.app.session.garbage_collection import collecting_here
 from study_app.app.session.termination import ended_from_outside
+from study_app.app.workstation import described, screen_number, settings_here, text_scale_on
 from study_app.devices import is_falcon, kind_of
 from study_app.devices.rig import Machine, open_machine
 from study_app.errors import SessionError, StudyError
@@ -39,8 +39,8 @@ from study_app.session.resume import FIRST, resume_at
 from study_app.session.start import Ready, measured, open_store
 
 if TYPE_CHECKING:
-    from study_app.app.preflight import Preflight
     from study_app.app.session.bridge import SessionBridge
+    from study_app.app.session.preflight_controller import Preflight
     from study_app.store.sessions.open_session import SessionStore
 
 CANCELLED = 130
@@ -198,7 +198,9 @@ class LiveSession(QObject):
 
     def _ask(self, made: Ready) -> None:
         """Show the operator what was found; the session begins when that is accepted."""
-        from study_app.app.preflight import Preflight  # noqa: PLC0415 - pyqtgraph: only once it is needed
+        from study_app.app.session.preflight_controller import (  # noqa: PLC0415 - pyqtgraph: only once it is needed
+            Preflight,
+        )
 
         shown_on, _ = self._screens()
         asked = Preflight(self.chosen, self.chosen.read_protocol(), made, shown_on, self.chosen.who, self.theme)

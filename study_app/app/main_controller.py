@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QEventLoop, QObject, QTimer
 
 from study_app.app.devices import DevicesDesk
-from study_app.app.live_session import BUG, LiveSession
-from study_app.app.machine import MachineDesk, theme_named
 from study_app.app.session.garbage_collection import collecting_here
+from study_app.app.session.live_session import BUG, LiveSession
 from study_app.app.session.termination import ended_from_outside
+from study_app.app.workstation import MachineDesk, theme_named
 from study_app.errors import StoreError
 from study_app.gui.application import application_here
 from study_app.gui.display.screens import place
@@ -26,7 +26,7 @@ from study_app.workspace import Workspace, chosen_workspace, offered_workspace, 
 LOOK_AFTER_MS = 300  # the window stands by then
 
 if TYPE_CHECKING:
-    from study_app.app.lab import First, LabVisit
+    from study_app.app.lab.controller import First, LabVisit
     from study_app.app.results import ResultsDesk
     from study_app.gui.lab.view import LabPlace
     from study_app.gui.results.view import ResultsPlace
@@ -54,7 +54,7 @@ def home(results: Path | None = None) -> int:
 
 def _first_of_lab() -> First:
     """Load the lab's modules and what it begins with."""
-    from study_app.app.lab import prepare  # noqa: PLC0415
+    from study_app.app.lab.controller import prepare  # noqa: PLC0415
 
     return prepare()
 
@@ -178,7 +178,7 @@ class Visit(QObject):
         self.window.prepared("lab")
 
     def _lab(self) -> LabPlace:
-        from study_app.app.lab import compose_lab  # noqa: PLC0415 - pyqtgraph: only once it is needed
+        from study_app.app.lab.controller import compose_lab  # noqa: PLC0415 - pyqtgraph: only once it is needed
         from study_app.gui.lab.view import LabPlace  # noqa: PLC0415
 
         made = LabPlace()

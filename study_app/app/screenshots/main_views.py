@@ -7,9 +7,9 @@ from typing import Any, Final
 
 from PySide6.QtWidgets import QDialog
 
-from study_app.app.screenshots.camera import Camera, shown
-from study_app.app.screenshots.stage import STUDY
-from study_app.app.visit import Visit
+from study_app.app.main_controller import Visit
+from study_app.app.screenshots.capture import Camera, shown
+from study_app.app.screenshots.example_study import STUDY
 from study_app.gui.settings.display_test import DisplayTest
 from study_app.gui.theme.theme import Theme
 from study_app.viewmodels.home import StudyFacts, study_facts

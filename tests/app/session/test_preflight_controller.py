@@ -12,8 +12,8 @@ from PySide6.QtCore import QEvent
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QApplication
 
-from study_app.app import preflight
-from study_app.app.preflight import Appraisal, Preflight
+from study_app.app.session import preflight_controller
+from study_app.app.session.preflight_controller import Appraisal, Preflight
 from study_app.errors import DeviceLost
 from study_app.evaluation.appraisal import Costs, Errors
 from study_app.gui.theme.theme import LIGHT
@@ -83,7 +83,7 @@ class Machine:
 
 @pytest.fixture
 def machine(monkeypatch: Any) -> Machine:
-    monkeypatch.setattr(preflight, "Appraiser", Answering)
+    monkeypatch.setattr(preflight_controller, "Appraiser", Answering)
     return Machine()
 
 
@@ -115,7 +115,7 @@ def test_going_back_does_not_wait_for_what_is_being_measured(asked: Preflight, m
         waited.append(sleep(60.0))
         return FACTS
 
-    monkeypatch.setattr(preflight, "measured", slow)
+    monkeypatch.setattr(preflight_controller, "measured", slow)
     asked._again()
     measuring = asked._measuring
     assert measuring is not None
@@ -134,7 +134,7 @@ def test_strokes_are_asked_of_the_measured_device_and_again_when_its_delay_has_c
     first: Any = made._appraisal._appraiser
     assert first.devices == [Dynamics(0.001, 20e-6, 0.3)]
     slower = replace(found, delay_ticks=3)
-    monkeypatch.setattr(preflight, "measured", lambda *_words, **_named: slower)
+    monkeypatch.setattr(preflight_controller, "measured", lambda *_words, **_named: slower)
     with qtbot.waitSignal(made._measured):
         made._again()
     again: Any = made._appraisal._appraiser
@@ -150,7 +150,7 @@ def test_a_mistake_in_measuring_does_not_leave_the_window_waiting(
     def broken(*_words: Any, **_named: Any) -> Facts:
         raise ValueError("no samples")
 
-    monkeypatch.setattr(preflight, "measured", broken)
+    monkeypatch.setattr(preflight_controller, "measured", broken)
     with qtbot.waitSignal(asked.failed) as failed:
         asked._again()
     assert isinstance(failed.args[0], ValueError)
@@ -166,10 +166,10 @@ def test_a_mistake_in_measuring_does_not_leave_the_window_waiting(
     ],
 )
 def test_an_error_that_is_not_known_is_not_called_none(monkeypatch: Any, told: Any, largest: float | None) -> None:
-    monkeypatch.setattr(preflight, "Appraiser", Answering)
+    monkeypatch.setattr(preflight_controller, "Appraiser", Answering)
     monkeypatch.setattr(Answering, "given", told)
     protocol = load("demo")
-    asked = preflight._scenes(protocol)[0]
+    asked = preflight_controller._scenes(protocol)[0]
     appraisal = Appraisal([asked, asked], UNKNOWN)
     while not appraisal.over:
         appraisal.look()
@@ -178,9 +178,9 @@ def test_an_error_that_is_not_known_is_not_called_none(monkeypatch: Any, told: A
 
 
 def test_the_share_withheld_is_asked_of_each_liquid_in_the_fastest_stroke_of_its_tasks(monkeypatch: Any) -> None:
-    monkeypatch.setattr(preflight, "Appraiser", Answering)
+    monkeypatch.setattr(preflight_controller, "Appraiser", Answering)
     protocol = load("rek2024")
-    asked = preflight._scenes(protocol)
+    asked = preflight_controller._scenes(protocol)
     assert {one.liquid for one in asked} == set(protocol.liquids)
     assert {one.stroke for one in asked if one.liquid == "honey"} == {Stroke(5.0, 0.03)}  # it is explored
     monkeypatch.setattr(Answering, "given", tuple(Errors(0.0, 0.0, 0.0, (), 0.01 * (n + 1)) for n in range(len(asked))))
@@ -195,9 +195,9 @@ def test_the_share_withheld_is_asked_of_each_liquid_in_the_fastest_stroke_of_its
 
 
 def test_of_several_shares_of_a_liquid_the_largest_counts(monkeypatch: Any) -> None:
-    monkeypatch.setattr(preflight, "Appraiser", Answering)
+    monkeypatch.setattr(preflight_controller, "Appraiser", Answering)
     monkeypatch.setattr(Answering, "given", (Errors(0.0, 0.0, 0.0, (), 0.04), Errors(0.0, 0.0, 0.0, (), 0.02)))
-    asked = preflight._scenes(load("demo"))[0]
+    asked = preflight_controller._scenes(load("demo"))[0]
     appraisal = Appraisal([asked, asked], UNKNOWN)
     while not appraisal.over:
         appraisal.look()
@@ -210,12 +210,12 @@ def test_of_the_strokes_of_several_tasks_the_fastest_counts(monkeypatch: Any, or
     blocks = list(protocol.blocks.values())
     strokes = [Stroke(float(hz), 0.03) for hz in range(1, 1 + len(blocks))][::order]
     given = iter(strokes)
-    monkeypatch.setattr(preflight, "fastest_stroke", lambda *_words: next(given))
+    monkeypatch.setattr(preflight_controller, "fastest_stroke", lambda *_words: next(given))
     thin = [
         stroke
         for stroke, block in zip(strokes, blocks, strict=True)
         if any(protocol.scene_for(it).liquids[0].id == "thin" for it in block.conditions)
     ]
     assert len(thin) > 1
-    found = {one.stroke for one in preflight._scenes(protocol) if one.liquid == "thin"}
+    found = {one.stroke for one in preflight_controller._scenes(protocol) if one.liquid == "thin"}
     assert found == {max(thin, key=lambda stroke: stroke.speed_mps)}

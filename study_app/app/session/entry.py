@@ -6,7 +6,7 @@ import contextlib
 from collections.abc import Callable
 from pathlib import Path
 
-from study_app.app.live_session import hold
+from study_app.app.session.live_session import hold
 from study_app.errors import StoreError
 from study_app.protocol.load import load
 from study_app.session.request import NewSession, draw_seed, resumed, study_results

@@ -10,8 +10,8 @@ import pytest
 from PySide6.QtCore import QEvent
 from PySide6.QtWidgets import QApplication
 
-from study_app.app import live_session
-from study_app.app.visit import Visit
+from study_app.app.main_controller import Visit
+from study_app.app.session import live_session
 from study_app.errors import DeviceLost, DeviceNotFound
 from study_app.gui.home.main_window import FULL, LEAST
 from study_app.gui.theme.theme import DARK

@@ -1,0 +1,1 @@
+"""The liquid lab: the window, the servo and the files behind it."""
