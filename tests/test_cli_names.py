@@ -7,7 +7,7 @@ import pytest
 from click.testing import CliRunner
 
 from study_app.cli import commands
-from study_app.cli.words import GROUPS
+from study_app.cli.options import GROUPS
 from study_app.protocol.load import load, source_bytes
 from study_app.store.exclusions import exclusions
 from study_app.store.sessions.begin import begin

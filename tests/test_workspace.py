@@ -8,7 +8,7 @@ import pytest
 from study_app import workspace as workspaces
 from study_app.app.main_controller import Visit
 from study_app.app.session.entry import run
-from study_app.cli.words import keep_offered_workspace
+from study_app.cli.options import keep_offered_workspace
 from study_app.errors import StoreError
 from study_app.protocol.load import load as load_protocol
 from study_app.protocol.load import source_bytes

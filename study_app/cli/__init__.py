@@ -13,25 +13,10 @@ import sys
 import click
 
 from study_app import __version__
-from study_app.cli import (
-    accuracy,
-    falcon,
-    identify,
-    listing,
-    model,
-    power,
-    report,
-    results,
-    running,
-    screenshots,
-    soak,
-    solver,
-    stability,
-    timing,
-    validate,
-)
+from study_app.cli import data, falcon, identify, listing, model, power, report, screenshots, study, validate
 from study_app.cli.devices import devices
-from study_app.cli.words import EXIT_USER_ERROR, GroupedCommands
+from study_app.cli.evidence import accuracy, cfd, soak, stability, timing
+from study_app.cli.options import EXIT_USER_ERROR, GroupedCommands
 from study_app.errors import StudyError
 
 
@@ -52,9 +37,9 @@ def commands(context: click.Context) -> None:
 
 
 MODULES = (
-    running,
+    study,
     listing,
-    results,
+    data,
     report,
     validate,
     power,
@@ -62,7 +47,7 @@ MODULES = (
     accuracy,
     stability,
     identify,
-    solver,
+    cfd,
     soak,
     timing,
     screenshots,

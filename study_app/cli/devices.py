@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from study_app.cli.words import EXIT_FOUND
+from study_app.cli.options import EXIT_FOUND
 
 if TYPE_CHECKING:
     from study_app.devices.falcon.device import FalconDevice

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from study_app.cli.model import assignment
-from study_app.cli.words import SCENE_FILE, Target
+from study_app.cli.options import SCENE_FILE, Target
 
 
 @click.command()

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from study_app.cli.words import RESULTS, Target, study_at
+from study_app.cli.options import RESULTS, Target, study_at
 
 STARTED = 16  # letters of a time down to the minute
 

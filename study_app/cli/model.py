@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from study_app.cli.words import SCENE_FILE, Target
+from study_app.cli.options import SCENE_FILE, Target
 
 
 @click.command()

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from study_app.cli.words import FILE, Target
+from study_app.cli.options import FILE, Target
 
 SIZES = (5, 8, 12, 16, 20, 24)
 EXIT_CANCELLED = 130

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from study_app.cli.words import EXIT_FOUND, Target, takes_study
+from study_app.cli.options import EXIT_FOUND, Target, takes_study
 
 
 @click.command()

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import click
 
-from study_app.cli.words import EXIT_FOUND, Target
+from study_app.cli.options import EXIT_FOUND, Target
 
 EXIT_UNDECIDED = 4
 

@@ -40,7 +40,7 @@ from study_app.store.sessions.begin import begin
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.sessions.reopen import reopen
 from tests.compiled import needs_servo
-from tests.faults import short
+from tests.faults.support import short
 from tests.session import small
 from tests.store.verification.forging import Lines, forge
 

@@ -15,7 +15,7 @@ from study_app.store.clock import SessionClock
 from study_app.store.sessions import reopen as resume
 from study_app.store.sessions.reopen import reopen
 from study_app.store.verification.verify_study import verify
-from tests.faults.worlds import StoredWorld
+from tests.faults.support.worlds import StoredWorld
 from tests.session import small
 
 HOUR = timedelta(hours=1)

@@ -18,7 +18,7 @@ from study_app.session.transitions.events import Note
 from study_app.session.transitions.state import Phase
 from study_app.store.journals import journal
 from study_app.store.verification.verify_study import verify
-from tests.faults.worlds import StoredWorld
+from tests.faults.support.worlds import StoredWorld
 from tests.session import small
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="limits the size of files as POSIX systems can")

@@ -28,7 +28,7 @@ pytestmark = [
 def held_with_a_freeze(folder: Path, how: str) -> tuple[dict[str, str], dict[str, str]]:
     """Hold a session that stands still in its first trial; return that trial's rows, the interrupted and the next."""
     program = subprocess.Popen(
-        [sys.executable, "-m", "tests.faults.frozen", str(folder), how],
+        [sys.executable, "-m", "tests.faults.support.frozen", str(folder), how],
         cwd=Path(__file__).parents[2],
         env=os.environ | {"QT_QPA_PLATFORM": "offscreen"},
     )

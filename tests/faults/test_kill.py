@@ -18,7 +18,7 @@ from study_app.store.journals import journal
 from study_app.store.tables import session_tables
 from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
-from tests.faults import short
+from tests.faults.support import short
 
 TIMES = {"answered_at", "onset_s", "first_choice_s", "last_change_s", "attempt"}
 WHAT_RAN = ("trial", "block", "phase", "part", "index", "of", "code", "outcome")
@@ -33,7 +33,7 @@ def kill(folder: Path, resume: str, count: int) -> list[dict[str, Any]]:
     """Kill ``count`` sessions; return what became of each."""
     protocol = short.write(folder, resume=resume)
     done = subprocess.run(
-        [sys.executable, "-m", "tests.faults.killer", str(protocol), str(folder), str(count), "1"],
+        [sys.executable, "-m", "tests.faults.support.killer", str(protocol), str(folder), str(count), "1"],
         cwd=Path(__file__).parents[2],
         capture_output=True,
         text=True,

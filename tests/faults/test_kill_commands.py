@@ -14,8 +14,8 @@ import pytest
 
 from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
-from tests.faults import short
-from tests.faults.command_killer import COMMANDS
+from tests.faults.support import short
+from tests.faults.support.command_killer import COMMANDS
 
 pytestmark = [
     needs_servo,
@@ -27,7 +27,7 @@ pytestmark = [
 def outcomes(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, Any]]:
     folder = tmp_path_factory.mktemp("commands")
     done = subprocess.run(
-        [sys.executable, "-m", "tests.faults.command_killer", str(short.write(folder)), str(folder), "1"],
+        [sys.executable, "-m", "tests.faults.support.command_killer", str(short.write(folder)), str(folder), "1"],
         cwd=Path(__file__).parents[2],
         capture_output=True,
         text=True,

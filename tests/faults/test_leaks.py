@@ -22,8 +22,8 @@ from study_app.store import receipt
 from study_app.store.folders import StudyFolder
 from study_app.store.verification.leaks import Telltales, leaks, telltales
 from tests.compiled import needs_servo
-from tests.faults import short
-from tests.faults.windows import Person
+from tests.faults.support import short
+from tests.faults.support.windows import Person
 
 pytestmark = [needs_servo, pytest.mark.usefixtures("qapp")]
 

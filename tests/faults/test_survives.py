@@ -30,7 +30,7 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], P
     with virtual_display("-screen", "0", "1366x768x24") as display:
         here = {"DISPLAY": display, "QT_QPA_PLATFORM": "xcb", "LIQUID_STUDY_CONFIG": str(folder / "settings")}
         ran = subprocess.run(
-            [sys.executable, "-m", "tests.faults.survivor", str(folder)],
+            [sys.executable, "-m", "tests.faults.support.survivor", str(folder)],
             cwd=ROOT,
             env=os.environ | here,
             capture_output=True,

@@ -15,7 +15,7 @@ from study_app.store.exclusions import exclude, exclusions
 from study_app.store.journals import journal
 from study_app.store.tables.formulas import unguarded
 from study_app.store.verification.verify_study import verify
-from tests.faults.worlds import StoredWorld
+from tests.faults.support.worlds import StoredWorld
 
 TEXTS = (
     'she said "oil, or tar"',

@@ -24,8 +24,8 @@ from study_app.store.journals import journal
 from study_app.store.progress import progress_of
 from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
-from tests.faults import short
-from tests.faults.windows import Person
+from tests.faults.support import short
+from tests.faults.support.windows import Person
 
 pytestmark = [needs_servo, pytest.mark.usefixtures("qapp")]
 

@@ -10,7 +10,7 @@ from study_app.session.transitions.events import Broke, PauseAsked, Reconnected,
 from study_app.session.transitions.state import Phase
 from study_app.session.transitions.table import advance
 from study_app.store.tables import session_tables
-from tests.faults.worlds import StoredWorld
+from tests.faults.support.worlds import StoredWorld
 from tests.session.transitions.test_table import state_in
 
 FAULT = "the device 'memory' stopped answering"

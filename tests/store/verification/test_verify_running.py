@@ -18,7 +18,7 @@ from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.sessions.begin import SessionStore, begin
 from study_app.store.verification.verify_study import verify
-from tests.faults import short
+from tests.faults.support import short
 from tests.store.conftest import SOURCE, choose, study_tables, summary_of_trial
 
 ENOUGH = 1  # looks

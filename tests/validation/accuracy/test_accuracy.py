@@ -13,7 +13,7 @@ from click.testing import CliRunner
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from study_app.cli import commands
-from study_app.cli.accuracy import _motion
+from study_app.cli.evidence.accuracy import _motion
 from study_app.errors import StudyError
 from study_app.evaluation.expected_error import expected, foretold, physical_n
 from study_app.evaluation.hand_motions import stir, stroke

@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner
 from scipy.integrate import quad
 
-from study_app.cli.solver import cfd
+from study_app.cli.evidence.cfd import cfd
 from study_app.errors import StudyError
 from study_app.evaluation import reference_solutions
 from study_app.evaluation.style import file_bytes

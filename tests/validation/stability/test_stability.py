@@ -9,7 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 from study_app import cli
-from study_app.cli.words import EXIT_FOUND
+from study_app.cli.options import EXIT_FOUND
 from study_app.errors import StoreError, StudyError
 from study_app.haptics.model.layout import LIMITER_NAMES
 from study_app.protocol.load import load, shipped

@@ -7,7 +7,7 @@ import pytest
 from click.testing import CliRunner
 
 from study_app import cli
-from study_app.cli.words import EXIT_FOUND
+from study_app.cli.options import EXIT_FOUND
 from study_app.haptics.model.layout import records
 from study_app.validation.stability import withheld_force
 from study_app.validation.stability.closed_loop import TRACE, follow

@@ -369,7 +369,7 @@ def run(monkeypatch, capsys, tmp_path):
     ],
 )
 def test_bad_words_are_one_line(run, monkeypatch, tmp_path, words, part):
-    monkeypatch.setattr("study_app.cli.timing.windows_thread", lambda _load: None)  # an application would stay
+    monkeypatch.setattr("study_app.cli.evidence.timing.windows_thread", lambda _load: None)  # an application would stay
     (tmp_path / "taken").write_text("a file", encoding="utf-8")
     code, said, complaint = run(*words)
     assert (code, said) == (2, "")

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 from click.core import ParameterSource
 
-from study_app.cli.words import FILE, RESULTS, Target, keep_offered_workspace, takes_session
+from study_app.cli.options import FILE, RESULTS, Target, keep_offered_workspace, takes_session
 
 SEED = click.IntRange(0, 2**31 - 1)
 WINDOWED = click.option("--windowed", is_flag=True, help="Show the participant's window in a frame, not full-screen.")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from study_app.cli.words import Target
+from study_app.cli.options import Target
 
 if TYPE_CHECKING:
     from study_app.haptics.model.motion import Motion

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from study_app.cli.timing import LOAD, windows_thread
-from study_app.cli.words import EXIT_FOUND, Target
+from study_app.cli.evidence.timing import LOAD, windows_thread
+from study_app.cli.options import EXIT_FOUND, Target
 
 if TYPE_CHECKING:
     from study_app.validation.timing.machine_load import LoadName

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from study_app.cli.words import EXIT_FOUND, Target
+from study_app.cli.options import EXIT_FOUND, Target
 
 if TYPE_CHECKING:
     from study_app.validation.stability.verdict import Verdict

@@ -20,7 +20,7 @@ from study_app.analysis.report.write_report import report
 from study_app.session.simulated import rehearsal
 from study_app.store.blinded.unblinding import unblind
 from study_app.store.sessions.rebuild import rebuild
-from tests.faults.killer import SEED, forked
+from tests.faults.support.killer import SEED, forked
 
 COMMANDS = {"export": (6, 0.0), "rebuild": (12, 0.0), "unblind": (12, 0.0), "report": (1, 0.9)}
 """How often each is killed, and after which share of its time at the earliest: a report writes at its end."""

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from study_app.cli.words import BY, EXIT_FOUND, Target, takes_session, takes_study
+from study_app.cli.options import BY, EXIT_FOUND, Target, takes_session, takes_study
 
 
 @click.command()

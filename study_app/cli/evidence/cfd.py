@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from study_app.cli.words import Target
+from study_app.cli.options import Target
 
 
 @click.command()

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from study_app.cli.words import Target
+from study_app.cli.options import Target
 from study_app.errors import DisplayError, StudyError
 
 if TYPE_CHECKING:

@@ -29,8 +29,8 @@ from study_app.gui.widgets.plots import TracePlot
 from study_app.session import start
 from study_app.session.pages import PausePage, TaskPage, TroublePage
 from study_app.store.recorder import Recorder
-from tests.faults import short
-from tests.faults.windows import Person
+from tests.faults.support import short
+from tests.faults.support.windows import Person
 
 LEFT = Qt.MouseButton.LeftButton
 

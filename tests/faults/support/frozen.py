@@ -24,8 +24,8 @@ from study_app.gui.participant.window import ParticipantWindow
 from study_app.session import start
 from study_app.session.pages import PausePage, QuestionnairePage, TaskPage, TextPage
 from study_app.session.trial import RunningTrial
-from tests.faults import short
-from tests.faults.windows import Person
+from tests.faults.support import short
+from tests.faults.support.windows import Person
 
 LONGEST_S = "2"
 WINDOW_S = 5.0

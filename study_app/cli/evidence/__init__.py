@@ -1,0 +1,1 @@
+"""Commands that print evidence: accuracy, solver, soak, stability, timing."""
