@@ -9,9 +9,10 @@ from typing import Final, TypeAlias
 from study_app.analysis.designs.block_tests import Asked, asked, sealed
 from study_app.analysis.designs.delays import delays_found
 from study_app.analysis.designs.liquids import liquids_found
-from study_app.analysis.findings.block_results import BlockFound, Results, Waiting
+from study_app.analysis.findings.block_results import BlockFound, Results
 from study_app.analysis.findings.conduct import delivered, orders
-from study_app.analysis.report.section_failures import Ended, Failure, Failures
+from study_app.analysis.findings.not_tested import Waiting
+from study_app.analysis.findings.section_failures import Ended, Failure, Failures
 from study_app.analysis.tables.compared_blocks import Block
 from study_app.analysis.tables.performance import Performance, performance
 from study_app.analysis.tables.study import Study

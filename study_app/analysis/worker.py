@@ -198,8 +198,8 @@ def _write_tables(order: WriteTables, tell: Tell, stop: Callable[[], bool]) -> D
     """Do what ``analysis.export.export.export`` does, and ask between its steps whether to give up."""
     from study_app.analysis.export import spss  # noqa: PLC0415
     from study_app.analysis.export.export import export_files  # noqa: PLC0415
-    from study_app.analysis.output import write_files  # noqa: PLC0415
     from study_app.analysis.tables.study import load_study  # noqa: PLC0415
+    from study_app.store.output_files import write_files  # noqa: PLC0415
 
     if "sav" in order.extras:
         spss.require()

@@ -97,7 +97,7 @@ class StudiesFound:
 
 @dataclass(frozen=True, slots=True)
 class SessionsFound:
-    """The sessions of a study as rows of ``store.tables.participants``, what is left out, and how the key was last opened."""
+    """The sessions of a study as rows of ``store.tables.participants``, exclusions, and how the key was last opened."""
 
     folder: Path
     rows: tuple[dict[str, Any], ...]

@@ -9,8 +9,8 @@ from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.app.workstation import MachineDesk
-from study_app.devices import kind_of
 from study_app.devices.backends import Backend, backends
+from study_app.devices.registry import kind_of
 from study_app.gui.devices.diagnosis_dialog import DiagnosisDialog
 from study_app.gui.devices.view import DevicesPlace
 from study_app.gui.theme.theme import Theme

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from study_app.devices import list_devices
+from study_app.devices.registry import list_devices
 from study_app.evaluation.appraisal import Costs, Errors
 from study_app.gui.home.new_session_dialog import DEVICE_WORDS
 from study_app.lab.parameters import EFFECT_WORDS

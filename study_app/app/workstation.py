@@ -9,7 +9,7 @@ from typing import Any, Final
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtGui import QScreen
 
-from study_app.devices import kind_of
+from study_app.devices.registry import kind_of
 from study_app.errors import DeviceError, StoreError
 from study_app.gui.display.frame_clock import BY_CLOCK, LOCKED
 from study_app.gui.display.opengl import has_card

@@ -61,8 +61,9 @@ def doctor(name: str, firmware: Path | None, faults: tuple[str, ...], to: Path |
     file holds this report, versions, settings, log and last error; no participant's id, no answer, no liquid's value.
     """
     click.echo(_PREPARING)  # what is imported and compiled next takes long the first time
+    from study_app.devices.doctor_report import lines
     from study_app.devices.falcon.doctor.examine import examine
-    from study_app.devices.falcon.doctor.failure_report import lines, report
+    from study_app.devices.falcon.doctor.failure_report import report
 
     found = report(examine(name, firmware=firmware, faults=faults, tell=click.echo))
     for line in lines(found):
@@ -117,10 +118,10 @@ def calibrate(name: str, firmware: Path | None, grams: float | None, *, scale: b
 
 def _falcon(name: str, firmware: Path | None, grams: float | None) -> tuple[FalconDevice, Emulator | None]:
     """Return the Falcon, not yet open, and the emulator behind it, if there is one."""
-    from study_app.devices import kind_of
     from study_app.devices.falcon.device import FalconDevice
     from study_app.devices.falcon.emulated import EmulatedFalcon
     from study_app.devices.falcon.emulator.emulator import Emulator
+    from study_app.devices.registry import kind_of
     from study_app.errors import DeviceError
 
     kind = kind_of(name)

@@ -29,8 +29,8 @@ def emulate_falcon(
 ) -> None:
     """Serve an emulated Falcon to other programs, in real time, until Ctrl-C.
 
-    It answers as the USB bridge does, from the boot loader on, in the framing that
-    study_app/devices/falcon/transport/socket_frames.py describes; --device falcon-socket:PATH puts our own driver there.
+    It answers as the USB bridge does, from the boot loader on, in the frames that
+    study_app/devices/falcon/transport/socket_frames.py describes; --device falcon-socket:PATH connects our own driver.
     Lights, homing and torques are printed as they change, on a terminal only.
     """
     from study_app.devices.falcon.emulator.emulator import Emulator

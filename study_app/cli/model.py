@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from study_app.cli.options import SCENE_FILE, Target
+from study_app.store.tables import csv_files
 
 
 @click.command()
@@ -29,7 +30,7 @@ def simulate(scene: str, liquid: str, path: str, to: Path, changes: tuple[str, .
     programmed = path in paths.NAMES or not (Path(path).suffix or Path(path).exists())
     moved = paths.path(path, rate_hz=chosen.rate_hz) if programmed else motion.read(Path(path))
     table = offline.simulate(chosen, moved)
-    motion.write(to, table)
+    csv_files.write_columns(to, table)
     click.echo(f"{to}: {len(table)} rows")
 
 

@@ -17,7 +17,7 @@ def screenshots(to: Path, only: str | None) -> None:
     """Take pictures of every window in both themes, of the real program; takes some minutes and needs no display."""
     os.environ["QT_QPA_PLATFORM"] = "offscreen"  # the same pictures on every machine
     from study_app.app.screenshots import screenshots as take
-    from study_app.evaluation.output import make_folder
+    from study_app.store.output_files import make_folder
 
     make_folder(to)
     take(to, only=only, tell=click.echo)

@@ -32,10 +32,10 @@ def validate_report(studies: int, jobs: int, seed: int, to: Path | None) -> None
     """
     if jobs == 0:
         raise click.BadParameter("0 jobs do nothing: give 1 or more, or -1 for one a core", param_hint="--jobs")
-    from study_app.analysis.output import write_files
     from study_app.analysis.power.plan import plan
     from study_app.protocol.load import load
     from study_app.session.simulated.trial_features import feelings
+    from study_app.store.output_files import write_files
     from study_app.validation.report_rates.rate_tables import markdown, table
     from study_app.validation.report_rates.rates import Rate
     from study_app.validation.report_rates.simulated_studies import simulated

@@ -60,7 +60,7 @@ def _falcon(usb: Any, platform: str) -> Backend:
     can = "felt, up to 8 N; needs its firmware after it was switched on, and homing"
     import libusb_package  # noqa: PLC0415 - loads libusb
 
-    from study_app.devices.falcon.transport.transport import find_falcons, serial_of  # noqa: PLC0415 - likewise
+    from study_app.devices.falcon.transport.usb import find_falcons, serial_of  # noqa: PLC0415 - likewise
 
     by = f"libusb {_version('libusb-package')}"
     usb = usb if usb is not None else libusb_package.get_libusb1_backend()

@@ -8,7 +8,7 @@ from pathlib import Path
 from random import Random
 from typing import TYPE_CHECKING, Any
 
-from study_app.devices import is_falcon, moves_by_itself, open_device
+from study_app.devices.registry import is_falcon, moves_by_itself, open_device
 from study_app.protocol.model import Protocol
 
 if TYPE_CHECKING:

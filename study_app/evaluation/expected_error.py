@@ -13,17 +13,16 @@ import numpy as np
 
 from study_app.evaluation import reference_solutions
 from study_app.evaluation.cost import measure
-from study_app.evaluation.hand_motions import stroke
+from study_app.evaluation.force_error import ROUNDING, Error, error_of
+from study_app.evaluation.hand_motions import COUNT_M, stroke
 from study_app.evaluation.reference_model import local_wakes, lowered, resistance_nspm, respond
 from study_app.evaluation.reference_solutions import CYCLES, Case, Truth
+from study_app.evaluation.scene_variants import with_effects
 from study_app.haptics.model.bounds import GRAVITY_MPS2
 from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.motion import Floats, Motion
 from study_app.haptics.model.scene import Effect, Everywhere, LocalWake, Scene
 from study_app.haptics.runtime.offline import simulate
-from study_app.validation.accuracy.candidate_sets import with_effects
-from study_app.validation.accuracy.candidates import COUNT_M
-from study_app.validation.accuracy.comparison import ROUNDING, Error, error_of
 
 SETTLED: Final = 2 / 3
 """After this share of the strokes the flow has forgotten how they began."""

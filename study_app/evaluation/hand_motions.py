@@ -58,3 +58,7 @@ def vectors_x(values: Floats) -> Floats:
     """Return vectors (n, 3) along x."""
     zero = np.zeros_like(values)
     return np.column_stack([values, zero, zero])
+
+
+COUNT_M: Final = 38e-6
+"""One count of the Falcon's encoders, at the hand [m]."""

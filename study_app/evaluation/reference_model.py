@@ -1,8 +1,8 @@
 """The force model by the letter of its definition: slow, plain, and what the product must equal.
 
 Every element of the wake is kept in a list and decays by itself; segments are summed anew each tick. Written from the
-definition, not from ``haptics.kernels.effects``, which it shares no code with. `exact_wakes` says the same without the rounding
-of long sums.
+definition, not from ``haptics.kernels.effects``, which it shares no code with. `exact_wakes` says the same without the
+rounding of long sums.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """One parameter of a scene set by its name: a new scene, or one line that says why not.
 
-Beyond ``haptics.model.overrides`` it knows components of vectors, effects one by one, and what a table begins with that is
-called for and does not stand in the liquid yet.
+Beyond ``haptics.model.overrides`` it knows components of vectors, effects one by one, and the default values of a table
+that the liquid does not have yet.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
 
-from study_app.devices import is_falcon, moves_by_itself, open_device
+from study_app.devices.registry import is_falcon, moves_by_itself, open_device
 from study_app.devices.simulated.hand_commands import hand_of
 from study_app.haptics.model.layout import SAMPLE, records
 from study_app.haptics.model.limits import slew_limit_n

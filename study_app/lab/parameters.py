@@ -2,7 +2,8 @@
 
 Ranges are those of the scene's own models; where those have no bound, or one far from anything that is felt, the rows
 below state the range that the lab offers [choice]. A value of a preset beyond it widens it. Names are ``table.field``,
-as ``haptics.model.overrides`` takes them; ``.x``, ``.y``, ``.z`` behind one mean a component, ``effects.NAME`` one effect.
+as ``haptics.model.overrides`` takes them; ``.x``, ``.y``, ``.z`` after a name mean a component, ``effects.NAME`` one
+effect.
 """
 
 from __future__ import annotations

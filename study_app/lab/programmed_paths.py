@@ -1,4 +1,4 @@
-"""Programmed paths for a hand: those of the figures (``haptics.model.paths``), as large as the workspace lets them be."""
+"""Programmed paths for a hand: those of the figures (``haptics.model.paths``), as large as the workspace permits."""
 
 from __future__ import annotations
 

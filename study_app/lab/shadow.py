@@ -1,9 +1,9 @@
 """What was felt, computed again beside the servo, and what the other setting would have been on the same motion.
 
-Telemetry comes in batches; the servo's own tick (``haptics.runtime.recompute``) answers for A and for B, each with a state of its
-own. The felt side shares what survives a change of scene with the servo's safety layer, so that its forces are the
-servo's to the last bit; the other side goes on with a copy of it. The velocity filters of both know the force that was
-sent: it moved the hand. Nothing here can hold the servo up.
+Telemetry comes in batches; the servo's own tick (``haptics.runtime.recompute``) answers for A and for B, each with a
+state of its own. The felt side shares what survives a change of scene with the servo's safety layer, so that its
+forces are the servo's to the last bit; the other side continues with a copy of it. Both velocity filters know the
+force that was sent: it moved the hand. Nothing here can delay the servo.
 """
 
 from __future__ import annotations

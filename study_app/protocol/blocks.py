@@ -7,7 +7,7 @@ from typing import Literal, Self, TypeAlias
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from study_app.protocol.orders.constrained import Constraint
+from study_app.protocol.order_constraint import Constraint
 from study_app.protocol.table import Table
 from study_app.protocol.texts import Id, Localised
 

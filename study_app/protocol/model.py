@@ -25,7 +25,8 @@ from study_app.haptics.model.ranges import DensityKgM3, DiameterM, DragCoefficie
 from study_app.haptics.model.scene import Accuracy, Body, Estimator, Ewma, Knee, Liquid, MotionBox, Scene, SceneScale
 from study_app.protocol.analysis_plan import Analysis
 from study_app.protocol.blocks import Block, Compared
-from study_app.protocol.questions.questionnaire import Item, Questionnaire, Scale
+from study_app.protocol.questions.questionnaire import Item, Questionnaire
+from study_app.protocol.questions.rating import Scale
 from study_app.protocol.table import Table
 from study_app.protocol.texts import Body as PageBody
 from study_app.protocol.texts import Description, Id, Language, Localised, text_in

@@ -9,14 +9,15 @@ from functools import partial
 from pathlib import Path
 from random import Random
 
-from study_app.devices import is_simulated, kind_of
+from study_app.devices.registry import is_simulated, kind_of
 from study_app.errors import StoreError
 from study_app.protocol.load import parse, source_bytes
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import stream
 from study_app.session.resume import find_protocol, source_to_resume
-from study_app.store.folders import locate, refuse_never_begun, study_folder
+from study_app.store.folders import locate, study_folder
 from study_app.store.progress import progress
+from study_app.store.sessions.participant_ids import refuse_never_begun
 from study_app.store.sessions.reopen import check_can_go_on
 
 MAX_SEED = 999_999

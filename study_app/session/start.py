@@ -7,16 +7,17 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from study_app.devices import is_falcon, is_simulated, kind_of
+from study_app.devices.registry import is_falcon, is_simulated, kind_of
 from study_app.devices.rig import Machine
 from study_app.errors import DeviceError, SessionError
 from study_app.protocol.model import Protocol
 from study_app.session.preflight import Facts, Screen
 from study_app.session.request import NewSession
 from study_app.store.clock import SessionClock
-from study_app.store.folders import StudyFolder, check_participant, check_unused
+from study_app.store.folders import StudyFolder
 from study_app.store.sessions.begin import begin
 from study_app.store.sessions.open_session import SessionStore
+from study_app.store.sessions.participant_ids import check_participant, check_unused
 from study_app.store.sessions.reopen import reopen
 from study_app.store.tables.study_description import check_study
 

@@ -17,8 +17,8 @@ from study_app.store.journals import journal
 from study_app.store.progress import attempts
 from study_app.store.sessions.folder_lock import open_alone
 from study_app.store.tables.columns import EXCLUSIONS, MISSING, header
+from study_app.store.tables.csv_files import csv_bytes
 from study_app.store.tables.formulas import unguarded
-from study_app.store.tables.session_tables import csv_bytes
 
 NAMED_IDS = 6
 

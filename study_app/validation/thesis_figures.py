@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from study_app.evaluation import style
-from study_app.evaluation.output import make_folder
 from study_app.store.atomic import write_file
+from study_app.store.output_files import make_folder
 from study_app.validation.thesis_motions import FIGURES, Run, ThesisFigure
 
 PLOT_PT: Final = 128.0

@@ -6,12 +6,12 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from study_app.devices import kind_of, list_devices
 from study_app.devices.backends import NONE, READY, Backend
+from study_app.devices.registry import kind_of, list_devices
 from study_app.errors import DeviceError
 
 if TYPE_CHECKING:
-    from study_app.gui.widgets.cards import Tone
+    from study_app.viewmodels.tones import Tone
 
 TITLES = {
     "mouse": "Mouse",

@@ -12,6 +12,7 @@ from typing import Literal
 from study_app.protocol.model import Explore, Protocol, Reach
 from study_app.protocol.orders.schedule import Trial
 from study_app.viewmodels.force_traces import ForceFigures
+from study_app.viewmodels.number_words import THIN_SPACE, duration_words, grouped, minutes
 from study_app.viewmodels.servo_health import Vitals
 from study_app.viewmodels.session_stages import NoteLine, SessionProgress, Stage, operator_language
 
@@ -30,7 +31,6 @@ MEASURES = {
 }
 """What is judged in a trial, as the operator's window calls it."""
 
-THIN_SPACE = "\u2009"
 NOTES_SHOWN = 3
 
 
@@ -215,26 +215,6 @@ def operator_view(
         ),
         blinding=session.protocol.study.blinding,
     )
-
-
-def minutes(seconds: float) -> str:
-    """Return 68 s as "1:08"; an hour and more as "1:02:03"."""
-    whole = max(0, int(seconds))
-    hours, rest = divmod(whole, 3600)
-    if hours:
-        return f"{hours}:{rest // 60:02d}:{rest % 60:02d}"
-    return f"{rest // 60}:{rest % 60:02d}"
-
-
-def grouped(number: int) -> str:
-    """Return 45918 as "45 918" with a thin space."""
-    return f"{number:,}".replace(",", THIN_SPACE)
-
-
-def duration_words(seconds: float) -> str:
-    """Return a lateness or age with the unit that suits it: "62 µs", "1.4 ms"."""
-    micros = seconds * 1e6
-    return f"{micros:.0f} µs" if micros < 1000 else f"{micros / 1000:.2g} ms"
 
 
 def _state(progress: SessionProgress, *, force_on: bool, trouble: str) -> State:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from study_app.devices import is_falcon
+from study_app.devices.registry import is_falcon
 from study_app.errors import StoreError
 from study_app.store.blinded.sealing import opened, opened_key
 from study_app.store.exclusions import Exclusion, exclusions

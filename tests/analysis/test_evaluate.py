@@ -16,7 +16,7 @@ from study_app.analysis.designs.block_tests import of_tables
 from study_app.analysis.designs.liquids import pairs_of
 from study_app.analysis.designs.verdicts import judged
 from study_app.analysis.evaluate import evaluate
-from study_app.analysis.findings import block_results as results
+from study_app.analysis.findings import item_test
 from study_app.analysis.findings.block_results import BlockFound, Results, plain
 from study_app.analysis.findings.conduct import delivered, orders
 from study_app.analysis.statistics.friedman import friedman
@@ -295,7 +295,7 @@ def test_where_one_liquid_differs_the_others_are_seldom_told_apart(n: int) -> No
     decided = replace(DECIDED, primary=())
     wrong = right = 0
     opened_ = paired([1.0, 2.0], [2.0, 1.0])
-    omnibus = tuple(results.Tested(item.id, opened_, "f", 9, "Holm", 0.001, True, "shown") for item in items)
+    omnibus = tuple(item_test.Tested(item.id, opened_, "f", 9, "Holm", 0.001, True, "shown") for item in items)
     for _ in range(100):
         latent = 3.5 + np.array([[0.0], [2.0], [0.0]]) + rng.normal(0, 1, (9, n, 3, 1))
         values = {item.id: np.clip(np.rint(rows), 1, 7) for item, rows in zip(items, latent, strict=True)}

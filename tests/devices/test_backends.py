@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import numba
 import pytest
 
-from study_app.devices import list_devices
 from study_app.devices.backends import NONE, NOT_HERE, READY, backends
 from study_app.devices.falcon.failures import UsbFailure
+from study_app.devices.registry import list_devices
 from study_app.devices.spacemouse.reports import MODELS
 
 

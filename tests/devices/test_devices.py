@@ -8,7 +8,7 @@ import pytest
 if numba.config.DISABLE_JIT:
     pytest.skip("devices are C functions", allow_module_level=True)
 
-from study_app.devices import is_falcon, is_simulated, kind_of, list_devices, moves_by_itself, open_device
+from study_app.devices.registry import is_falcon, is_simulated, kind_of, list_devices, moves_by_itself, open_device
 from study_app.errors import DeviceNotFound
 from study_app.haptics.kernels.c_functions import READ_LOST, READ_NEW, READ_NOTHING_NEW
 from study_app.haptics.model.layout import new_reading

@@ -15,9 +15,21 @@ from PySide6.QtWidgets import QApplication, QLabel, QWidget
 from study_app.gui.participant.pages import page_widget
 
 MODULES = tuple(
-    f"study_app.gui.{name}"
-    for name in ("keys", "progress", "scene_view", "pages.cells", "pages.heading", "pages.languages")
-) + tuple(f"study_app.gui.participant.pages.{name}" for name in ("notices", "questionnaire", "reading", "rows", "text"))
+    f"study_app.gui.participant.{name}"
+    for name in (
+        "tank_widget",
+        "pages.answer_cell",
+        "pages.column_labels",
+        "pages.key_caps",
+        "pages.language_switch",
+        "pages.notices",
+        "pages.progress_line",
+        "pages.questionnaire",
+        "pages.reading_page",
+        "pages.statement_row",
+        "pages.text_page",
+    )
+)
 
 
 @dataclass(frozen=True)

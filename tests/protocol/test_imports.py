@@ -10,7 +10,9 @@ HEAVY = ("numba", "llvmlite", "PySide6", "pyqtgraph", "pandas", "scipy", "matplo
 
 
 def test_reading_a_protocol_loads_neither_compiler_nor_qt():
-    modules = [f"study_app.protocol.{module.name}" for module in pkgutil.iter_modules(study_app.protocol.__path__)]
+    modules = [
+        module.name for module in pkgutil.walk_packages(study_app.protocol.__path__, prefix="study_app.protocol.")
+    ]
     assert "study_app.protocol.load" in modules
     program = (
         f"import sys, {', '.join(modules)}\n"

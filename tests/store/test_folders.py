@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 from study_app.errors import StoreError
-from study_app.store.folders import StudyFolder, check_participant, check_unused, locate, study_folder, suggest_id
+from study_app.store.folders import StudyFolder, locate, study_folder
+from study_app.store.sessions.participant_ids import check_participant, check_unused, suggest_id
 
 
 def with_sessions(path: Path, *names: str) -> StudyFolder:

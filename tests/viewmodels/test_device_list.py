@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from study_app.devices import list_devices
 from study_app.devices.backends import NONE, NOT_HERE, READY, Backend, backends
+from study_app.devices.registry import list_devices
 from study_app.viewmodels.device_list import FELT_BY_PEOPLE, device_named, devices_shown, looking
 
 MOUSE = Backend("mouse", "the window", READY, "seen, not felt")

@@ -9,7 +9,8 @@ import pytest
 from study_app.protocol.model import Limits
 from study_app.store.tables.columns import TRIALS, header
 from study_app.store.tables.session_tables import beyond_limits
-from study_app.viewmodels.operator import MEASURES, duration_words, grouped, minutes
+from study_app.viewmodels.number_words import duration_words, grouped, minutes
+from study_app.viewmodels.operator import MEASURES
 
 SECRETS = ("thin", "thick", "prompt", "200")
 

@@ -10,8 +10,10 @@ import numpy as np
 import pandas as pd
 
 from study_app.analysis.designs.verdicts import FDR, alone, in_family, judged
-from study_app.analysis.findings.block_results import BlockFound, Tested, Waiting
-from study_app.analysis.report.section_failures import Failure, Failures
+from study_app.analysis.findings.block_results import BlockFound
+from study_app.analysis.findings.item_test import Tested
+from study_app.analysis.findings.not_tested import Waiting
+from study_app.analysis.findings.section_failures import Failure, Failures
 from study_app.analysis.statistics.friedman import DRAWN_UP_TO, friedman
 from study_app.analysis.statistics.global_permutation import global_permutation
 from study_app.analysis.statistics.multiple_comparisons import false_discovery

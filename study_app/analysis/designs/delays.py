@@ -9,7 +9,11 @@ import numpy as np
 
 from study_app.analysis.designs.block_tests import AGAIN, MANY, OVER_ALL, Asked, asked_again, head, over_all
 from study_app.analysis.designs.verdicts import judged
-from study_app.analysis.findings.block_results import Against, BlockFound, Lowest, Tested, Waiting
+from study_app.analysis.findings.block_results import BlockFound
+from study_app.analysis.findings.contrast_with_control import Against
+from study_app.analysis.findings.item_test import Tested
+from study_app.analysis.findings.lowest_delay import Lowest
+from study_app.analysis.findings.not_tested import Waiting
 from study_app.analysis.statistics.equivalence.power import participants_needed
 from study_app.analysis.statistics.equivalence.tost import tost
 from study_app.analysis.statistics.multiple_comparisons import holm

@@ -20,7 +20,11 @@ from study_app.analysis.designs.block_tests import (
     over_all,
 )
 from study_app.analysis.designs.verdicts import HOLM, in_family, verdict
-from study_app.analysis.findings.block_results import BlockFound, Named, Pair, Tested, Waiting
+from study_app.analysis.findings.block_results import BlockFound
+from study_app.analysis.findings.item_test import Tested
+from study_app.analysis.findings.liquid_recognition import Named
+from study_app.analysis.findings.not_tested import Waiting
+from study_app.analysis.findings.pair_comparison import Pair
 from study_app.analysis.statistics.multiple_comparisons import holm
 from study_app.analysis.statistics.outcome import Outcome, told
 from study_app.analysis.statistics.paired import paired

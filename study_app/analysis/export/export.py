@@ -11,8 +11,8 @@ from study_app.analysis.export.codebook import codebook_bytes
 from study_app.analysis.export.frame_csv import table_bytes
 from study_app.analysis.export.typed_tables import Delivered, deliver
 from study_app.analysis.export.wide_table import wide
-from study_app.analysis.output import write_files
 from study_app.analysis.tables.study import Study, load_study
+from study_app.store.output_files import write_files
 
 Extra: TypeAlias = Literal["wide", "parquet", "sav", "psych-ds"]
 NOTHING_ELSE: Final[frozenset[Extra]] = frozenset()

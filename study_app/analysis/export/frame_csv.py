@@ -1,4 +1,4 @@
-"""A frame as CSV, a column at a time: the same cells as ``store.tables.session_tables`` writes, row by row, and much sooner."""
+"""A frame as CSV, column by column: the same cells as ``store.tables.csv_files`` writes row by row, and faster."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pandas as pd
 
 from study_app.analysis.export.typed_tables import Delivered
 from study_app.store.tables.columns import header
-from study_app.store.tables.session_tables import cell_text
+from study_app.store.tables.csv_files import cell_text
 
 ROWS_AT_ONCE: Final = 20_000
 """So many rows are held as text at the same time."""

@@ -12,11 +12,11 @@ from matplotlib.figure import Figure
 from study_app.analysis import style
 from study_app.analysis.figures import captions, diverging_bars, small_multiples
 from study_app.analysis.figures.page_layout import Mark
-from study_app.analysis.output import write_files
 from study_app.analysis.tables.compared_blocks import Block, Kind
 from study_app.analysis.tables.measures import by_participant
 from study_app.analysis.tables.study import Study, load_study
 from study_app.errors import AnalysisError
+from study_app.store.output_files import write_files
 
 KINDS: Final[tuple[Kind, ...]] = ("liquids", "delays")
 

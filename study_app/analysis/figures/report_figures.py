@@ -16,8 +16,8 @@ from study_app.analysis.figures import (
     small_multiples,
 )
 from study_app.analysis.findings.block_results import BlockFound, Results
+from study_app.analysis.findings.section_failures import Failure, Failures
 from study_app.analysis.findings.words import counted, interval, number, p_equals
-from study_app.analysis.report.section_failures import Failure, Failures
 from study_app.analysis.tables.compared_blocks import Block
 from study_app.analysis.tables.performance import OF_REACHES
 from study_app.analysis.tables.study import Study
@@ -187,7 +187,8 @@ def _movement(study: Study, block: Block, results: Results, name: str, forms: Se
     simulated = "SIMULATED participants, no people; " if study.simulated else ""
     caption = (
         f"How participants reached, over the delay that was asked for ({simulated}{n} with recordings). Thin lines: "
-        f"{small_multiples.told_lines(len(people))}; thick line: median; band: the middle half. Movement time: from the "
+        f"{small_multiples.told_lines(len(people))}; thick line: median; band: the middle half. Movement time: from "
+        "the "
         "lighting of a target to the "
         f"entry that was held. Scales do not begin at zero. {_kept(block, results)}"
     )

@@ -8,117 +8,23 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass
-from typing import Any, Literal, TypeAlias
+from typing import Any
 
-from study_app.analysis.report.section_failures import Failure
-from study_app.analysis.statistics.equivalence.tost import Equivalence
-from study_app.analysis.statistics.equivalence.tost import Verdict as Nearness
+from study_app.analysis.findings.contrast_with_control import Against
+from study_app.analysis.findings.delivered_delay import Delivered
+from study_app.analysis.findings.item_test import Tested
+from study_app.analysis.findings.liquid_recognition import Named
+from study_app.analysis.findings.lowest_delay import Lowest
+from study_app.analysis.findings.not_tested import Waiting
+from study_app.analysis.findings.pair_comparison import Pair
+from study_app.analysis.findings.section_failures import Failure
 from study_app.analysis.statistics.outcome import Outcome
 from study_app.analysis.statistics.psychometrics.threshold import Threshold
-from study_app.analysis.statistics.recognition import Recognition
-from study_app.analysis.statistics.trend import StepDown
 from study_app.analysis.tables.compared_blocks import Item, Kind, Setting
 from study_app.analysis.tables.performance import Performance
-from study_app.analysis.tables.planned_analysis import Decided, Direction
+from study_app.analysis.tables.planned_analysis import Decided
 from study_app.errors import AnalysisError
 from study_app.protocol.orders.balance import Evenness
-
-Verdict: TypeAlias = Literal["shown", "suggested", "not shown", "out of reach", "not tested"]
-"""What may be said: ``shown`` (primary), ``suggested`` (exploratory), ``not shown``, ``out of reach`` of so few
-participants however they had answered, or ``not tested``. None of them says that there is nothing."""
-
-
-@dataclass(frozen=True, slots=True)
-class Tested:
-    """A test of one statement within its family of ``members``, with p adjusted by ``correction``."""
-
-    item: str
-    outcome: Outcome
-    family: str
-    members: int
-    correction: str
-    p_adjusted: float | None
-    primary: bool
-    verdict: Verdict
-
-
-@dataclass(frozen=True, slots=True)
-class Pair:
-    """Two settings (codes) compared in one statement; the family is all pairs that are compared in the block."""
-
-    first: str
-    second: str
-    tested: Tested
-
-
-@dataclass(frozen=True, slots=True)
-class Named:
-    """The recognition of liquids: the items that name one, and which of them is right for each setting (code)."""
-
-    labels: tuple[str, ...]
-    settings: tuple[str, ...]
-    right: tuple[str | None, ...]
-    found: Recognition
-    verdict: Verdict
-
-
-@dataclass(frozen=True, slots=True)
-class Lowest:
-    """The lowest delay at which a trend shows in one statement, stepping down.
-
-    The error rate of ``steps`` holds within the statement; that of ``over_all_ms``, the lowest delay whose steps all
-    have p ≤ alpha / ``members``, over all statements of the family.
-    """
-
-    item: str
-    steps: StepDown
-    members: int = 1
-
-    @property
-    def over_all_ms(self) -> float | None:
-        """The lowest delay that shows with the error rate held over all statements; None without any."""
-        lowest = None
-        for step in self.steps.steps:
-            if step.page.p is None or step.page.p > self.steps.alpha / self.members:
-                break
-            lowest = step.longest_ms
-        return lowest
-
-
-@dataclass(frozen=True, slots=True)
-class Against:
-    """One delay compared with the shortest in one statement.
-
-    ``found`` holds the verdict; ``p_adjusted`` is p of a difference, corrected over the ``members`` comparisons of
-    the block; ``expected`` the direction that was stated before the study, None where none was.
-    """
-
-    item: str
-    delay_ms: float
-    control_ms: float
-    found: Equivalence
-    p_adjusted: float | None
-    members: int
-    expected: Direction | None = None
-
-    @property
-    def verdict(self) -> Nearness:
-        """What may be said: "equivalent" where every test shows it, "different" by the corrected p."""
-        return self.found.verdict
-
-    @property
-    def as_expected(self) -> bool:
-        """Whether answers went where they were expected to, or nothing was expected."""
-        away = self.found.effect or 0.0
-        return self.expected is None or (away > 0) == (self.expected == "increasing")
-
-
-@dataclass(frozen=True, slots=True)
-class Waiting:
-    """What is not there, and why: while the key is sealed, or for good."""
-
-    what: str
-    why: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -166,25 +72,6 @@ class BlockFound:
         if self.kind != "delays" or not self.revealed:
             return ()
         return tuple(sorted({setting.delay_ms or 0.0 for setting in self.settings}))
-
-
-@dataclass(frozen=True, slots=True)
-class Delivered:
-    """How far what was shown under one setting differed from what was asked for; ms, over trials.
-
-    Of ``judged`` trials it is known whether they kept to the protocol's limits of timing; ``valid`` ones did.
-    """
-
-    block: str
-    code: str | None
-    delay_ms: float | None
-    trials: int
-    measured: int
-    judged: int
-    valid: int
-    error_mean_ms: float | None
-    error_worst_ms: float | None
-    achieved_ms: float | None
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import pandas as pd
 
-from study_app.analysis.findings.block_results import Delivered
+from study_app.analysis.findings.delivered_delay import Delivered
 from study_app.analysis.tables.compared_blocks import Block
 from study_app.analysis.tables.study import Study
 from study_app.protocol.orders.balance import Evenness, evenness

@@ -12,7 +12,7 @@ from study_app.analysis.tables.planned_analysis import Decided
 from study_app.errors import AnalysisError
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
-from study_app.protocol.questions.questionnaire import POINTS
+from study_app.protocol.questions.rating import POINTS
 from study_app.protocol.questions.simulated_answers import OPINIONS, Felt
 
 Feelings: TypeAlias = Mapping[tuple[str, str], Sequence[Felt]]

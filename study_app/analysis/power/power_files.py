@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from study_app.analysis import style
-from study_app.analysis.output import write_files
 from study_app.analysis.power import figure
 from study_app.analysis.power.power_curves import Powers
 from study_app.analysis.power.power_tables import power_csv, power_markdown
+from study_app.store.output_files import write_files
 
 
 def write(found: Powers, to: Path) -> tuple[Path, ...]:

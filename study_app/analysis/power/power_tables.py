@@ -13,7 +13,7 @@ from study_app.analysis.power.counts import EFFECTS
 from study_app.analysis.power.permutation_tests import DRAWS
 from study_app.analysis.power.power_curves import WANTED, Curve, Powers, Question, interval
 from study_app.store.tables.columns import Column
-from study_app.store.tables.session_tables import csv_bytes
+from study_app.store.tables.csv_files import csv_bytes
 
 COLUMNS: Final = (
     Column("study", "text", "Short name of the study, from its protocol."),

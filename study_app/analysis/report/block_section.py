@@ -6,7 +6,10 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 
 from study_app.analysis.figures.report_figures import Picture
-from study_app.analysis.findings.block_results import BlockFound, Pair, Results, Tested
+from study_app.analysis.findings.block_results import BlockFound, Results
+from study_app.analysis.findings.item_test import Tested
+from study_app.analysis.findings.pair_comparison import Pair
+from study_app.analysis.findings.section_failures import Failure, Failures
 from study_app.analysis.findings.words import (
     VERDICTS_MEAN,
     interval,
@@ -24,7 +27,6 @@ from study_app.analysis.findings.words import (
 )
 from study_app.analysis.report import delay_sections
 from study_app.analysis.report.html_page import bullets, heading, not_there, paragraph, picture, table
-from study_app.analysis.report.section_failures import Failure, Failures
 from study_app.analysis.statistics.ordinal import Ordinal
 from study_app.analysis.statistics.paired import Paired
 

@@ -6,7 +6,8 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-from study_app.analysis.findings.block_results import BlockFound, Delivered, Results
+from study_app.analysis.findings.block_results import BlockFound, Results
+from study_app.analysis.findings.delivered_delay import Delivered
 from study_app.analysis.findings.words import counted, listed, ms, name, number, settings_noun
 from study_app.analysis.report.html_page import bullets, heading, paragraph, table
 from study_app.analysis.tables.performance import DEFINITIONS as TRIAL_DEFINITIONS

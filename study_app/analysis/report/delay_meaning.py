@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
-from study_app.analysis.findings.block_results import Against, BlockFound, Delivered, Lowest, Results
+from study_app.analysis.findings.block_results import BlockFound, Results
+from study_app.analysis.findings.contrast_with_control import Against
+from study_app.analysis.findings.delivered_delay import Delivered
+from study_app.analysis.findings.lowest_delay import Lowest
 from study_app.analysis.findings.words import beyond, counted, interval, listed, ms, number, p_equals, percent, short
 from study_app.analysis.statistics.equivalence.tost import fewest
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from study_app.analysis.findings.block_results import Against, BlockFound, Results
+from study_app.analysis.findings.block_results import BlockFound, Results
+from study_app.analysis.findings.contrast_with_control import Against
 from study_app.analysis.findings.words import beyond, counted, enough, interval, ms, number, p_value, percent, short
 from study_app.analysis.report.delay_meaning import VERDICTS, by_delay, tempting_ms
 from study_app.analysis.report.delay_meaning import meaning as paragraphs_on_delay

@@ -6,7 +6,8 @@ from collections.abc import Iterator, Sequence
 
 from study_app import __version__
 from study_app.analysis.figures.captions import people_a_setting
-from study_app.analysis.findings.block_results import BlockFound, Results, Tested
+from study_app.analysis.findings.block_results import BlockFound, Results
+from study_app.analysis.findings.item_test import Tested
 from study_app.analysis.findings.words import (
     all_of,
     counted,

@@ -13,16 +13,18 @@ from typing import Any, Final
 from study_app import __version__
 from study_app.analysis.designs.verdicts import ALONE, HOLM
 from study_app.analysis.export.codebook import head
-from study_app.analysis.findings.block_results import Against, BlockFound, Results, Tested, plain
+from study_app.analysis.findings.block_results import BlockFound, Results, plain
+from study_app.analysis.findings.contrast_with_control import Against
+from study_app.analysis.findings.item_test import Tested
+from study_app.analysis.findings.section_failures import Failure, Failures
 from study_app.analysis.findings.words import name
-from study_app.analysis.report.section_failures import Failure, Failures
 from study_app.analysis.statistics.outcome import Outcome
 from study_app.analysis.tables.study import Study
 from study_app.store.blinded import blinding
 from study_app.store.checksums import sha256
 from study_app.store.folders import StudyFolder
 from study_app.store.tables.columns import Column
-from study_app.store.tables.session_tables import csv_bytes
+from study_app.store.tables.csv_files import csv_bytes
 
 FORMAT: Final = 1
 LIBRARIES: Final = ("numpy", "scipy", "pandas", "matplotlib", "pyarrow")

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from study_app.analysis.findings.block_results import BlockFound, Results, Tested
+from study_app.analysis.findings.block_results import BlockFound, Results
+from study_app.analysis.findings.item_test import Tested
 from study_app.analysis.findings.words import (
     all_of,
     counted,

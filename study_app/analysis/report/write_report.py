@@ -14,8 +14,8 @@ from study_app.analysis.evaluate import Progress, evaluate
 from study_app.analysis.export.export import export_files
 from study_app.analysis.figures.report_figures import Picture, pictures
 from study_app.analysis.findings.block_results import Results
+from study_app.analysis.findings.section_failures import Failure, Failures
 from study_app.analysis.findings.words import counted
-from study_app.analysis.output import write_files
 from study_app.analysis.report import block_section, conduct_section, number_files, summary
 from study_app.analysis.report.first_page.page import first_page
 from study_app.analysis.report.html_page import (
@@ -31,11 +31,11 @@ from study_app.analysis.report.html_page import (
 )
 from study_app.analysis.report.methods_paragraph import methods, told_versions
 from study_app.analysis.report.r_script import r_script
-from study_app.analysis.report.section_failures import Failure, Failures
 from study_app.analysis.report.typeface import font_faces
 from study_app.analysis.tables.study import Study, load_study
 from study_app.errors import AnalysisError
 from study_app.store.blinded import blinding
+from study_app.store.output_files import write_files
 
 HASHES_SHOWN = 12
 """Of so few files the page shows the hashes one by one; of more, one over all of them."""

@@ -13,7 +13,8 @@ from study_app.session.request import NewSession, draw_seed, resumed, study_resu
 from study_app.session.resume import is_rehearsal
 from study_app.session.start import check
 from study_app.store import receipt
-from study_app.store.folders import locate, refuse_never_begun
+from study_app.store.folders import locate
+from study_app.store.sessions.participant_ids import refuse_never_begun
 from study_app.store.workstation import remember_protocol
 from study_app.workspace import workspace
 

@@ -23,7 +23,7 @@ from study_app.app.devices import diagnosis
 from study_app.app.session.garbage_collection import collecting_here
 from study_app.app.session.termination import ended_from_outside
 from study_app.app.workstation import described, screen_number, settings_here, text_scale_on
-from study_app.devices import is_falcon, kind_of
+from study_app.devices.registry import is_falcon, kind_of
 from study_app.devices.rig import Machine, open_machine
 from study_app.errors import SessionError, StudyError
 from study_app.gui.application import application_here

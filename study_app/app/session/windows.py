@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 from study_app.app.session.bridge import SessionBridge
 from study_app.app.session.parts import Parts
-from study_app.devices import is_simulated, kind_of, moves_by_itself
 from study_app.devices.mouse import MouseDevice
+from study_app.devices.registry import is_simulated, kind_of, moves_by_itself
 from study_app.devices.simulated.hand_commands import HandOrders, hand_of
 from study_app.gui.display.opengl import has_card
 from study_app.gui.display.screens import choose_screens, place

@@ -33,7 +33,7 @@ def accuracy(scene: str | None, liquid: str | None, path: str, to: Path | None) 
     FILE is a protocol or scene file; default: rek2024 and physical_liquids.
     Wakes are measured against their definition, models of a real liquid against experiments and exact solutions.
     """
-    from study_app.evaluation.output import make_folder
+    from study_app.store.output_files import make_folder
     from study_app.validation.accuracy.accuracy_report import markdown
     from study_app.validation.accuracy.accuracy_report import write as write_all
     from study_app.validation.accuracy.comparison import accuracy as measure

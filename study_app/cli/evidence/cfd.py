@@ -22,7 +22,7 @@ def cfd(to: Path | None, *, solve: bool) -> None:
 
     A ball of 68 mm starts, moves evenly and stops at once, at 0.2 and 0.6 m/s. Fitting takes about a minute.
     """
-    from study_app.evaluation.output import make_folder
+    from study_app.store.output_files import make_folder
     from study_app.validation.cfd.fits import fit_all
     from study_app.validation.cfd.model_comparison import fits_markdown, steady_markdown, write
     from study_app.validation.cfd.solver import solve as solve_all

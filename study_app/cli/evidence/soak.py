@@ -32,8 +32,8 @@ def soak(
 
     FILE holds the liquids; default: rek2024. Ctrl+C ends it with the report so far.
     """
-    from study_app.evaluation.output import make_folder
     from study_app.protocol.load import load_scenes
+    from study_app.store.output_files import make_folder
     from study_app.validation.soak.soak import soak as soak_servo
     from study_app.validation.timing.machine_load import beside
 

@@ -54,7 +54,7 @@ def timing(seconds: float, load: LoadName, spin_us: float | None, of_delays: boo
             raise StudyError("--spin is about the servo's loops: leave it out with --delays")
         time_delays(seconds, load, to)
         return
-    from study_app.evaluation.output import make_folder
+    from study_app.store.output_files import make_folder
     from study_app.validation.timing.measurement import timing as time_loops
     from study_app.validation.timing.timing_report import text, write
 
@@ -76,7 +76,7 @@ def timing(seconds: float, load: LoadName, spin_us: float | None, of_delays: boo
 
 def time_delays(seconds: float, load: LoadName, to: Path | None) -> None:
     """Print how well delays are kept; without a display, on none."""
-    from study_app.evaluation.output import make_folder
+    from study_app.store.output_files import make_folder
     from study_app.validation.timing.delay_report import text, write
 
     if sys.platform == "linux" and not any(map(os.environ.get, ("QT_QPA_PLATFORM", "DISPLAY", "WAYLAND_DISPLAY"))):

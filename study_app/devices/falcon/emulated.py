@@ -15,7 +15,8 @@ from study_app.devices.falcon.device import FORCE_LIMIT_N, FalconDevice
 from study_app.devices.falcon.emulator.emulator import Emulator
 from study_app.devices.falcon.emulator.usb_backend import EmulatedBackend
 from study_app.devices.falcon.mechanics.geometry import WORKSPACE_M
-from study_app.devices.falcon.transport.transport import PyUsbTransport, Transport
+from study_app.devices.falcon.transport.transport import Transport
+from study_app.devices.falcon.transport.usb import PyUsbTransport
 
 _STILL_TURNS = 10  # between two strokes of homing it moves again sooner
 

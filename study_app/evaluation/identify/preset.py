@@ -12,11 +12,11 @@ from study_app.evaluation import style
 from study_app.evaluation.identify import figure
 from study_app.evaluation.identify.fit import CONFIDENCE, Fit
 from study_app.evaluation.identify.parameters import Parameter
-from study_app.evaluation.output import make_folder
-from study_app.haptics.model import motion
 from study_app.haptics.runtime.offline import Table
 from study_app.protocol.scene_file import for_new_file, scene_text
 from study_app.store.atomic import write_file
+from study_app.store.output_files import make_folder
+from study_app.store.tables import csv_files
 
 COLUMNS: Final = tuple(f"{kind}_{axis}_n" for kind in ("measured", "fitted", "residual") for axis in "xyz")
 
@@ -49,7 +49,7 @@ def write(found: Fit, to: Path, source: Path) -> tuple[Path, ...]:
     written = [to / f"{found.liquid_id}.toml", to / f"{name}.txt", to / f"{name}.csv"]
     write_file(written[0], preset(found, source).encode())
     write_file(written[1], f"{text(found)}\n".encode())
-    motion.write(written[2], residuals(found))
+    csv_files.write_columns(written[2], residuals(found))
     drawn = figure.draw(found)
     for kind in style.FORMATS:
         written.append(to / f"{name}.{kind}")

@@ -11,7 +11,8 @@ from PySide6.QtCore import QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QDialog, QFileDialog, QHBoxLayout, QProgressBar, QScrollArea, QVBoxLayout, QWidget
 
-from study_app.devices.falcon.doctor.failure_report import Report, findings_of, lines
+from study_app.devices.doctor_report import Report, lines
+from study_app.devices.falcon.doctor.failure_report import findings_of
 from study_app.devices.falcon.doctor.worker import Examination, Said
 from study_app.devices.falcon.failure_modes import Facts
 from study_app.errors import StoreError

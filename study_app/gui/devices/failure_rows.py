@@ -6,12 +6,13 @@ from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QColor, QGuiApplication, QPainter, QPaintEvent
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLineEdit, QVBoxLayout, QWidget
 
-from study_app.devices.falcon.doctor.failure_report import Finding, State
+from study_app.devices.doctor_report import Finding, State
 from study_app.gui.theme.theme import RADIUS_CONTROL, font
 from study_app.gui.theme.themed import Themed, dress
-from study_app.gui.widgets.cards import Chip, Tone
+from study_app.gui.widgets.cards import Chip
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import figures, label
+from study_app.viewmodels.tones import Tone
 
 STATES: dict[State, tuple[Tone, str, str]] = {
     "ok": ("ok", "check", "OK"),

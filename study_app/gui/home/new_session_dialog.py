@@ -20,7 +20,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from study_app.devices import kind_of, list_devices
+from study_app.devices.registry import kind_of, list_devices
 from study_app.errors import DeviceError, StoreError
 from study_app.gui.display.screens import screens_shown
 from study_app.gui.theme.theme import LIGHT, Theme, font
@@ -30,7 +30,8 @@ from study_app.gui.widgets.cards import Icon, Rule
 from study_app.gui.widgets.controls import ActionButton, Check, Choice, Number
 from study_app.gui.widgets.labels import label, set_ink
 from study_app.session.request import NewSession, draw_seed, study_results
-from study_app.store.folders import MAX_SESSION, StudyFolder, UsedIds, check_participant, used_ids
+from study_app.store.folders import StudyFolder
+from study_app.store.sessions.participant_ids import MAX_SESSION, UsedIds, check_participant, used_ids
 from study_app.store.tables.study_description import check_study
 from study_app.store.workstation import DEFAULTS, MachineSettings
 from study_app.viewmodels.device_list import TITLES

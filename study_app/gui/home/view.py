@@ -11,7 +11,7 @@ from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QBoxLayout, QFileDialog, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
 
-from study_app.devices import kind_of
+from study_app.devices.registry import kind_of
 from study_app.errors import StudyError
 from study_app.gui.application import open_here
 from study_app.gui.display.screens import screens_shown

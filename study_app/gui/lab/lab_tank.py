@@ -36,7 +36,7 @@ from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CARD, TANK, font
 from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.background import Background
 from study_app.viewmodels.lab import LabView, Point
-from study_app.viewmodels.operator import grouped
+from study_app.viewmodels.number_words import grouped
 
 MOUSE = "mouse"
 WORKSPACE_M: Point = (0.1, 0.06, 0.06)

@@ -15,7 +15,7 @@ from study_app.gui.widgets.cards import Bar, Card, Icon, Rule
 from study_app.gui.widgets.labels import Elided, figures, label, set_ink
 from study_app.gui.widgets.masked_panel import Hidden
 from study_app.viewmodels.lab import CostRow, ErrorRow, LabView, LimiterShown
-from study_app.viewmodels.operator import grouped
+from study_app.viewmodels.number_words import grouped
 
 NAME_WIDTH = 84
 LINE = 26

@@ -12,7 +12,8 @@ from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QVBoxLayout, QWi
 from study_app.gui.theme.theme import TypeRole, font
 from study_app.gui.widgets.cards import Bar
 from study_app.gui.widgets.labels import Elided, figures, label
-from study_app.viewmodels.operator import OperatorView, minutes
+from study_app.viewmodels.number_words import minutes
+from study_app.viewmodels.operator import OperatorView
 
 HEADINGS: tuple[TypeRole, ...] = ("display", "title", "title_dense", "card")
 

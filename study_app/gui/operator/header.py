@@ -9,10 +9,12 @@ from PySide6.QtWidgets import QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed
-from study_app.gui.widgets.cards import Chip, Logo, Tone
+from study_app.gui.widgets.cards import Chip, Logo
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, figures
-from study_app.viewmodels.operator import OperatorView, State, minutes
+from study_app.viewmodels.number_words import minutes
+from study_app.viewmodels.operator import OperatorView, State
+from study_app.viewmodels.tones import Tone
 
 STATES: dict[State, tuple[Tone, str]] = {
     "preparing": ("neutral", "clock"),

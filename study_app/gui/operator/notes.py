@@ -10,7 +10,8 @@ from study_app.gui.theme.theme import font
 from study_app.gui.widgets.cards import Card, Icon
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, figures, label
-from study_app.viewmodels.operator import NOTES_SHOWN, OperatorView, minutes
+from study_app.viewmodels.number_words import minutes
+from study_app.viewmodels.operator import NOTES_SHOWN, OperatorView
 
 
 class NoteField(QPlainTextEdit):

@@ -9,10 +9,10 @@ from PySide6.QtCore import QSignalBlocker, QSize, Qt, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QBoxLayout, QDialog, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
 
-from study_app.gui.results.decision_dialogs import LeaveOutDialog, TakeBackDialog, UnblindDialog
 from study_app.gui.results.export_dialog import Extra, WriteDialog
 from study_app.gui.results.figures_panel import FiguresPanel
 from study_app.gui.results.sidebar import ExclusionsCard, SessionsCard
+from study_app.gui.sessions.decision_dialogs import LeaveOutDialog, TakeBackDialog, UnblindDialog
 from study_app.gui.sessions.session_page import SessionPage
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import take_away

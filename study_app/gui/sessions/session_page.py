@@ -11,7 +11,7 @@ from PySide6.QtCore import QAbstractTableModel, QModelIndex, Qt, Signal
 from PySide6.QtWidgets import QDialog, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
 
 from study_app.errors import StoreError
-from study_app.gui.results.decision_dialogs import LeaveOutDialog, TakeBackDialog
+from study_app.gui.sessions.decision_dialogs import LeaveOutDialog, TakeBackDialog
 from study_app.gui.sessions.motion_plots import MotionPlot
 from study_app.gui.theme.theme import Theme, font
 from study_app.gui.theme.themed import dress, take_away, wear

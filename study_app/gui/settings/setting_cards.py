@@ -6,7 +6,7 @@ from PySide6.QtCore import QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QButtonGroup, QFileDialog, QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
 
-from study_app.devices import list_devices
+from study_app.devices.registry import list_devices
 from study_app.gui.display.screens import ScreenShown
 from study_app.gui.settings.display_offset import OffsetForm
 from study_app.gui.settings.measured_number import LEAST_WORDS, Measure

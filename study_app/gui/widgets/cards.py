@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Literal, TypeAlias
-
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
@@ -12,8 +10,7 @@ from study_app.gui.theme.icons import draw_icon, draw_logo
 from study_app.gui.theme.theme import RADIUS_CARD, Theme, font
 from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.labels import Ink, label
-
-Tone: TypeAlias = Literal["ok", "warn", "bad", "accent", "neutral"]
+from study_app.viewmodels.tones import Tone
 
 SHADOW = 3
 SHADOW_ALPHAS = (5, 5, 4)

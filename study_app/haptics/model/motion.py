@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import math
-import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -115,33 +114,3 @@ def _number(field: str) -> float | None:
     except ValueError:
         return None
     return value if math.isfinite(value) else None
-
-
-def write(path: Path, table: np.recarray[Any, Any]) -> None:
-    """Write a table of named columns as CSV, every number to its last digit; either the whole file or nothing.
-
-    Raises
-    ------
-    StudyError
-        A number is not finite, or the file cannot be written; one that was there is untouched.
-    """
-    names = table.dtype.names or ()
-    for name in names:
-        if not (finite := np.isfinite(table[name])).all():
-            row = int(np.argmin(finite))
-            raise StudyError(
-                f"{path} is not written: {name} is {table[name][row]} in row {row + 1}; it must be finite: "
-                "lower places, speeds or parameters"
-            )
-    unfinished = path.with_name(f".{path.name}.{os.getpid()}.unfinished")
-    try:
-        with unfinished.open("x", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(names)
-            writer.writerows(zip(*(table[name].tolist() for name in names), strict=True))
-            file.flush()
-            os.fsync(file.fileno())
-        unfinished.replace(path)
-    except OSError as error:
-        unfinished.unlink(missing_ok=True)
-        raise StudyError(f"cannot write {path}: {error.strerror or error}") from error

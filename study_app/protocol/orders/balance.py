@@ -15,8 +15,8 @@ from typing import Literal, TypeAlias
 from study_app.errors import StudyError
 from study_app.protocol.blocks import Order
 from study_app.protocol.model import Protocol
+from study_app.protocol.order_constraint import longest_run, shortest_distance
 from study_app.protocol.orders.block_orders import BlockOrder, orders_of
-from study_app.protocol.orders.constrained import longest_run, shortest_distance
 from study_app.protocol.orders.latin_squares import borders_even, enrolment, row_count
 from study_app.protocol.orders.schedule import codes_of
 

@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from study_app.errors import StudyError
 from study_app.protocol.blocks import Block, Order, Phase
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.constrained import Constraint
+from study_app.protocol.order_constraint import Constraint
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,8 +21,9 @@ from typing import TypeAlias
 
 from study_app.protocol.blocks import Phase
 from study_app.protocol.model import Protocol
+from study_app.protocol.order_constraint import Constraint
 from study_app.protocol.orders.block_orders import BlockOrder, Orders, block_codes, orders_of
-from study_app.protocol.orders.constrained import Constraint, arrange
+from study_app.protocol.orders.constrained import arrange
 from study_app.protocol.orders.latin_squares import row, row_count, row_of
 from study_app.protocol.streams import Draw, shuffle, stream
 

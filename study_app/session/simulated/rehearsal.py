@@ -20,7 +20,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from study_app.devices import moves_by_itself, open_device
+from study_app.devices.registry import moves_by_itself, open_device
 from study_app.devices.simulated.hand_commands import hand_of
 from study_app.errors import SessionError, StoreError
 from study_app.haptics.runtime.clocks.clock import VirtualClock
@@ -39,11 +39,12 @@ from study_app.session.transitions.events import Begin, Chosen, Continue, Event,
 from study_app.session.trial import TankView
 from study_app.session.unkept import Unkept
 from study_app.store.clock import SessionClock
-from study_app.store.folders import StudyFolder, check_unused, locate, rehearsal_folder
+from study_app.store.folders import StudyFolder, locate, rehearsal_folder
 from study_app.store.journals import journal
 from study_app.store.progress import progress_of
 from study_app.store.sessions.begin import begin
 from study_app.store.sessions.open_session import SessionStore
+from study_app.store.sessions.participant_ids import check_unused
 from study_app.store.sessions.reopen import reopen
 from study_app.store.tables.study_description import check_study
 from study_app.workspace import workspace

@@ -35,7 +35,7 @@ class LanguageChosen:
 
 @dataclass(frozen=True, slots=True)
 class TaskDone:
-    """The task of the running trial is over; ``summary`` is what its trial row records (see ``store.tables.columns``)."""
+    """The task of the running trial is over; ``summary`` is what its row records (see ``store.tables.columns``)."""
 
     at_s: float
     outcome: Literal["complete", "timeout"]

@@ -21,8 +21,8 @@ from study_app.store.journals.journal import Line
 from study_app.store.sessions.folder_lock import open_alone
 from study_app.store.sessions.open_session import Place, table_files
 from study_app.store.tables.columns import LATER, SEALED, TABLES
+from study_app.store.tables.csv_files import in_columns_of
 from study_app.store.tables.participants import write_participants
-from study_app.store.tables.session_tables import in_columns_of
 from study_app.store.tables.study_description import described_study, write_description
 
 

@@ -18,12 +18,13 @@ from study_app.store import receipt
 from study_app.store.atomic import beside, cannot_write, is_there, sweep_old, sync_folder
 from study_app.store.blinded.blinding import Key, open_or_draw_key, reveals
 from study_app.store.clock import SessionClock
-from study_app.store.folders import StudyFolder, check_participant, check_unused, used_id
+from study_app.store.folders import StudyFolder
 from study_app.store.journals.journal import FORMAT
 from study_app.store.journals.journal_writer import Journal
 from study_app.store.recorder import Recorder
 from study_app.store.sessions.folder_lock import Opening, create_opened
 from study_app.store.sessions.open_session import Place, SessionStore
+from study_app.store.sessions.participant_ids import check_participant, check_unused, used_id
 from study_app.store.sessions.unstarted_sessions import sweep_claims, take_over
 from study_app.store.tables.participants import write_participants
 from study_app.store.tables.study_description import check_study, write_description

@@ -22,7 +22,7 @@ from study_app.store.journals.journal import Line
 from study_app.store.journals.journal_writer import Journal
 from study_app.store.recorder import Kept, Recorder, event_of, hashes_of
 from study_app.store.sessions.folder_lock import Opening
-from study_app.store.tables import session_tables
+from study_app.store.tables import csv_files, session_tables
 from study_app.store.tables.columns import RESPONSES
 from study_app.store.tables.growing_tables import GrowingTables
 from study_app.store.tables.participants import write_participants
@@ -224,6 +224,6 @@ def table_files(place: Place, lines: Sequence[Line], key: Key | None) -> tuple[t
     rows = session_tables.SessionRows(lines)
     columns = session_tables.trial_columns(lines, opened=key is not None)
     return (
-        (place.folder.table(place.study, "responses"), session_tables.csv_bytes(RESPONSES, rows.responses)),
-        (place.folder.table(place.study, "trials"), session_tables.csv_bytes(columns, rows.trials)),
+        (place.folder.table(place.study, "responses"), csv_files.csv_bytes(RESPONSES, rows.responses)),
+        (place.folder.table(place.study, "trials"), csv_files.csv_bytes(columns, rows.trials)),
     )

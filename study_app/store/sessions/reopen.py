@@ -23,7 +23,7 @@ from study_app.store.atomic import is_there, sweep
 from study_app.store.blinded.blinding import Key, open_or_draw_key, read_key, same_conditions
 from study_app.store.checksums import sha256
 from study_app.store.clock import SessionClock
-from study_app.store.folders import SessionFolder, StudyFolder, locate, refuse_never_begun
+from study_app.store.folders import SessionFolder, StudyFolder, locate
 from study_app.store.journals import journal
 from study_app.store.journals.cut_journal import refuse_if_cut
 from study_app.store.journals.journal import Contents, Line
@@ -33,6 +33,7 @@ from study_app.store.recorder import Lost, Recorded, event_of, recording_files
 from study_app.store.sessions.begin import make_recorder, surroundings
 from study_app.store.sessions.folder_lock import open_alone, refuse_if_open
 from study_app.store.sessions.open_session import Place, SessionStore
+from study_app.store.sessions.participant_ids import refuse_never_begun
 from study_app.store.tables.participants import write_participants
 from study_app.store.tables.study_description import write_description
 

@@ -22,12 +22,13 @@ from study_app.store.blinded.blinding import open_or_draw_key, reveals
 from study_app.store.blinded.sealing import opened, opened_key, sealed
 from study_app.store.checksums import checksum_bytes
 from study_app.store.clock import SessionClock
-from study_app.store.folders import StudyFolder, check_participant, check_unused, used_id
+from study_app.store.folders import StudyFolder
 from study_app.store.journals.journal import Line, line_bytes, line_of, plain
 from study_app.store.sessions.begin import first_words, make_folder
 from study_app.store.sessions.folder_lock import Opening, open_alone
 from study_app.store.sessions.open_session import Place, table_files
-from study_app.store.tables import session_tables
+from study_app.store.sessions.participant_ids import check_participant, check_unused, used_id
+from study_app.store.tables import csv_files, session_tables
 from study_app.store.tables.participants import write_participants
 from study_app.store.tables.study_description import check_study, write_description
 from study_app.store.verification.fingerprints import fingerprint, note_fingerprint
@@ -73,7 +74,7 @@ class SimulatedStudy:
         make_folder(self.folder.path)
         self.key = open_or_draw_key(self.folder.path, protocol, stream(seed, "blinding").random, unbundled(source)[1])
         self.protocol = protocol
-        self._rows: dict[Path, session_tables.Row] = {}
+        self._rows: dict[Path, csv_files.Row] = {}
         self._opening: Opening | None = None
         self._told: dict[str, Any] = {
             "session": 1,

@@ -14,7 +14,8 @@ from study_app.store.blinded.blinding import Key
 from study_app.store.blinded.sealing import opened
 from study_app.store.journals.journal import Line
 from study_app.store.tables.columns import RESPONSES, Column
-from study_app.store.tables.session_tables import Row, SessionRows, header_bytes, records, trial_columns
+from study_app.store.tables.csv_files import Row, header_bytes, records
+from study_app.store.tables.session_tables import SessionRows, trial_columns
 
 
 class GrowingTables:

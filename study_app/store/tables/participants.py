@@ -18,14 +18,14 @@ from study_app.store.blinded.sealing import opened, opened_key
 from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal
 from study_app.store.sessions.unstarted_sessions import never_begun
-from study_app.store.tables import session_tables
+from study_app.store.tables import csv_files, session_tables
 from study_app.store.tables.columns import PARTICIPANTS, header
 
 COARSE_S = 2.0  # moments of files closer to each other than this may be told in the wrong order
-NONE: Final[Mapping[Path, session_tables.Row]] = MappingProxyType({})
+NONE: Final[Mapping[Path, csv_files.Row]] = MappingProxyType({})
 
 
-def participants(folder: StudyFolder, known: Mapping[Path, session_tables.Row] = NONE) -> list[session_tables.Row]:
+def participants(folder: StudyFolder, known: Mapping[Path, csv_files.Row] = NONE) -> list[csv_files.Row]:
     """Return one row per session that has begun its journal, by participant and number.
 
     ``known`` are rows by session folder whose journals need not be read, since this program has just written them.
@@ -38,7 +38,7 @@ def participants(folder: StudyFolder, known: Mapping[Path, session_tables.Row] =
     ]
 
 
-def participants_at_once(folder: StudyFolder) -> list[session_tables.Row]:
+def participants_at_once(folder: StudyFolder) -> list[csv_files.Row]:
     """Return what `participants` does, without reading each journal, for lists that people wait for.
 
     A session's row in the table counts where the journal was last changed clearly before the table was; its journal is
@@ -57,13 +57,13 @@ def participants_at_once(folder: StudyFolder) -> list[session_tables.Row]:
     ]
 
 
-def _table(folder: StudyFolder) -> tuple[float, dict[tuple[str, int], session_tables.Row]]:
+def _table(folder: StudyFolder) -> tuple[float, dict[tuple[str, int], csv_files.Row]]:
     """Return when the table was written [s since 1970], and its rows by participant and session."""
     written_s, rows = 0.0, {}
     for path in folder.data.glob(folder.participants("*").name):
         with contextlib.suppress(OSError, ValueError, csv.Error):  # then the journals are read
             written_s = _changed_s(path)
-            found = session_tables.read_table(read_own(path, folder.path), PARTICIPANTS)
+            found = csv_files.read_table(read_own(path, folder.path), PARTICIPANTS)
             rows = {(row["participant"], row["session"]): row for row in found}
     return written_s, rows
 
@@ -83,7 +83,7 @@ def opened_or_none(folder: StudyFolder) -> Key | None:
     return None
 
 
-def row_of(session: SessionFolder, key: Key | None) -> list[session_tables.Row]:
+def row_of(session: SessionFolder, key: Key | None) -> list[csv_files.Row]:
     """Return the row of one session; none if it has not begun. ``key`` is the study's once it was opened."""
     try:
         contents = journal.scan(session.journal) if is_there(session.journal) else journal.Contents([], 0)
@@ -94,7 +94,7 @@ def row_of(session: SessionFolder, key: Key | None) -> list[session_tables.Row]:
     return [row_from(session, contents, key) if contents.lines else _damaged(session, {})]
 
 
-def row_from(session: SessionFolder, contents: journal.Contents, key: Key | None) -> session_tables.Row:
+def row_from(session: SessionFolder, contents: journal.Contents, key: Key | None) -> csv_files.Row:
     """Return the row of a session whose journal has these lines."""
     try:
         row = session_tables.participant(opened(contents.lines, key))
@@ -103,7 +103,7 @@ def row_from(session: SessionFolder, contents: journal.Contents, key: Key | None
     return row if contents.damage is None else row | {"status": "damaged"}
 
 
-def _damaged(session: SessionFolder, start: journal.Line) -> session_tables.Row:
+def _damaged(session: SessionFolder, start: journal.Line) -> csv_files.Row:
     """Return the row of a session whose journal gives none: what its folder, its first line and its receipt tell."""
     if not start:
         with contextlib.suppress(StoreError):
@@ -116,7 +116,7 @@ def _damaged(session: SessionFolder, start: journal.Line) -> session_tables.Row:
     return {**dict.fromkeys(header(PARTICIPANTS)), **known, **which, "status": "damaged"}
 
 
-def write_participants(folder: StudyFolder, study: str, known: Mapping[Path, session_tables.Row] = NONE) -> None:
+def write_participants(folder: StudyFolder, study: str, known: Mapping[Path, csv_files.Row] = NONE) -> None:
     """Bring the table up to date with all journals; ``known`` as in :func:`participants`.
 
     Several programs may do so at once on a shared folder: each looks again after it wrote, so that whoever wrote last
@@ -128,12 +128,12 @@ def write_participants(folder: StudyFolder, study: str, known: Mapping[Path, ses
         The table cannot be written.
     """
     path = folder.participants(study)
-    content = session_tables.csv_bytes(PARTICIPANTS, participants(folder, known))
+    content = csv_files.csv_bytes(PARTICIPANTS, participants(folder, known))
     if path.is_file() and path.read_bytes() == content:
         return
     while True:
         write_file(path, content)
-        again = session_tables.csv_bytes(PARTICIPANTS, participants(folder, known))
+        again = csv_files.csv_bytes(PARTICIPANTS, participants(folder, known))
         if again == content:
             return
         content = again

@@ -6,18 +6,13 @@ order, the same bytes for the same rows on every machine.
 
 from __future__ import annotations
 
-import csv
-import io
-import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any, TypeAlias
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 from study_app.errors import StoreError
 from study_app.store.journals.journal import Line
-from study_app.store.tables.columns import LATER, MISSING, RESPONSES, TRIALS, Column, columns_held, header, unsealed
-from study_app.store.tables.formulas import guarded, unguarded
-
-Row: TypeAlias = dict[str, Any]
+from study_app.store.tables.columns import RESPONSES, TRIALS, Column, header, unsealed
+from study_app.store.tables.csv_files import Row
 
 _SESSION_COLUMNS = ("study", "participant", "session", "simulated", "pilot")
 _TRIAL_COLUMNS = ("trial", "attempt", "block", "phase", "part", "index", "code")
@@ -197,93 +192,6 @@ def latest(rows: Iterable[Row]) -> list[Row]:
     for row in rows:
         last[row["trial"]] = max(row["attempt"], last.get(row["trial"], 0))
     return [row for row in rows if row["attempt"] == last[row["trial"]]]
-
-
-def csv_bytes(columns: Sequence[Column], rows: Iterable[Mapping[str, Any]]) -> bytes:
-    """Return the table as CSV: comma, UTF-8, RFC 4180 quoting, one line feed a record, ``n/a`` where nothing is known.
-
-    Numbers are written in full (the shortest text that reads back as the same number). A text that a spreadsheet would
-    compute has an apostrophe before it (``formulas``); half a surrogate pair, which no file can hold, becomes a
-    question mark.
-    """
-    return b"".join([header_bytes(columns), *records(columns, rows)])
-
-
-def header_bytes(columns: Sequence[Column]) -> bytes:
-    """Return the first record of a table."""
-    return f"{','.join(header(tuple(columns)))}\n".encode()
-
-
-def records(columns: Sequence[Column], rows: Iterable[Mapping[str, Any]]) -> Iterator[bytes]:
-    """Yield each row of a table as `csv_bytes` writes it."""
-    names = header(tuple(columns))
-    for row in rows:
-        yield f"{','.join([cell_text(row[name]) for name in names])}\n".encode("utf-8", "replace")
-
-
-def read_table(table: bytes, columns: Sequence[Column]) -> list[Row]:
-    """Return the rows of a table that `csv_bytes` wrote, in these of its columns; None is what is missing.
-
-    Raises
-    ------
-    ValueError, csv.Error
-        It is no such table.
-    """
-    found = list(csv.reader(io.StringIO(table.decode("utf-8"), newline=""), strict=True)) or [[]]
-    places = [(column, found[0].index(column.name)) for column in columns]
-    if any(len(row) != len(found[0]) for row in found):
-        raise ValueError("its rows differ in length")
-    return [{column.name: _value(column, row[place]) for column, place in places} for row in found[1:]]
-
-
-def _value(column: Column, cell: str) -> Any:
-    if cell == MISSING:
-        return None
-    match column.kind:
-        case "integer" | "number":
-            return int(cell) if cell.removeprefix("-").isdigit() else float(cell)
-        case "flag":
-            return cell == "true"
-    return unguarded(cell)
-
-
-def in_columns_of(
-    held: bytes, table: bytes, columns: Sequence[Column], may_lack: frozenset[str] = LATER
-) -> tuple[bytes, tuple[Column, ...]]:
-    """Return ``table``, whose columns are ``columns``, with those that the table ``held`` must have; and these columns.
-
-    ``held`` may lack ``may_lack``, columns that its version did not write, and ``table`` those that are sealed. Where
-    ``held`` has the same texts without apostrophes, as earlier versions wrote them, it is returned itself.
-    """
-    names, ours = (one.partition(b"\n")[0].decode("utf-8", "replace").split(",") for one in (held, table))
-    there = tuple(column for column in columns if column.name in ours)
-    kept = columns_held(names, there, may_lack)
-    table = table if kept == there else csv_bytes(kept, read_table(table, kept))
-    return (held if b"'" in table and held == _without_guards(table) else table), kept
-
-
-def _without_guards(table: bytes) -> bytes:
-    """Return a table that `csv_bytes` wrote without the apostrophes before texts that a spreadsheet would compute."""
-    rows = csv.reader(io.StringIO(table.decode("utf-8"), newline=""))
-    return "".join(f"{','.join([_quoted(unguarded(cell)) for cell in row])}\n" for row in rows).encode()
-
-
-def cell_text(value: Any) -> str:
-    """Return a cell as it stands in a table."""
-    kind = type(value)
-    if value is None or (kind is float and not math.isfinite(value)):
-        return MISSING
-    if kind is int or kind is float:
-        return repr(value)
-    if kind is bool:
-        return "true" if value else "false"
-    return _quoted(guarded(str(value)))
-
-
-def _quoted(text: str) -> str:
-    if "," in text or '"' in text or "\n" in text or "\r" in text or text != text.strip():
-        return '"' + text.replace('"', '""') + '"'
-    return text
 
 
 def _session(lines: Sequence[Line]) -> Row:

@@ -19,7 +19,7 @@ from study_app.store.journals.journal import Contents
 from study_app.store.sessions.folder_lock import is_open
 from study_app.store.sessions.open_session import Place, table_files
 from study_app.store.tables.columns import TABLES
-from study_app.store.tables.session_tables import in_columns_of
+from study_app.store.tables.csv_files import in_columns_of
 
 CHANGED = "has changed since the session ended (its checksum differs)"
 REBUILT_AFTER = "says that checksums or fingerprint were made again after the session had ended"

@@ -33,7 +33,7 @@ from study_app.store.recorder import recording_files
 from study_app.store.sessions.folder_lock import is_open
 from study_app.store.sessions.open_session import Place, table_files
 from study_app.store.sessions.unstarted_sessions import never_begun
-from study_app.store.tables import session_tables
+from study_app.store.tables import csv_files
 from study_app.store.tables.columns import MISSING, TABLES
 from study_app.store.tables.participants import opened_or_none, row_from
 from study_app.store.verification import table_checks
@@ -65,7 +65,7 @@ class Checked:
     readable: bool
     running: bool
     chained: bool = False
-    row: session_tables.Row | None = None
+    row: csv_files.Row | None = None
     trials: frozenset[int] = frozenset()
     fingerprint: str = ""
 
@@ -258,7 +258,7 @@ def check_table(
     except OSError:
         found.error(path, "is missing or cannot be read; rebuild makes it again")
         return
-    expected, columns = session_tables.in_columns_of(content, expected, TABLES[name])
+    expected, columns = csv_files.in_columns_of(content, expected, TABLES[name])
     if differing := _differing_lines(content, expected):
         beginning = expected.startswith(content)
         behind = all(map(may_be_behind, differing)) and (beginning or _is_behind(content, expected, name))

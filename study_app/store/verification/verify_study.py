@@ -23,7 +23,7 @@ from study_app.store.blinded.blinding import Key
 from study_app.store.folders import StudyFolder
 from study_app.store.sessions.folder_lock import is_open
 from study_app.store.sessions.open_session import Place
-from study_app.store.tables import session_tables
+from study_app.store.tables import csv_files
 from study_app.store.tables.columns import EXCLUSIONS, PARTICIPANTS
 from study_app.store.tables.participants import opened_or_none, row_of
 from study_app.store.tables.study_description import described_study, describes_alike, description_bytes, names_sealed
@@ -34,7 +34,7 @@ from study_app.store.verification.verify_session import BETWEEN_S, LOOKS, Checke
 from study_app.store.verification.violations import Finding, Gathered
 
 Sessions: TypeAlias = list[Checked]
-Rows: TypeAlias = list[tuple[session_tables.Row, bool]]  # and whether the session runs
+Rows: TypeAlias = list[tuple[csv_files.Row, bool]]  # and whether the session runs
 Proofs: TypeAlias = Sequence[tuple[str, str]]  # fingerprint and session
 
 
@@ -118,7 +118,7 @@ def _participants(study: StudyFolder, name: str, sessions: Sessions, found: Gath
     for _ in range(LOOKS):
         if is_open(study.path):  # by a program that writes the table when it ends
             return
-        content = session_tables.csv_bytes(PARTICIPANTS, [row for row, _ in rows])
+        content = csv_files.csv_bytes(PARTICIPANTS, [row for row, _ in rows])
         behind = [running or row["status"] == receipt.UNFINISHED for row, running in rows]
         late = {number for number, may_be in enumerate(behind, start=2) if may_be}
         seen = found.alike()

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from study_app.evaluation.scene_variants import _only, _wake, with_effects, with_wake
 from study_app.haptics.model.bounds import REFERENCE
 from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.laws import Law
-from study_app.haptics.model.scene import Drag, Effect, Estimator, Everywhere, Ewma, Foaw, Given, Line, Raw, Scene
+from study_app.haptics.model.scene import Effect, Estimator, Ewma, Foaw, Given, Line, Raw, Scene
 from study_app.validation.accuracy.candidates import InterpretedRung, LinearRung, ListRung, Rung, TickRung, given
 from study_app.validation.accuracy.naive_wake import NumpyTail, PlainTail
 
@@ -123,27 +122,5 @@ def _carrying(exact: Scene, law: Law, carried: tuple[Effect, ...]) -> Rung:
     return TickRung(" + ".join([_PLAIN[law], *words]), " + ".join([_INITIALS[law], *words]), "effects", of)
 
 
-def with_wake(scene: Scene, **changes: Any) -> Scene:
-    """Return the scene with other parameters of its wake."""
-    wake = _wake(scene).model_copy(update=changes)
-    return scene.model_copy(update={"liquids": (scene.liquids[0].model_copy(update={"wake": wake}),)})
-
-
-def with_effects(scene: Scene, *effects: Effect, law: Law | None = None) -> Scene:
-    """Return the scene with other effects, and perhaps another law of drag."""
-    changes: dict[str, Any] = {"effects": effects} | ({} if law is None else {"drag": Drag(law=law)})
-    return scene.model_copy(update={"liquids": (scene.liquids[0].model_copy(update=changes),)})
-
-
-def _only(scene: Scene, liquid: Any) -> Scene:
-    """Return the scene with one liquid, that is everywhere and does not flow by itself."""
-    alone = liquid.model_copy(update={"region": Everywhere(), "current": None})
-    return scene.model_copy(update={"liquids": (alone,)})
-
-
 def _has_wake(scene: Scene) -> bool:
     return "wake" in scene.liquids[0].effects
-
-
-def _wake(scene: Scene) -> Any:
-    return scene.liquids[0].wake

@@ -14,6 +14,7 @@ from typing import Any, ClassVar, Final, Literal, TypeAlias
 
 import numpy as np
 
+from study_app.evaluation.hand_motions import COUNT_M
 from study_app.evaluation.reference_model import lowered
 from study_app.haptics.kernels.compiled import kernel
 from study_app.haptics.kernels.effects.drag import resistance
@@ -30,8 +31,6 @@ from study_app.validation.accuracy.naive_wake import NumpyTail, PlainTail, list_
 
 UNLIMITED: Final = Bearable(1e9, 1e9)
 """Forces are compared as the model gives them: no slope limit, which no table has for the slowest rungs."""
-COUNT_M: Final = 38e-6
-"""One count of the Falcon's encoders, at the hand [m]."""
 Family: TypeAlias = Literal["tick", "list", "rate", "estimator", "law", "effects"]
 
 

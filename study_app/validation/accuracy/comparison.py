@@ -3,34 +3,27 @@
 from __future__ import annotations
 
 import math
-import os
-import platform
 import statistics
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Final, Literal, NamedTuple, TypeAlias
 
-import numba
 import numpy as np
 
 from study_app.errors import StudyError
 from study_app.evaluation import reference_solutions as truths
+from study_app.evaluation.force_error import ROUNDING, Error, error_of
 from study_app.evaluation.hand_motions import with_velocity
 from study_app.evaluation.reference_solutions import Truth
-from study_app.haptics.model.motion import Floats, Motion
+from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Scene
 from study_app.validation.accuracy import candidate_sets
 from study_app.validation.accuracy.candidates import Rung, given
+from study_app.validation.computer import machine
 
 Kind: TypeAlias = Literal["numerical", "physical"]
 
-RELATIVE: Final = 0.05
-FELT_N: Final = 0.05
-"""The accuracy target: max(5 % of the force, 0.05 N), below the smallest difference of force that people feel, 7 %."""
-ROUNDING: Final = 1e-9
-"""Errors below this share of the force are rounding, and count as equal."""
 
 ALIKE: Final = 1.05
 """Times within this factor count as equal."""
@@ -42,20 +35,6 @@ REPEATS: Final = 5
 BATCHES: Final = 40
 ALLOWANCE_S: Final = 0.8
 """What a rung may take of one repeat; one that is slower gives fewer batches, at least one."""
-
-
-class Error(NamedTuple):
-    """How wrong a force is: root mean square and greatest [N], as shares of the same of the truth, and direction.
-
-    ``direction_deg`` is the root mean square angle where the true force is felt, or else where it is not near zero.
-    """
-
-    rms_n: float
-    most_n: float
-    rms: float
-    most: float
-    direction_deg: float
-    target: float  # max(5 %, 0.05 N) as a share of the true force
 
 
 def _clock() -> Callable[[], int]:
@@ -188,26 +167,6 @@ def _rows(
     return rows
 
 
-def error_of(forces_n: Sequence[Floats], truth: Truth) -> Error:
-    """Return how wrong forces are, one (n, 3) array for each case of the truth."""
-    true_n = np.concatenate([case.force_n[case.counted] for case in truth.cases])
-    felt_n = np.concatenate([force[case.counted] for force, case in zip(forces_n, truth.cases, strict=True)])
-    sizes_n = np.linalg.norm(true_n, axis=1)
-    wrong_n = np.linalg.norm(felt_n - true_n, axis=1)
-    true_rms_n, true_most_n = _rms(sizes_n), float(sizes_n.max())
-    rms_n, most_n = _rms(wrong_n), float(wrong_n.max())
-    counts = (sizes_n >= min(FELT_N, RELATIVE * true_most_n)) & (np.linalg.norm(felt_n, axis=1) > 0)
-    cross = np.linalg.norm(np.cross(felt_n[counts], true_n[counts]), axis=1)
-    angles = np.degrees(np.arctan2(cross, (felt_n[counts] * true_n[counts]).sum(axis=1)))
-    target = max(RELATIVE, FELT_N / true_rms_n)
-    direction_deg = _rms(angles) if len(angles) else math.nan
-    return Error(rms_n, most_n, rms_n / true_rms_n, most_n / true_most_n, direction_deg, target)
-
-
-def _rms(values: Floats) -> float:
-    return float(np.sqrt(np.mean(values**2)))
-
-
 class _Bench:
     """One rung along the motion, again and again, its memory filled before the clock runs."""
 
@@ -301,14 +260,3 @@ def _with_fronts(rows: tuple[Row, ...]) -> tuple[Row, ...]:
     kinds = {kind: [row for row in rows if row.kind == kind] for kind in ("numerical", "physical")}
     on_it = {rung for of in kinds.values() for rung in front(worst(of))}
     return tuple(replace(row, on_front=row.rung in on_it) for row in rows)
-
-
-def machine() -> str:
-    """Return what the times are of: processor, cores, system, versions."""
-    name = platform.processor() or platform.machine()
-    cpus = Path("/proc/cpuinfo")
-    if cpus.exists():
-        lines = cpus.read_text(encoding="utf-8", errors="replace").splitlines()
-        name = next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), name)
-    versions = f"Python {platform.python_version()}, numpy {np.__version__}, numba {numba.__version__}"
-    return f"{name}, {os.cpu_count()} cores, {platform.system()}, {versions}"

@@ -16,7 +16,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter
 
 from study_app.evaluation import style
-from study_app.validation.accuracy.comparison import FELT_N, RELATIVE, ROUNDING, Accuracy, Kind, Row, front, worst
+from study_app.evaluation.force_error import FELT_N, RELATIVE, ROUNDING
+from study_app.validation.accuracy.comparison import Accuracy, Kind, Row, front, worst
 
 WIDTH_PT: Final = 85 / 25.4 * 72
 LEFT_PT: Final = 27.0

@@ -1,6 +1,6 @@
 """The wake as a list that is gone through every tick, as one would first write it: compiled, numpy, Python.
 
-These are what the program could be instead of what it is (``haptics.kernels.effects.wake``): they cost more the longer the
+They are alternatives to ``haptics.kernels.effects.wake`` whose computation time grows with the length of the
 list. Each keeps the elements in a ring and answers two questions a tick: `wake` and, after the force, `follow`.
 """
 

@@ -15,13 +15,13 @@ from typing import Final
 import numpy as np
 
 from study_app.errors import StudyError
-from study_app.evaluation.output import make_folder
 from study_app.haptics.model.motion import Floats
 from study_app.store.atomic import write_file
-from study_app.validation.accuracy.comparison import machine
+from study_app.store.output_files import make_folder
 from study_app.validation.cfd.cases import END, RAMP, STOP, Case, cases, linear_drags, moments, speed
 from study_app.validation.cfd.flow import ORDER, Flow, Grid, library
 from study_app.validation.cfd.stored_flows import MOTION, STEADY, STEADY_FILE, notes_of, text
+from study_app.validation.computer import machine
 
 COMMAND: Final = "liquid-study cfd --solve"
 GRID: Final = Grid(ahead=40, behind=80, aside=40, ball=0.1, near=0.4, far=8)

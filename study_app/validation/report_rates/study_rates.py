@@ -11,10 +11,10 @@ import numpy as np
 from study_app.analysis.designs.block_tests import Asked, of_tables, over_all
 from study_app.analysis.evaluate import found_in
 from study_app.analysis.findings.block_results import BlockFound, Results
+from study_app.analysis.findings.section_failures import Failures
 from study_app.analysis.report.first_page.answer import FOUND
 from study_app.analysis.report.first_page.answers_of_delays import common_ms
 from study_app.analysis.report.first_page.claims import answers as answered
-from study_app.analysis.report.section_failures import Failures
 from study_app.analysis.tables.compared_blocks import Block
 from study_app.analysis.tables.measures import Array
 from study_app.validation.report_rates.rates import Limit, Rate

@@ -1,7 +1,7 @@
 """A closed loop, compiled: the hand moves the handle, the servo's own tick answers, the motors act on the handle.
 
-The handle is that of ``haptics.kernels.plant``, or of the second plant, `arm`. The same motion can be played to the tick again
-without the force acting on anything. All sizes are at the hand.
+The handle is that of ``haptics.kernels.plant``, or of the second plant, `arm`. The same motion can be played to the
+tick again without the force acting on anything. All sizes are at the hand.
 """
 
 from __future__ import annotations

@@ -83,8 +83,8 @@ class Case:
     the greatest speed of the hand along its ``motion``, ``way_mm`` the length of a reach, the diameter of a circle and
     twice the amplitude of a sine.
 
-    ``plant`` is the device and hand of ``haptics.kernels.plant``, the second one, of `arm`, or "falcon": the driver and its
-    emulator (`driven`), whose delay, encoders and samples are their own. ``believed`` is the delay that
+    ``plant`` is the device and hand of ``haptics.kernels.plant``, the second one, of `arm`, or "falcon": the driver and
+    its emulator (`driven`), whose delay, encoders and samples are their own. ``believed`` is the delay that
     the loop believes (-1: the true one), ``slows_to`` that of the device from 0.5 s on (-1: the same). ``lost`` is a
     share of ticks without a new sample, ``duplicated`` one of samples that repeat the position before; for the last
     ``burst_ms`` of every 300 ms there is no new sample.

@@ -19,9 +19,9 @@ from dataclasses import astuple, dataclass, fields
 from pathlib import Path
 from typing import Any, Final
 
-from study_app.evaluation.output import make_folder
 from study_app.haptics.model.layout import LIMITER_NAMES
 from study_app.store.atomic import write_file
+from study_app.store.output_files import make_folder
 from study_app.validation.stability.case_groups import Group
 from study_app.validation.stability.damping_boundary import DELAYS, PERIODS_S, measure_limits, measured_estimators
 from study_app.validation.stability.driver_loop import judge_driven

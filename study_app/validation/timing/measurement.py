@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Final
 
 from study_app.errors import StudyError
-from study_app.validation.accuracy.comparison import machine
+from study_app.validation.computer import machine
 from study_app.validation.timing.lateness import Timed, lane
 from study_app.validation.timing.loops import PERIOD_NS, BareLoop, Loop, QtLoop, ServoLoop, Taken, ThreadLoop, granted
 from study_app.validation.timing.machine_load import LoadName, Windows, beside

@@ -9,8 +9,8 @@ import pytest
 from study_app.analysis.export.export import export
 from study_app.analysis.export.frame_csv import table_bytes
 from study_app.analysis.export.typed_tables import Delivered
-from study_app.analysis.output import write_files
 from study_app.errors import AnalysisError
+from study_app.store.output_files import write_files
 from study_app.store.tables.columns import RESPONSES, SEALED, TRIALS, Column, header, unsealed
 from study_app.store.tables.formulas import unguarded
 from tests.analysis.conftest import CANNOT_JUDGE, DELAY_ERROR_MS, HIDDEN, Results

@@ -372,7 +372,8 @@ def test_the_caption_of_opened_delays_says_how_late_they_really_were(rek: Result
 def test_the_same_results_give_the_same_bytes_in_another_process_too(rek: Results, tmp_path: Path) -> None:
     twelve(rek, people=2)
     first = {path.name: path.read_bytes() for path in answer_figures.plot(rek.folder, tmp_path / "first")}
-    code = f"from study_app.analysis.figures.answer_figures import plot; plot({str(rek.folder)!r}, {str(tmp_path / 'second')!r})"
+    again = f"plot({str(rek.folder)!r}, {str(tmp_path / 'second')!r})"
+    code = f"from study_app.analysis.figures.answer_figures import plot; {again}"
     subprocess.run(
         [sys.executable, "-W", "error", "-c", code], check=True, env={"PYTHONHASHSEED": "7", "HOME": str(tmp_path)}
     )

@@ -6,8 +6,10 @@ from collections.abc import Mapping
 
 import pytest
 
-from study_app.analysis.findings.block_results import Against, BlockFound, Lowest
+from study_app.analysis.findings.block_results import BlockFound
 from study_app.analysis.findings.block_results import Results as Found
+from study_app.analysis.findings.contrast_with_control import Against
+from study_app.analysis.findings.lowest_delay import Lowest
 from study_app.analysis.report.delay_meaning import by_delay, meaning, tempting_ms
 from study_app.analysis.report.summary import findings, limits
 from study_app.analysis.statistics.equivalence.tost import tost

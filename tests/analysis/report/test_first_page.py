@@ -9,14 +9,15 @@ import numpy as np
 import pytest
 
 from study_app.analysis.evaluate import evaluate
-from study_app.analysis.findings.block_results import Named, Results
+from study_app.analysis.findings.block_results import Results
+from study_app.analysis.findings.liquid_recognition import Named
+from study_app.analysis.findings.section_failures import Failures
 from study_app.analysis.report.first_page.answer import Answer
 from study_app.analysis.report.first_page.answers_of_delays import common_ms
 from study_app.analysis.report.first_page.answers_of_liquids import given, recognised
 from study_app.analysis.report.first_page.claims import answers
 from study_app.analysis.report.first_page.page import first_page
 from study_app.analysis.report.measured import CLAIMS, STUDIES, empty_studies
-from study_app.analysis.report.section_failures import Failures
 from study_app.analysis.statistics.recognition import recognition
 from study_app.analysis.tables.planned_analysis import Decided
 from tests.analysis.made_up import DECIDED, ITEMS, delays, everybody, liquids, study

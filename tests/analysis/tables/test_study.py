@@ -8,7 +8,7 @@ from study_app.analysis.tables.study import Study, load_study
 from study_app.errors import AnalysisError, StoreError
 from study_app.protocol.load import parse, source_bytes
 from study_app.store.tables.columns import RESPONSES, TRIALS, header
-from study_app.store.tables.session_tables import csv_bytes, read_table
+from study_app.store.tables.csv_files import csv_bytes, read_table
 from tests.analysis.conftest import CANNOT_JUDGE, Answer, Results, make_results
 from tests.store.earlier import TRIALS_HEADER
 

@@ -20,7 +20,7 @@ from study_app.devices.falcon.boot import (
 from study_app.devices.falcon.emulator.emulator import ALL_HOMED, Emulator
 from study_app.devices.falcon.emulator.usb_backend import EmulatedBackend
 from study_app.devices.falcon.failures import FalconLost, FalconNotFound, UsbFailure, usb_failure
-from study_app.devices.falcon.transport.transport import PyUsbTransport
+from study_app.devices.falcon.transport.usb import PyUsbTransport
 from study_app.devices.falcon.wire import constants
 from study_app.errors import DeviceError
 from tests.devices.falcon.test_firmware import stream

@@ -10,7 +10,6 @@ import pytest
 if numba.config.DISABLE_JIT:
     pytest.skip("devices are C functions", allow_module_level=True)
 
-from study_app.devices import open_device
 from study_app.devices.falcon import device as driver
 from study_app.devices.falcon import firmware
 from study_app.devices.falcon.emulated import EmulatedFalcon
@@ -22,6 +21,7 @@ from study_app.devices.falcon.mechanics.calibration import Calibration
 from study_app.devices.falcon.mechanics.geometry import GEOMETRIES, SAFE_BOX_M
 from study_app.devices.falcon.mechanics.kinematics import REACHED, inverse, new_mechanism
 from study_app.devices.falcon.wire import constants
+from study_app.devices.registry import open_device
 from study_app.devices.scripted import STIFFNESS_NPM
 from study_app.errors import DeviceError
 from study_app.haptics.kernels.c_functions import READ_LOST, READ_NEW, READ_NOTHING_NEW

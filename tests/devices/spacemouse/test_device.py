@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 if numba.config.DISABLE_JIT:
     pytest.skip("devices are C functions", allow_module_level=True)
 
-from study_app.devices import is_simulated, list_devices, moves_by_itself
+from study_app.devices.registry import is_simulated, list_devices, moves_by_itself
 from study_app.devices.spacemouse import hid as spacemouse_hid
 from study_app.devices.spacemouse.device import SpaceMouseDevice
 from study_app.devices.spacemouse.hid import find_space_mice

@@ -9,7 +9,8 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QFileDialog, QLabel
 
-from study_app.devices.falcon.doctor.failure_report import Report, findings_of
+from study_app.devices.doctor_report import Report
+from study_app.devices.falcon.doctor.failure_report import findings_of
 from study_app.devices.falcon.doctor.worker import Examination
 from study_app.devices.falcon.failure_modes import MODES, OPEN, UDEV_RULE, Facts
 from study_app.errors import StudyError

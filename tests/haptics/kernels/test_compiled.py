@@ -103,7 +103,7 @@ def test_what_a_killed_program_had_begun_to_remove_goes(tmp_path: Path) -> None:
 
 def test_programs_that_begin_at_once_sweep_without_a_word_and_use_one_cache(tmp_path: Path) -> None:
     old = caches(tmp_path, [UNUSED_S * 40] * (KEPT_FOLDERS + 12))
-    begin = [sys.executable, "-c", "from study_app.haptics import compiled"]
+    begin = [sys.executable, "-c", "from study_app.haptics.kernels import compiled"]
     environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
     programs = [
         subprocess.Popen(begin, env=environment, stderr=subprocess.PIPE, cwd=Path(__file__).parents[3])
@@ -121,7 +121,7 @@ def said_at_start(folder: Path, environment: dict[str, str]) -> tuple[str, str]:
     """Start an interpreter that compiles a file in ``folder``; return where it keeps that, and what it said."""
     program = folder / "program.py"
     program.write_text(
-        "from study_app.haptics import compiled\n"
+        "from study_app.haptics.kernels import compiled\n"
         "@compiled.kernel\n"
         "def twice(x): return 2 * x\n"
         "assert twice(21) == 42\n"

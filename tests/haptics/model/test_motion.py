@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from study_app.errors import ProtocolError, StudyError
-from study_app.haptics.model.motion import Motion, read, write
+from study_app.haptics.model.motion import Motion, read
+from study_app.store.tables.csv_files import write_columns
 from tests.haptics.scenes import examples
 
 HEADER = "t_s,x_m,y_m,z_m"
@@ -97,7 +98,7 @@ def test_what_is_written_is_read_back_to_the_last_bit(tmp_path_factory, values):
     table.t_s = np.arange(len(values)) / 3
     table.x_m, table.y_m, table.z_m = values.T
     file = tmp_path_factory.mktemp("motion") / "out.csv"
-    write(file, table)
+    write_columns(file, table)
     motion = read(file)
     assert motion.t_s.tobytes() == table.t_s.tobytes()
     assert motion.position_m.tobytes() == np.ascontiguousarray(values).tobytes()
@@ -106,13 +107,13 @@ def test_what_is_written_is_read_back_to_the_last_bit(tmp_path_factory, values):
 def test_whole_numbers_are_written_as_such(tmp_path):
     table = np.recarray(1, [("t_s", float), ("limiters", np.int64)])
     table.t_s, table.limiters = 0.1, 17
-    write(tmp_path / "out.csv", table)
+    write_columns(tmp_path / "out.csv", table)
     assert (tmp_path / "out.csv").read_bytes() == b"t_s,limiters\n0.1,17\n"
 
 
 def test_a_file_is_replaced_whole_and_nothing_is_left_beside_it(tmp_path):
     file = written(tmp_path, "old")
-    write(file, np.recarray(1, [("t_s", float)], buf=np.zeros(1)))
+    write_columns(file, np.recarray(1, [("t_s", float)], buf=np.zeros(1)))
     assert file.read_text() == "t_s\n0.0\n"
     assert [found.name for found in tmp_path.iterdir()] == [file.name]
 
@@ -120,10 +121,10 @@ def test_a_file_is_replaced_whole_and_nothing_is_left_beside_it(tmp_path):
 def test_on_error_nothing_is_written_and_what_was_there_stays(tmp_path):
     (tmp_path / "out.csv").mkdir()
     with pytest.raises(StudyError, match=r"cannot write .*out.csv"):
-        write(tmp_path / "out.csv", np.recarray(1, [("t_s", float)], buf=np.zeros(1)))
+        write_columns(tmp_path / "out.csv", np.recarray(1, [("t_s", float)], buf=np.zeros(1)))
     assert [found.name for found in tmp_path.iterdir()] == ["out.csv"]
     with pytest.raises(StudyError, match="cannot write"):
-        write(tmp_path / "absent" / "out.csv", np.recarray(1, [("t_s", float)], buf=np.zeros(1)))
+        write_columns(tmp_path / "absent" / "out.csv", np.recarray(1, [("t_s", float)], buf=np.zeros(1)))
 
 
 @pytest.mark.parametrize(

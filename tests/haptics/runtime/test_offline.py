@@ -3,11 +3,12 @@ import pytest
 
 from study_app.haptics.model.layout import LIMITER_SLEW
 from study_app.haptics.model.limits import SLEW_N
-from study_app.haptics.model.motion import Motion, write
+from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.overrides import override_all
 from study_app.haptics.model.paths import circle, line, path, reach, reverse, zigzag
 from study_app.haptics.model.scene import Scene
 from study_app.haptics.runtime.offline import COLUMNS, simulate
+from study_app.store.tables.csv_files import write_columns
 from tests.haptics.scenes import HONEY, WATER, WATER_FACTOR, moving, scene, vectors
 
 # The settings of the thesis' figures 3 to 8.
@@ -149,7 +150,7 @@ def test_a_file_is_as_good_as_a_motion(tmp_path):
     motion = circle(1000.0, rest_s=0.1, revolutions=0.1)
     table = simulate(WATER, motion)
     file = tmp_path / "motion.csv"
-    write(file, table[["t_s", "x_m", "y_m", "z_m", "vx_mps", "vy_mps", "vz_mps"]])
+    write_columns(file, table[["t_s", "x_m", "y_m", "z_m", "vx_mps", "vy_mps", "vz_mps"]])
     assert (simulate(WATER, file) == table).all()
     assert (simulate(WATER, str(file)) == table).all()
 

@@ -26,7 +26,7 @@ from study_app.store.sessions.begin import SessionStore
 from study_app.store.sessions.rebuild import rebuild
 from study_app.store.sessions.reopen import reopen
 from study_app.store.tables.columns import SEALED, TRIALS, header, unsealed
-from study_app.store.tables.session_tables import csv_bytes, read_table
+from study_app.store.tables.csv_files import csv_bytes, read_table
 from study_app.store.tables.study_description import description_bytes
 from study_app.store.verification.verify_study import verify
 from tests.store.conftest import SOURCE

@@ -12,11 +12,12 @@ import pytest
 
 from study_app import app
 from study_app.errors import StoreError
-from study_app.store.folders import StudyFolder, check_unused, suggest_id
+from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal_writer
 from study_app.store.sessions import begin, open_session
 from study_app.store.sessions.folder_lock import markers, open_alone
 from study_app.store.sessions.open_session import SessionStore
+from study_app.store.sessions.participant_ids import check_unused, suggest_id
 from study_app.store.sessions.reopen import reopen
 from study_app.store.sessions.unstarted_sessions import abandoned, never_begun
 from study_app.store.verification.verify_study import verify

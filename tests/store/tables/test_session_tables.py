@@ -18,16 +18,9 @@ from study_app.store.journals.journal import read
 from study_app.store.progress import progress_of
 from study_app.store.sessions.begin import SessionStore
 from study_app.store.tables.columns import MISSING, RESPONSES, TABLES, TRIALS, Column, header, unsealed, variable
+from study_app.store.tables.csv_files import csv_bytes, in_columns_of, read_table
 from study_app.store.tables.formulas import guarded
-from study_app.store.tables.session_tables import (
-    csv_bytes,
-    in_columns_of,
-    latest,
-    participant,
-    read_table,
-    responses,
-    trials,
-)
+from study_app.store.tables.session_tables import latest, participant, responses, trials
 
 NASTY = [
     "plain",

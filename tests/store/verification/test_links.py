@@ -11,12 +11,12 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from study_app.analysis.output import write_files
 from study_app.cli import commands
 from study_app.errors import AnalysisError, StoreError
 from study_app.store import receipt
 from study_app.store.blinded import blinding
 from study_app.store.journals import journal
+from study_app.store.output_files import write_files
 from study_app.store.sessions.begin import SessionStore
 from study_app.store.verification.verify_study import verify
 

@@ -22,8 +22,8 @@ from study_app.store.sessions.begin import SessionStore
 from study_app.store.sessions.rebuild import rebuild
 from study_app.store.sessions.unstarted_sessions import never_begun
 from study_app.store.tables.columns import TABLES
+from study_app.store.tables.csv_files import csv_bytes, read_table
 from study_app.store.tables.participants import write_participants
-from study_app.store.tables.session_tables import csv_bytes, read_table
 from study_app.store.verification.verify_study import Findings, verify
 from tests.store.conftest import choose
 from tests.store.earlier import TRIALS_HEADER

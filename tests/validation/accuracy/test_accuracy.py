@@ -16,6 +16,7 @@ from study_app.cli import commands
 from study_app.cli.evidence.accuracy import _motion
 from study_app.errors import StudyError
 from study_app.evaluation.expected_error import expected, foretold, physical_n
+from study_app.evaluation.force_error import ROUNDING, Error, error_of
 from study_app.evaluation.hand_motions import stir, stroke
 from study_app.evaluation.reference_solutions import Case, Truth
 from study_app.haptics.model.motion import Motion
@@ -24,19 +25,7 @@ from study_app.protocol.load import load_scene
 from study_app.validation.accuracy import candidate_sets
 from study_app.validation.accuracy.accuracy_report import COLUMNS, csv_text, markdown, write
 from study_app.validation.accuracy.candidates import LinearRung, ListRung, TickRung
-from study_app.validation.accuracy.comparison import (
-    FINE_S,
-    ROUNDING,
-    Accuracy,
-    Error,
-    Row,
-    Time,
-    accuracy,
-    error_of,
-    front,
-    race,
-    worst,
-)
+from study_app.validation.accuracy.comparison import FINE_S, Accuracy, Row, Time, accuracy, front, race, worst
 from study_app.validation.accuracy.figure import LABEL_PT, draw, duration, spread
 from tests.haptics.scenes import COMPILED
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-from study_app.analysis.findings.block_results import Against, BlockFound
+from study_app.analysis.findings.block_results import BlockFound
+from study_app.analysis.findings.contrast_with_control import Against
 from study_app.analysis.findings.words import all_of, beyond, interval, listed, ms, number, percent, short
 from study_app.analysis.report.first_page.answer import NO_EVIDENCE, Answer
 from study_app.analysis.tables.planned_analysis import Decided

@@ -6,7 +6,9 @@ from collections.abc import Iterator, Sequence
 from itertools import combinations
 
 from study_app.analysis.designs.liquids import smallest_of_pairs
-from study_app.analysis.findings.block_results import BlockFound, Named, Tested
+from study_app.analysis.findings.block_results import BlockFound
+from study_app.analysis.findings.item_test import Tested
+from study_app.analysis.findings.liquid_recognition import Named
 from study_app.analysis.findings.words import counted, interval, listed, name, number, short
 from study_app.analysis.report.first_page.answer import FOUND, NO_EVIDENCE, Answer
 from study_app.analysis.statistics.outcome import Interval

@@ -10,11 +10,11 @@ from typing import Any, Final
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 
 from study_app.analysis.findings.block_results import BlockFound, Results
+from study_app.analysis.findings.section_failures import Failure, Failures
 from study_app.analysis.report.first_page import pictures
 from study_app.analysis.report.first_page.answer import ASKED, Answer
 from study_app.analysis.report.first_page.claims import answers
 from study_app.analysis.report.measured import empty_studies
-from study_app.analysis.report.section_failures import Failure, Failures
 
 SHOWN: Final = 6
 """So many limits are listed; the others are folded."""
@@ -55,6 +55,6 @@ def _kept_together(words: str) -> str:
 @cache
 def _template() -> Template:
     """Return the template of the first page; everything in it is escaped, and nothing may be missing."""
-    loader = PackageLoader("study_app.analysis.report", "templates")
+    loader = PackageLoader("study_app.analysis.report.first_page", "templates")
     environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
     return environment.get_template("first_page.html")

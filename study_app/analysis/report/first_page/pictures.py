@@ -10,7 +10,8 @@ from matplotlib.axes import Axes
 from study_app.analysis import style
 from study_app.analysis.figures import psychometric_curve
 from study_app.analysis.figures.page_layout import Sheet
-from study_app.analysis.findings.block_results import BlockFound, Named
+from study_app.analysis.findings.block_results import BlockFound
+from study_app.analysis.findings.liquid_recognition import Named
 from study_app.analysis.findings.words import ms, name, short
 from study_app.analysis.report.first_page.answer import Answer
 from study_app.analysis.report.first_page.answers_of_delays import common_ms

@@ -15,7 +15,6 @@ from typing import Any, Final
 
 import numpy as np
 
-from study_app.devices import kind_of
 from study_app.devices.falcon.device import FalconDevice
 from study_app.devices.falcon.emulated import EmulatedFalcon, new_emulator
 from study_app.devices.falcon.emulator.emulator import Emulator
@@ -23,7 +22,8 @@ from study_app.devices.falcon.failure_modes import ALL_HOMED, OPEN, Facts
 from study_app.devices.falcon.failures import FalconFailure, UsbFailure
 from study_app.devices.falcon.mechanics.geometry import WORKSPACE_M
 from study_app.devices.falcon.transport.ftdi import FtdiTransport, load_d2xx
-from study_app.devices.falcon.transport.transport import find_falcons
+from study_app.devices.falcon.transport.usb import find_falcons
+from study_app.devices.registry import kind_of
 from study_app.errors import DeviceError, DeviceLost, ServoFault
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo

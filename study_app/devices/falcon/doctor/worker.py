@@ -15,7 +15,8 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Final, NoReturn, TypeAlias
 
-from study_app.devices.falcon.doctor.failure_report import Report, report
+from study_app.devices.doctor_report import Report
+from study_app.devices.falcon.doctor.failure_report import report
 from study_app.errors import StudyError
 
 PATIENCE_S: Final = 3.0

@@ -7,8 +7,8 @@ element,
     v_tail = (1/S) Σ_i d_i Σ_{j in i} |e_j| ,      v_wake = v_tail · response(|v_tail| / m̄) .
 
 All of it is linear in the |e_j|, so sums are kept and only what enters or leaves is added or taken: here, the response
-to the sums and what a tick does to the list; in ``segments``, the bookkeeping. ``evaluation.reference_model`` is the same
-by the letter, element by element.
+to the sums and what a tick does to the list; in ``segments``, the bookkeeping. ``evaluation.reference_model`` is
+the same by the letter, element by element.
 """
 
 from __future__ import annotations

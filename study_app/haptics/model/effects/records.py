@@ -1,7 +1,7 @@
 """What each effect keeps: its parameters, its state, and the rows it owns in the model's arrays.
 
-Shapes, units and meaning are said here once, as in ``haptics.model.layout``, which puts these records together to those of a
-liquid. Unless a name says otherwise: m, m/s, N, s, scene frame.
+Shapes, units and meaning are said here once, as in ``haptics.model.layout``, which puts these records together to those
+of a liquid. Unless a name says otherwise: m, m/s, N, s, scene frame.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from study_app.devices.falcon.doctor.failure_report import Report
+from study_app.devices.doctor_report import Report
 from study_app.devices.falcon.doctor.worker import ENDED, Examination
 from study_app.errors import StudyError
 from tests.compiled import needs_servo

@@ -11,16 +11,16 @@ import pytest
 if numba.config.DISABLE_JIT:
     pytest.skip("devices are C functions", allow_module_level=True)
 
-from study_app.devices import open_device
 from study_app.devices.falcon.emulator.emulator import Emulator
 from study_app.devices.falcon.emulator.socket_server import EmulatorServer
 from study_app.devices.falcon.homing import PULL_OUT, READY, STROKES
+from study_app.devices.registry import open_device
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 
 PUSHES_AND_DIES = """
 import os, signal, sys, time
-from study_app.devices import open_device
+from study_app.devices.registry import open_device
 from study_app.haptics.model.layout import new_command, new_reading
 device, reading, command = open_device(sys.argv[1]), new_reading(), new_command()
 command[0].force_n = (0.0, 0.0, 2.0)

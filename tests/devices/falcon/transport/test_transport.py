@@ -9,7 +9,8 @@ import usb.core
 
 from study_app.devices.falcon.failures import FURTHER_KINDS, KINDS, FalconLost, FalconNotFound, UsbFailure, usb_failure
 from study_app.devices.falcon.transport.ftdi import FtdiTransport
-from study_app.devices.falcon.transport.transport import PyUsbTransport, open_transport
+from study_app.devices.falcon.transport.transport import open_transport
+from study_app.devices.falcon.transport.usb import PyUsbTransport
 from study_app.devices.falcon.wire import constants
 from study_app.errors import DeviceError, DeviceLost, DeviceNotFound
 from tests.devices.falcon.support.bridges import Backend, D2xx, both
@@ -218,7 +219,7 @@ def test_without_a_falcon_libusb_finds_none():
 
 
 def test_libusbs_function_is_the_one_that_compiled_code_calls():
-    from study_app.devices.falcon.transport.transport import libusb_calls
+    from study_app.devices.falcon.transport.usb import libusb_calls
 
     backend = libusb_package.get_libusb1_backend()
     if backend is None:
@@ -246,8 +247,8 @@ def test_every_failure_is_one_line_that_says_what_to_do():
 
 
 def test_importing_the_ways_to_the_bridge_loads_no_compiler():
-    modules = "transport, transport_socket, transport_ftdi"
-    code = f"import sys; from study_app.devices.falcon import {modules}; sys.exit('numba' in sys.modules)"
+    modules = "transport, usb, unix_socket, ftdi"
+    code = f"import sys; from study_app.devices.falcon.transport import {modules}; sys.exit('numba' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False, env={**os.environ}).returncode == 0
 
 

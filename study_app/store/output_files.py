@@ -1,4 +1,4 @@
-"""Files handed out: all of them whole, or none."""
+"""Files and folders handed to the user: all of them whole, or none."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import secrets
 from collections.abc import Mapping
 from pathlib import Path
 
-from study_app.errors import AnalysisError
+from study_app.errors import AnalysisError, StoreError
 from study_app.store.atomic import sweep_old
 
 
@@ -55,3 +55,19 @@ def write_files(to: Path, files: Mapping[str, bytes]) -> tuple[Path, ...]:
     for folder in {path.parent for path in staged.values()}:
         sweep_old(folder)
     return tuple(to / name for name in files)
+
+
+def make_folder(to: Path) -> None:
+    """Make the folder for reports before the work begins, not minutes or days after.
+
+    Raises
+    ------
+    StoreError
+        It cannot be made.
+    """
+    try:
+        to.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StoreError(
+            f"cannot make the folder {to} ({error.strerror or error}): choose another with --to"
+        ) from error

@@ -16,26 +16,26 @@ from study_app.protocol.load import load
 from tests.analysis.conftest import Results, make_results, twelve
 
 TESTS = {
-    "tables.Study.aggregate": ("liquids", "measures of settings"),
-    "block_tests.presented": ("delays", "counts of answers"),
-    "block_tests.session_numbers": ("delays", "numbers of sessions"),
-    "block_tests.friedman": ("liquids", "test of settings"),
-    "block_tests.global_permutation": ("liquids", "test over all statements"),
-    "liquids_found.recognition": ("liquids", "test of recognition"),
-    "block_tests.ordinal": ("liquids", "the same asked with other assumptions"),
-    "delays_found.page": ("delays", "test of a trend (Page)"),
-    "delays_found.step_down": ("delays", "lowest delay that shows"),
-    "delays_found.tost": ("delays", "test of equivalence"),
-    "delays_found.noticed": ("delays", "detection threshold"),
+    "tables.study.Study.aggregate": ("liquids", "measures of settings"),
+    "designs.block_tests.presented": ("delays", "counts of answers"),
+    "designs.block_tests.session_numbers": ("delays", "numbers of sessions"),
+    "designs.block_tests.friedman": ("liquids", "test of settings"),
+    "designs.block_tests.global_permutation": ("liquids", "test over all statements"),
+    "designs.liquids.recognition": ("liquids", "test of recognition"),
+    "designs.block_tests.ordinal": ("liquids", "the same asked with other assumptions"),
+    "designs.delays.page": ("delays", "test of a trend (Page)"),
+    "designs.delays.step_down": ("delays", "lowest delay that shows"),
+    "designs.delays.tost": ("delays", "test of equivalence"),
+    "designs.delays.noticed": ("delays", "detection threshold"),
 }
 WRITING = {
-    "figures.render": "figure liquids",
-    "report.writing.methods": "texts: methods",
-    "report.writing.short.findings": "texts: findings",
-    "report.writing.r_script": "report.R",
-    "report.listing.motion_csv": "motion.csv",
+    "figures.answer_figures.render": "figure liquids",
+    "report.write_report.methods": "texts: methods",
+    "report.write_report.summary.findings": "texts: findings",
+    "report.write_report.r_script": "report.R",
+    "report.number_files.motion_csv": "motion.csv",
     "report.delay_sections.lowest": "lowest delay",
-    "report.writing.conduct_section.conduct": "section “How it was run”",
+    "report.write_report.conduct_section.conduct": "section “How it was run”",
 }
 
 
@@ -79,7 +79,7 @@ def test_what_progress_raises_is_no_failure(opened: Results) -> None:
 def test_a_report_with_failures_is_written_and_ends_with_three(
     opened: Results, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for broken in (*WRITING, "delays_found.noticed"):
+    for broken in (*WRITING, "designs.delays.noticed"):
         monkeypatch.setattr(f"study_app.analysis.{broken}", fail)
     to = tmp_path / "report"
     done = CliRunner().invoke(commands, ["report", str(opened.folder), "--to", str(to)])

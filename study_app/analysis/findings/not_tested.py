@@ -1,0 +1,13 @@
+"""What was not tested, and why."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Waiting:
+    """What is not there, and why: while the key is sealed, or for good."""
+
+    what: str
+    why: str
