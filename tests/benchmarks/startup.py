@@ -39,14 +39,15 @@ class Probe(QObject):
         return False
 
 from study_app import app
-from study_app.app import live_session, visit
-made = visit.application_here
+from study_app.app import main_controller
+from study_app.app.session import live_session
+made = main_controller.application_here
 def with_probe():
     application = made()
     application.probe = Probe(sys.argv[2].split(","))
     application.installEventFilter(application.probe)
     return application
-live_session.application_here = visit.application_here = with_probe
+live_session.application_here = main_controller.application_here = with_probe
 if sys.argv[1] == "home":
     app.home()
 else:

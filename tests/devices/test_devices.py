@@ -149,5 +149,5 @@ def test_who_holds_a_device_follows_from_its_name(name, falcon, by_itself, simul
 
 
 def test_naming_the_devices_loads_no_compiler():
-    program = "import sys, study_app.devices as d; d.list_devices(); sys.exit('numba' in sys.modules)"
+    program = "import sys, study_app.devices.registry as d; d.list_devices(); sys.exit('numba' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0

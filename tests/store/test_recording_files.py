@@ -228,13 +228,13 @@ import sys
 from pathlib import Path
 import numpy as np
 from study_app.haptics.model.layout import SAMPLE
-from study_app.store import recording
+from study_app.store import recording_files
 path = Path(sys.argv[1])
-file = recording.SamplesFile(path, {}, 1000.0)
+file = recording_files.SamplesFile(path, {}, 1000.0)
 file.write(np.zeros(2000, SAMPLE))
 file.finish()
-recording.read_samples(path)
-recording.read_frames(recording.write_frames(path.with_name("frames.parquet"), np.zeros((3, 2), np.int64), {}).path)
+recording_files.read_samples(path)
+recording_files.read_frames(recording_files.write_frames(path.with_name("frames.parquet"), np.zeros((3, 2), np.int64), {}).path)
 print([name for name in ("pandas", "numba", "scipy", "PySide6") if name in sys.modules])
 """
 

@@ -73,7 +73,7 @@ def test_nothing_of_a_study_is_in_it(
     (session / "journal.jsonl").write_text(f'{{"participant": "{ID}", "value": "{ANSWER}"}}\n')
     (session / "crash.txt").write_text(
         "Fatal Python error: Segmentation fault\n\nCurrent thread 0x00007f (most recent call first):\n"
-        f'  File "/opt/tester-home/study_app/gui/bridge.py", line 12 in start\n{ID} {DENSITY}\n'
+        f'  File "/opt/tester-home/study_app/app/session/bridge.py", line 12 in start\n{ID} {DENSITY}\n'
     )
     firmware, recent = "/x/tester-home/falcon.bin", ("/x/tester-home/own.toml",)
     workstation.save(

@@ -157,22 +157,21 @@ def test_nothing_is_compiled_once_a_client_can_connect(tmp_path):
     """In a program of its own: the first boot and homing through a socket must not wait for a compiler."""
     program = """
 import sys
-from study_app.devices.falcon.emulator import arm, boot, face, faults, ftdi, host, run, server
+from study_app.devices.falcon.emulator import arm, boot_loader, emulator, faults, firmware_loop, ftdi_bridge, host_interface
 from study_app.devices.falcon.emulator.socket_server import EmulatorServer
-from study_app.devices import hand
-from study_app.haptics import plant
-from tests.devices.falcon.emulator.test_socket_server import Foreign, packet, HOMING, wire, OUT, CONTROL
-modules = (arm, boot, face, faults, ftdi, host, run, hand, plant)
+from study_app.devices.simulated import hand
+from study_app.haptics.kernels import plant
+from tests.devices.falcon.emulator.test_socket_server import Foreign, packet, HOMING, constants, OUT, CONTROL
+modules = (arm, boot_loader, emulator, faults, firmware_loop, ftdi_bridge, host_interface, hand, plant)
 def compiled():
     return {(name, len(one.signatures)) for module in modules for name, one in vars(module).items()
             if hasattr(one, "signatures")}
-emulator = face.Emulator()
-with EmulatorServer(emulator, sys.argv[1]) as served:
+with EmulatorServer(emulator.Emulator(), sys.argv[1]) as served:
     before = compiled()
     foreign = Foreign(sys.argv[1])
-    foreign.ask(CONTROL, wire.REQUEST_MODEM, wire.DTR_LOW)
-    foreign.ask(CONTROL, wire.REQUEST_MODEM, wire.DTR_HIGH)
-    foreign.out(wire.PING)
+    foreign.ask(CONTROL, constants.REQUEST_MODEM, constants.DTR_LOW)
+    foreign.ask(CONTROL, constants.REQUEST_MODEM, constants.DTR_HIGH)
+    foreign.out(constants.PING)
     foreign.ask(3, 0x81, 0, 64, 100)
     foreign.set_up()
     foreign.out(packet((1, 2, 3), HOMING))
