@@ -30,23 +30,23 @@ PUBLISHED = {
         "test_ordinal.py::test_published_laplace_estimates_are_the_maximum_of_one_node",
         "test_ordinal.py::test_leaving_the_judges_out_shrinks_the_effects",
     ),
-    "Equivalence: sleep (Student 1908; R, TOSTER)": ("test_equivalence.py::test_published_sleep_data",),
+    "Equivalence: sleep (Student 1908; R, TOSTER)": ("equivalence/test_tost.py::test_published_sleep_data",),
     "Kendall's W of raters: anxiety (R, irr, DescTools)": (
         "test_agreement.py::test_published_agreement_of_three_raters",
     ),
     "Skillings & Mack (1981), table 1 (R, Skillings.Mack)": (
-        "test_missing.py::test_published_assembly_times",
-        "test_missing.py::test_without_missing_answers_and_ties_it_is_friedmans",
+        "test_skillings_mack.py::test_published_assembly_times",
+        "test_skillings_mack.py::test_without_missing_answers_and_ties_it_is_friedmans",
     ),
     "Psychometric functions: psignifit's tests (MATLAB version)": (
-        "test_threshold.py::test_published_fits_of_ten_trials",
-        "test_threshold.py::test_published_fit_of_ninety_trials",
+        "psychometrics/test_threshold.py::test_published_fits_of_ten_trials",
+        "psychometrics/test_threshold.py::test_published_fit_of_ninety_trials",
     ),
     "Friedman's post-hocs: Nemenyi, Conover (R, rstatix)": (
         "test_friedman.py::test_mean_ranks_give_the_published_nemenyi_and_conover_comparisons",
         "test_against_others.py::test_scikit_posthocs",
     ),
-    "Binomial regression: beetles (Bliss 1935)": ("test_threshold.py::test_published_beetles",),
+    "Binomial regression: beetles (Bliss 1935)": ("psychometrics/test_threshold.py::test_published_beetles",),
     "Percentages: MathAnxiety, PISA reading (R, likert)": (
         "test_percentages.py::test_twenty_students",
         "test_percentages.py::test_every_level_of_the_students_has_its_share",
@@ -58,7 +58,7 @@ PUBLISHED = {
         "test_friedman.py::test_published_exact_tails",
         "test_friedman.py::test_five_people_with_ties_give_the_exact_p_and_not_the_approximate_one",
     ),
-    "Holm (statsmodels)": ("test_families.py::test_published_adjustments",),
+    "Holm (statsmodels)": ("test_multiple_comparisons.py::test_published_adjustments",),
     "Cohen's kappa": ("test_agreement.py::test_published_kappa",),
     "Cochran's Q (pingouin, statsmodels)": ("test_friedman.py::test_two_values_give_cochrans_q",),
     "Wilcoxon with ties and zeros (scipy)": (
@@ -72,13 +72,13 @@ PUBLISHED = {
     "What so many participants can reach at all": (
         "test_paired.py::test_the_smallest_p_of_so_many_pairs",
         "test_friedman.py::test_the_smallest_p_of_so_many_people",
-        "test_families.py::test_what_pairs_can_reach_in_a_family",
+        "test_multiple_comparisons.py::test_what_pairs_can_reach_in_a_family",
     ),
     "Critical numbers of hits by matching": (
         "test_recognition.py::test_published_critical_numbers_of_hits",
         "test_recognition.py::test_published_matching_of_five_people",
     ),
-    "Power of the equivalence test": ("test_equivalence.py::test_published_power_at_no_difference",),
+    "Power of the equivalence test": ("equivalence/test_tost.py::test_published_power_at_no_difference",),
 }
 
 
