@@ -7,7 +7,6 @@ from pathlib import Path
 import click
 
 from study_app.cli.options import SCENE_FILE, Target
-from study_app.store.tables import csv_files
 
 
 @click.command()
@@ -25,6 +24,7 @@ def simulate(scene: str, liquid: str, path: str, to: Path, changes: tuple[str, .
     from study_app.haptics.model.overrides import override_all
     from study_app.haptics.runtime import offline
     from study_app.protocol.load import load_scene
+    from study_app.store.tables import csv_files
 
     chosen = override_all(load_scene(scene, liquid), dict(assignment(change) for change in changes))
     programmed = path in paths.NAMES or not (Path(path).suffix or Path(path).exists())

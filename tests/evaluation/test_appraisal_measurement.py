@@ -56,7 +56,7 @@ def test_the_thesis_liquids_are_the_definition_to_rounding(name: str) -> None:
 
 def test_an_error_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     """A reference with a tail of one element less is another liquid."""
-    true = appraisal_measurement.references.respond
+    true = appraisal_measurement.reference_model.respond
 
     def shorter(scene, motion, *, exact=False):  # type: ignore[no-untyped-def]
         liquid = scene.liquids[0]
@@ -64,7 +64,7 @@ def test_an_error_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
         other = scene.model_copy(update={"liquids": (liquid.model_copy(update={"wake": wake}),)})
         return true(other, motion, exact=exact)
 
-    monkeypatch.setattr(appraisal_measurement.references, "respond", shorter)
+    monkeypatch.setattr(appraisal_measurement.reference_model, "respond", shorter)
     found = appraisal_measurement.errors(THESIS["light_oil"])
     assert found.wake is not None
     assert found.wake > 1e-4

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from study_app.errors import DeviceError, DeviceNotFound
-from study_app.gui.preflight.startup_window import FIRST_TIME, OpeningWindow
+from study_app.gui.home.startup_window import FIRST_TIME, OpeningWindow
 from study_app.protocol.load import load
 from study_app.session.request import NewSession, study_results
 from study_app.session.start import check

@@ -234,7 +234,8 @@ file = recording_files.SamplesFile(path, {}, 1000.0)
 file.write(np.zeros(2000, SAMPLE))
 file.finish()
 recording_files.read_samples(path)
-recording_files.read_frames(recording_files.write_frames(path.with_name("frames.parquet"), np.zeros((3, 2), np.int64), {}).path)
+frames = path.with_name("frames.parquet")
+recording_files.read_frames(recording_files.write_frames(frames, np.zeros((3, 2), np.int64), {}).path)
 print([name for name in ("pandas", "numba", "scipy", "PySide6") if name in sys.modules])
 """
 

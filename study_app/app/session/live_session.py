@@ -28,7 +28,7 @@ from study_app.devices.rig import Machine, open_machine
 from study_app.errors import SessionError, StudyError
 from study_app.gui.application import application_here
 from study_app.gui.display.screens import choose_screens, place
-from study_app.gui.preflight.startup_window import OpeningWindow
+from study_app.gui.home.startup_window import OpeningWindow
 from study_app.gui.theme.theme import LIGHT, Theme
 from study_app.gui.widgets.dialogs import Notice
 from study_app.protocol.load import parse

@@ -21,10 +21,10 @@ from study_app import app
 from study_app.app.session import live_session, termination
 from study_app.errors import DeviceNotFound, DisplayError, SessionError, StoreError, StudyError
 from study_app.gui.home.main_window import MainWindow
+from study_app.gui.home.startup_window import OpeningWindow
 from study_app.gui.operator import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.gui.preflight import PreflightWindow
-from study_app.gui.preflight.startup_window import OpeningWindow
 from study_app.gui.theme.theme import PARTICIPANT
 from study_app.protocol.load import parse, source_bytes
 from study_app.session import start

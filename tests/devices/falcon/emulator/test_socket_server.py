@@ -157,7 +157,8 @@ def test_nothing_is_compiled_once_a_client_can_connect(tmp_path):
     """In a program of its own: the first boot and homing through a socket must not wait for a compiler."""
     program = """
 import sys
-from study_app.devices.falcon.emulator import arm, boot_loader, emulator, faults, firmware_loop, ftdi_bridge, host_interface
+from study_app.devices.falcon.emulator import arm, boot_loader, emulator, faults
+from study_app.devices.falcon.emulator import firmware_loop, ftdi_bridge, host_interface
 from study_app.devices.falcon.emulator.socket_server import EmulatorServer
 from study_app.devices.simulated import hand
 from study_app.haptics.kernels import plant

@@ -8,7 +8,7 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 
-from study_app.gui.preflight.startup_window import OpeningWindow
+from study_app.gui.home.startup_window import OpeningWindow
 
 
 @pytest.fixture
