@@ -33,13 +33,13 @@ def test_the_wheel_contains_the_protocols_and_the_typeface(installed: Path) -> N
     assert shipped == {path.name for path in (ROOT / "protocols").glob("*.toml")}
     assert list((package / "gui" / "assets" / "fonts").glob("Inter-*"))
     assert (package / "py.typed").is_file()
-    limits = "haptics/slope_limits.csv"
+    limits = "haptics/model/slope_limits.csv"
     assert (package / limits).read_bytes() == (ROOT / "study_app" / limits).read_bytes()
 
 
 def test_the_wheel_contains_the_fluid_solvers_tables(installed: Path) -> None:
-    tables = ROOT / "study_app" / "evaluation" / "cfd"
-    shipped = {path.name for path in (installed / "study_app" / "evaluation" / "cfd").glob("*.csv")}
+    tables = ROOT / "study_app" / "validation" / "cfd"
+    shipped = {path.name for path in (installed / "study_app" / "validation" / "cfd").glob("*.csv")}
     assert shipped == {path.name for path in tables.glob("*.csv")} >= {"steady.csv", "fits.csv", "honey-600mmps.csv"}
 
 

@@ -2,7 +2,7 @@
 
 Two kinds, kept apart. *Numerical*: the definition of the model itself, summed without rounding errors. *Physical*: what
 a real sphere meets, as far as that is known: measured steady drag, the exact forces of creeping flow, and tables that a
-fluid solver left in the package (``evaluation/cfd/*.csv``). None of it shares code with ``haptics.kernels.effects``.
+fluid solver left in the package (``validation/cfd/*.csv``). None of it shares code with ``haptics.kernels.effects``.
 """
 
 from __future__ import annotations
