@@ -20,7 +20,7 @@ from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.layout import SAMPLE, records
 from study_app.haptics.model.scene import Scene
 from study_app.haptics.runtime.pack import adjust_into, pack, pack_into
-from study_app.haptics.runtime.recompute import new_trail, take_again
+from study_app.haptics.runtime.recompute import new_wake_places, recompute_sample
 from study_app.haptics.runtime.scene_records import scaled_length
 from study_app.lab.ab_comparison import Side, other
 from study_app.lab.wake_tail import Tail, tail_of
@@ -169,7 +169,7 @@ class _Half:
         self._dynamics = dynamics
         self.safety = new_safety(limit_n)
         self._model = pack(rest, capacity=elements, dynamics=dynamics)
-        self._trail, self._places = new_trail(elements)
+        self._trail, self._places = new_wake_places(elements)
 
     def restart(self) -> None:
         """Be as before the first sample."""
@@ -190,7 +190,7 @@ class _Half:
     def answer(self, samples: Any, *, felt: bool) -> Any:
         """Return the samples with what comes of them here; ``felt`` where the device was sent this side's force."""
         out = samples.copy()
-        take_again(self._model, self.safety[0], out, self._trail[0], self._places, felt)
+        recompute_sample(self._model, self.safety[0], out, self._trail[0], self._places, felt)
         return out
 
     def tail(self) -> Tail | None:

@@ -19,11 +19,11 @@ for one that acts as late as the loop is believed to be, a tick at least, and fo
 lowest counts. A force that is under way belongs to an earlier velocity: a late balance may hold what was stored then.
 The liquid may owe 1 mJ; with D = -1 mJ - E, its debt beyond that:
 
-- `weaken`: a debt of 0.125 mJ halves the force, one of 0.375 mJ halves it again, and it comes back at 50 % a second: a
-  loop that swings has its gain lowered until it does not, instead of being caught at every swing. A debt of the fast
-  part of force and motion alone counts likewise (`incremental`);
-- `settle`: what pushes the hand along its way may not spend in 20 ms more than is left; in debt it is let go, and
-  damping added until the next step would pay the debt, up to half the damping that the loop bears, weakened likewise.
+- `reduce_gain`: a debt of 0.125 mJ halves the force, one of 0.375 mJ halves it again, and it comes back at 50 % a
+  second: the gain of an oscillating loop falls until it no longer oscillates. A debt of the fast part of force and
+  motion alone counts likewise (`incremental_passivity`);
+- `apply_controller`: what pushes the hand along its way may not spend in 20 ms more than is left; in debt it is let go,
+  and damping added until the next step would pay the debt, up to half the maximum stable damping, weakened likewise.
   The way is taken from the last 2 ms; what is slower than 40 mm/s may be a count of the encoder, and is no way yet;
 - the whole force is kept within F - D / R, F and R being the strongest force and the longest step so far. So E ≥ -1 mJ
   - F R on any path of the hand: even the worst next step leaves D at F R.
@@ -57,7 +57,7 @@ DELIVERY_STEPS_PER_N = 2.0**14
 
 
 @kernel
-def open_account(account: Record) -> None:
+def reset_observer(account: Record) -> None:
     """Begin at 0, with nothing sent: what came before was another liquid's."""
     account.balance_j = 0.0
     account.late_balance_j = 0.0
@@ -85,7 +85,7 @@ def open_account(account: Record) -> None:
 
 
 @part
-def observe(model: Any, safety: Record, interval_s: float) -> None:
+def update_observer(model: Any, safety: Record, interval_s: float) -> None:
     """Enter the work of the last step into the balances; ``interval_s`` is 0 where there is no new sample.
 
     Where several forces were sent between two samples, their mean over time counts.
@@ -166,7 +166,7 @@ def _forgive(balance_j: float, forgiven_j: float) -> float:
 
 
 @part
-def weaken(parameters: Record, account: Record, sample: Record) -> None:
+def reduce_gain(parameters: Record, account: Record, sample: Record) -> None:
     """Send a share of the force, halved by every halving debt, and all of it again only seconds after the last."""
     left_j = min(_left_j(account), INCREMENTAL_ALLOWANCE_J + account.fast.balance_j)
     account.gain = min(account.gain * (1.0 + RECOVERY_PER_S * parameters.period_s), 1.0)
@@ -180,7 +180,7 @@ def weaken(parameters: Record, account: Record, sample: Record) -> None:
 
 
 @part
-def settle(parameters: Record, safety: Record, sample: Record) -> None:
+def apply_controller(parameters: Record, safety: Record, sample: Record) -> None:
     """Change the force about to be sent so that a debt is paid back, and cannot grow beyond one step's work."""
     account = safety.account
     left_j = _left_j(account)

@@ -14,7 +14,7 @@ FADE_S = 20e-3
 
 
 @part
-def share_out(model: Any, interval_s: float) -> None:
+def update_volume_fractions(model: Any, interval_s: float) -> None:
     """Say how much of the body every liquid has: its share φ of the volume, and of the frontal area to begin with.
 
     Where liquids overlap, the last listed counts, as far as the body is under its surface. At a border φ takes 20 ms

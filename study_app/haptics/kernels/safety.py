@@ -12,7 +12,13 @@ import math
 from typing import Any
 
 from study_app.haptics.kernels.compiled import kernel, part
-from study_app.haptics.kernels.passivity import log_command, observe, open_account, settle, weaken
+from study_app.haptics.kernels.passivity import (
+    apply_controller,
+    log_command,
+    reduce_gain,
+    reset_observer,
+    update_observer,
+)
 from study_app.haptics.kernels.vector import clear, copy, distance, dot, is_finite, norm, square, square_distance
 from study_app.haptics.model.device_dynamics import BELIEVED_TICKS
 from study_app.haptics.model.layout import (
@@ -47,7 +53,7 @@ def new_safety(device_limit_n: float = math.inf, delay_ticks: int = BELIEVED_TIC
     """
     safety = records(SAFETY, 1)
     safety[0].fade_s = START_FADE_S
-    open_account(safety[0].account)
+    reset_observer(safety[0].account)
     safety[0].device_limit_n = device_limit_n
     safety[0].delay_ticks = delay_ticks
     return safety
@@ -61,7 +67,7 @@ def begin_scene(safety: Record) -> None:
     """
     settling = safety.account.settling
     safety.fade = 0.0
-    open_account(safety.account)
+    reset_observer(safety.account)
     safety.account.settling = settling
 
 
@@ -74,7 +80,7 @@ def guard(model: Any, safety: Record, sample: Record, interval_s: float) -> None
     parameters, state = model.parameters[0], model.state[0]
     account = safety.account
     force_n, lift_n = sample.device_force_n, account.lift_n
-    observe(model, safety, interval_s)
+    update_observer(model, safety, interval_s)
     copy(lift_n, account.lift_before_n)
     copy(state.force_n, force_n)
     copy(state.lift_n, lift_n)
@@ -90,10 +96,10 @@ def guard(model: Any, safety: Record, sample: Record, interval_s: float) -> None
     _limit_norm(force_n, lift_n, limit_n, sample)
     _fade(force_n, lift_n, safety, sample)
     copy(force_n, safety.permitted_n)
-    weaken(parameters, account, sample)
+    reduce_gain(parameters, account, sample)
     _limit_slew(force_n, parameters, state, safety, sample)
     copy(force_n, safety.slewed_n)
-    settle(parameters, safety, sample)
+    apply_controller(parameters, safety, sample)
     _limit_norm(force_n, lift_n, limit_n, sample)
     if safety.stop != 0 or safety.fault != 0:
         _let_go(force_n, safety, sample)

@@ -24,7 +24,7 @@ def clamp(interval_s: float) -> float:
 
 
 @part
-def admit(parameters: Record, state: Record, safety: Record, sample: Record) -> float:
+def accept_sample(parameters: Record, state: Record, safety: Record, sample: Record) -> float:
     """Take the sample's position into the scene and return Δt [s], or 0 where there is nothing to take.
 
     Δt is the time since the last accepted sample, so that the next one covers any gap; the first takes the nominal
@@ -85,7 +85,7 @@ def _plausible(state: Record, sample: Record, interval_s: float) -> bool:
 
 
 @part
-def watch(parameters: Record, safety: Record, sample: Record) -> None:
+def watchdog(parameters: Record, safety: Record, sample: Record) -> None:
     """Say how long the turn is, and let the force go when no usable sample came: 5 ms fade, 50 ms zero and fault.
 
     A turn that comes late itself is no better, however fresh its sample: the device held an old force meanwhile. It

@@ -1,6 +1,6 @@
-"""One turn of the servo, read from top to bottom.
+"""One tick of the servo, read from top to bottom.
 
-The lines of `respond` are the pipeline; the bits of a liquid's ``effects`` say which of them run. Nothing here
+The lines of `step_model` are the pipeline; the bits of a liquid's ``effects`` say which of them run. Nothing here
 allocates, raises or waits; the servo, a rehearsal and `offline.simulate` run the same code.
 """
 
@@ -9,19 +9,19 @@ from __future__ import annotations
 from typing import Any
 
 from study_app.haptics.kernels.compiled import kernel, part
-from study_app.haptics.kernels.effects.added_mass import push_aside
-from study_app.haptics.kernels.effects.buoyancy import carry
-from study_app.haptics.kernels.effects.current import stream
-from study_app.haptics.kernels.effects.drag import resist
-from study_app.haptics.kernels.effects.history import remember
-from study_app.haptics.kernels.effects.local_wake import forget_places, leave_behind, linger
-from study_app.haptics.kernels.effects.surface import expose
-from study_app.haptics.kernels.effects.wake import flow, follow
+from study_app.haptics.kernels.effects.added_mass import added_mass_force
+from study_app.haptics.kernels.effects.buoyancy import buoyancy_force
+from study_app.haptics.kernels.effects.current import current_velocity
+from study_app.haptics.kernels.effects.drag import drag_force
+from study_app.haptics.kernels.effects.history import basset_force
+from study_app.haptics.kernels.effects.local_wake import clear_local_wake, deposit_local_wake, local_wake_velocity
+from study_app.haptics.kernels.effects.surface import wetted_fraction
+from study_app.haptics.kernels.effects.wake import update_wake, wake_velocity
 from study_app.haptics.kernels.estimators.kalman import take_force
-from study_app.haptics.kernels.estimators.velocity import estimate, forget
-from study_app.haptics.kernels.regions import share_out
+from study_app.haptics.kernels.estimators.velocity import estimate_velocity, reset_estimator
+from study_app.haptics.kernels.regions import update_volume_fractions
 from study_app.haptics.kernels.safety import guard
-from study_app.haptics.kernels.sample_validation import admit, watch
+from study_app.haptics.kernels.sample_validation import accept_sample, watchdog
 from study_app.haptics.kernels.vector import clear, copy, subtract
 from study_app.haptics.kernels.wake_segments import empty
 from study_app.haptics.model.layout import (
@@ -48,26 +48,26 @@ def tick(model: Any, safety: Record, sample: Record) -> None:
     """
     sample.limiters = 0
     sample.status = STATUS_OK
-    interval_s = admit(model.parameters[0], model.state[0], safety, sample)
-    watch(model.parameters[0], safety, sample)
+    interval_s = accept_sample(model.parameters[0], model.state[0], safety, sample)
+    watchdog(model.parameters[0], safety, sample)
     if interval_s > 0.0:
         take_force(model.state[0], safety)
-        respond(model, interval_s)
-    report(model.state[0], sample)
+        step_model(model, interval_s)
+    write_sample(model.state[0], sample)
     guard(model, safety, sample, interval_s)
 
 
 @part
-def respond(model: Any, interval_s: float) -> None:
+def step_model(model: Any, interval_s: float) -> None:
     """Let the liquids respond to the place the body has reached, Δt after the one before.
 
     Every effect is evaluated before the wake takes this tick in: the first tick of a motion meets a liquid at rest.
     """
     parameters, state = model.parameters[0], model.state[0]
     if state.tracking == 0:
-        begin(model)
-    estimate(parameters, state, model.window, interval_s)
-    share_out(model, interval_s)
+        reset_tracking(model)
+    estimate_velocity(parameters, state, model.window, interval_s)
+    update_volume_fractions(model, interval_s)
 
     clear(state.force_n)
     clear(state.lift_n)
@@ -75,50 +75,50 @@ def respond(model: Any, interval_s: float) -> None:
     clear(state.drift_mps)
     for i in range(parameters.liquids):
         if model.liquid_states[i].share > 0.0:
-            act(model, i, interval_s)
+            apply_effects(model, i, interval_s)
         else:
-            leave(model, i)
+            reset_liquid(model, i)
     if parameters.effects & EFFECT_BUOYANCY:
-        carry(model)
+        buoyancy_force(model)
 
 
 @part
-def act(model: Any, i: int, interval_s: float) -> None:
+def apply_effects(model: Any, i: int, interval_s: float) -> None:
     """Let one liquid, in which the body is, act on it by the effects it asks for: in this order, no others."""
     liquid, local, state = model.liquids[i], model.liquid_states[i], model.state[0]
     copy(state.velocity_mps, local.motion_mps)
     clear(local.wake_mps)
     if liquid.effects & EFFECT_CURRENT:
-        stream(liquid, local, state)
+        current_velocity(liquid, local, state)
         copy(local.current.velocity_mps, state.drift_mps)
     if liquid.effects & EFFECT_WAKE:
-        flow(liquid, local, model.segments)
+        wake_velocity(liquid, local, model.segments)
     if liquid.effects & EFFECT_LOCAL_WAKE:
-        linger(liquid, local, state, model.cells, interval_s)
+        local_wake_velocity(liquid, local, state, model.cells, interval_s)
     subtract(local.motion_mps, local.wake_mps, local.relative_mps)
     copy(local.wake_mps, state.wake_mps)
     if liquid.effects & EFFECT_SURFACE:
-        expose(local)
+        wetted_fraction(local)
     if liquid.effects & EFFECT_DRAG:
-        resist(liquid, local, state)
+        drag_force(liquid, local, state)
     if liquid.effects & EFFECT_ADDED_MASS:
-        push_aside(liquid, local, state, interval_s)
+        added_mass_force(liquid, local, state, interval_s)
     if liquid.effects & EFFECT_HISTORY:
-        remember(liquid, local, state, model.intervals, model.exponentials, interval_s)
+        basset_force(liquid, local, state, model.intervals, model.exponentials, interval_s)
     if liquid.effects & EFFECT_WAKE:
-        follow(liquid, local, state, model.elements, model.segments, interval_s)
+        update_wake(liquid, local, state, model.elements, model.segments, interval_s)
     if liquid.effects & EFFECT_LOCAL_WAKE:
-        leave_behind(liquid, local, state, model.cells, interval_s)
+        deposit_local_wake(liquid, local, state, model.cells, interval_s)
 
 
 @part
-def leave(model: Any, i: int) -> None:
+def reset_liquid(model: Any, i: int) -> None:
     """Let one liquid forget the body: it is out of it, or was lost."""
     liquid, local = model.liquids[i], model.liquid_states[i]
     if liquid.effects & EFFECT_WAKE:
         empty(liquid.wake, local.wake, model.segments)
     if liquid.effects & EFFECT_LOCAL_WAKE:
-        forget_places(local.local_wake)
+        clear_local_wake(local.local_wake)
     if liquid.effects & EFFECT_ADDED_MASS:
         local.added_mass.primed = 0
     if liquid.effects & EFFECT_HISTORY:
@@ -126,16 +126,16 @@ def leave(model: Any, i: int) -> None:
 
 
 @kernel
-def begin(model: Any) -> None:
+def reset_tracking(model: Any) -> None:
     """Forget the motion so far: all that is known of the body is where it is."""
-    forget(model.parameters[0], model.state[0])
+    reset_estimator(model.parameters[0], model.state[0])
     for i in range(model.parameters[0].liquids):
-        leave(model, i)
+        reset_liquid(model, i)
     model.state[0].tracking = 1
 
 
 @part
-def report(state: Record, sample: Record) -> None:
+def write_sample(state: Record, sample: Record) -> None:
     """Write what the liquids did into the sample."""
     copy(state.velocity_mps, sample.velocity_mps)
     copy(state.wake_mps, sample.wake_mps)

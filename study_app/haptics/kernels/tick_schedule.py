@@ -21,7 +21,7 @@ PACE = np.dtype(
 )
 
 
-def new_pace(period_s: float, *, jitter_s: float = 0.0, missed: float = 0.0, seed: int = 1) -> Any:
+def new_schedule(period_s: float, *, jitter_s: float = 0.0, missed: float = 0.0, seed: int = 1) -> Any:
     """Return the record of a servo's pace; ``jitter_s`` must stay below the period, ``missed`` below 1."""
     pace = records(PACE, 1)
     pace.period_s = period_s
@@ -32,7 +32,7 @@ def new_pace(period_s: float, *, jitter_s: float = 0.0, missed: float = 0.0, see
 
 
 @kernel
-def next_turn(pace: Any) -> float:
+def next_tick(pace: Any) -> float:
     """Return the time until the servo's next turn [s]: its deadlines stay regular, it is late or misses some."""
     turns = 1.0
     while pace.missed > 0.0 and random(pace) < pace.missed:

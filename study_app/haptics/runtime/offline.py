@@ -13,7 +13,7 @@ from study_app.haptics.kernels.compiled import kernel
 from study_app.haptics.kernels.estimators.kalman import take_force
 from study_app.haptics.kernels.safety import guard, new_safety
 from study_app.haptics.kernels.sample_validation import clamp, place
-from study_app.haptics.kernels.tick import report, respond
+from study_app.haptics.kernels.tick import step_model, write_sample
 from study_app.haptics.model.device_dynamics import MOST_DELAY, Dynamics
 from study_app.haptics.model.layout import ESTIMATOR_GIVEN, SAMPLE, Record, records
 from study_app.haptics.model.limits import bearable
@@ -95,8 +95,8 @@ def _run(model: Any, safety: Record, samples: Any, t_s: Any) -> None:
                 state.estimate_mps[axis] = sample.velocity_mps[axis]
         safety.turn_s = interval_s
         take_force(state, safety)
-        respond(model, interval_s)
-        report(state, sample)
+        step_model(model, interval_s)
+        write_sample(state, sample)
         guard(model, safety, sample, interval_s)
 
 

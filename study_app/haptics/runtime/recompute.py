@@ -45,7 +45,7 @@ TRAIL = np.dtype(
 )
 
 
-def new_trail(elements: int) -> tuple[Any, Any]:
+def new_wake_places(elements: int) -> tuple[Any, Any]:
     """Return an empty trail, (1,) ``TRAIL``, and the ring of its places, (elements,) ``PLACE``."""
     return records(TRAIL, 1), records(PLACE, elements)
 
@@ -81,7 +81,7 @@ def take_sample(model: Any, safety: Record, sample: Record, delivered: bool) -> 
 
 
 @kernel
-def take_again(model: Any, safety: Record, samples: Any, trail: Record, places: Any, delivered: bool) -> None:
+def recompute_sample(model: Any, safety: Record, samples: Any, trail: Record, places: Any, delivered: bool) -> None:
     """Take each of ``samples`` as the servo took it, and write what comes out into them.
 
     ``trail`` and ``places`` follow the wake of the model's first liquid. ``delivered`` says that the forces in

@@ -14,11 +14,11 @@ import numpy as np
 from study_app.haptics.kernels.compiled import kernel
 from study_app.haptics.kernels.estimators.kalman import take_force
 from study_app.haptics.kernels.loop import follow_delay
-from study_app.haptics.kernels.passivity import log_acted, log_command, observe
+from study_app.haptics.kernels.passivity import log_acted, log_command, update_observer
 from study_app.haptics.kernels.plant import measure, move, push
-from study_app.haptics.kernels.sample_validation import admit, watch
-from study_app.haptics.kernels.tick import report, respond, tick
-from study_app.haptics.kernels.tick_schedule import next_turn, random
+from study_app.haptics.kernels.sample_validation import accept_sample, watchdog
+from study_app.haptics.kernels.tick import step_model, tick, write_sample
+from study_app.haptics.kernels.tick_schedule import next_tick, random
 from study_app.haptics.kernels.vector import clear, copy, is_finite
 from study_app.validation.stability.arm_plant import ARM, advance, write_force
 
@@ -127,7 +127,7 @@ def run(model: Any, safety: Any, sample: Any, handle: Any, pace: Any, loop: Any,
     k = first
     while k < trace.shape[0] and loop.now_s < loop.until_s and loop.broken == 0:
         if k > 0:
-            elapsed_s = next_turn(pace)
+            elapsed_s = next_tick(pace)
             loop.now_s += elapsed_s
             place(loop, loop.now_s, loop.goes_m)
             if loop.now_s >= loop.release_s:
@@ -271,13 +271,13 @@ def _answer(model: Any, safety: Any, sample: Any, safe: int) -> None:
         tick(model, safety, sample)
         return
     sample.limiters = 0
-    interval_s = admit(model.parameters[0], model.state[0], safety, sample)
-    watch(model.parameters[0], safety, sample)
+    interval_s = accept_sample(model.parameters[0], model.state[0], safety, sample)
+    watchdog(model.parameters[0], safety, sample)
     if interval_s > 0.0:
         take_force(model.state[0], safety)
-        respond(model, interval_s)
-    report(model.state[0], sample)
-    observe(model, safety, interval_s)
+        step_model(model, interval_s)
+    write_sample(model.state[0], sample)
+    update_observer(model, safety, interval_s)
     copy(sample.force_n, sample.device_force_n)
     copy(model.state[0].lift_n, safety.account.lift_n)
     log_command(safety.account, sample.device_force_n)

@@ -10,7 +10,7 @@ import numpy as np
 
 from study_app.haptics.kernels.plant import new_handle
 from study_app.haptics.kernels.safety import new_safety
-from study_app.haptics.kernels.tick_schedule import new_pace
+from study_app.haptics.kernels.tick_schedule import new_schedule
 from study_app.haptics.model.device_dynamics import MOST_DELAY, Dynamics
 from study_app.haptics.model.layout import SAMPLE, records
 from study_app.haptics.model.limits import INERTIA_SHARE, Bearable, Entry
@@ -182,7 +182,7 @@ def _comes_to_rest(
         new_safety(delay_ticks=delays[1])[0],
         records(SAMPLE, 1)[0],
         handle,
-        new_pace(period_s),
+        new_schedule(period_s),
         loop,
         trace,
         0,

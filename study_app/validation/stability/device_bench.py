@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from study_app.haptics.kernels.plant import new_handle
 from study_app.haptics.kernels.safety import new_safety
-from study_app.haptics.kernels.tick_schedule import new_pace
+from study_app.haptics.kernels.tick_schedule import new_schedule
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.layout import SAMPLE, records
 from study_app.haptics.model.limits import Bearable
@@ -93,7 +93,7 @@ def new_bench(case: Case, *, safe: bool, limits: Bearable | None = None) -> Benc
         **_device(case),
     )
     model = pack(scene_of(case), limits=limits, dynamics=_dynamics(case))
-    pace = new_pace(1.0 / case.rate_hz, jitter_s=case.jitter / case.rate_hz, missed=case.missed)
+    pace = new_schedule(1.0 / case.rate_hz, jitter_s=case.jitter / case.rate_hz, missed=case.missed)
     return Bench(model, safety, records(SAMPLE, 1), handle, pace, loop)
 
 

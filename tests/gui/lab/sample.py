@@ -14,7 +14,7 @@ from study_app.haptics.kernels.safety import begin_scene, new_safety
 from study_app.haptics.model.layout import SAMPLE, records
 from study_app.haptics.model.scene import Scene
 from study_app.haptics.runtime.pack import pack
-from study_app.haptics.runtime.recompute import new_trail, take_again
+from study_app.haptics.runtime.recompute import new_wake_places, recompute_sample
 from study_app.lab.ab_comparison import Setting, Workbench
 from study_app.lab.limiters import LimiterCounts
 from study_app.lab.presets import spoken
@@ -58,8 +58,8 @@ def felt_samples(scene: Scene, hand_m: Any) -> Any:
     samples.position_m = hand_m
     safety = new_safety(8.0)
     begin_scene(safety[0])
-    trail, places = new_trail(ELEMENTS)
-    take_again(pack(scene, capacity=ELEMENTS), safety[0], samples, trail[0], places, True)
+    trail, places = new_wake_places(ELEMENTS)
+    recompute_sample(pack(scene, capacity=ELEMENTS), safety[0], samples, trail[0], places, True)
     return samples
 
 

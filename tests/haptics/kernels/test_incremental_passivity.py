@@ -11,7 +11,7 @@ from study_app.haptics.kernels.incremental_passivity import (
     close_incremental,
     observe_incremental,
 )
-from study_app.haptics.kernels.passivity import HALVING_J, open_account, weaken
+from study_app.haptics.kernels.passivity import HALVING_J, reduce_gain, reset_observer
 from study_app.haptics.model.layout import ACCOUNT, LIMITER_ENERGY, PARAMETERS, SAMPLE, records
 from tests.haptics.scenes import HONEY, Hand
 
@@ -60,13 +60,13 @@ def test_a_swing_is_owed_for_although_the_motion_pays_more():
 
 def test_a_debt_beyond_the_allowance_lowers_the_gain():
     parameters, account, sample = records(PARAMETERS, 1)[0], records(ACCOUNT, 1)[0], records(SAMPLE, 1)[0]
-    open_account(account)
+    reset_observer(account)
     sample.device_force_n[0] = 4.0
     account.fast.balance_j = -ALLOWANCE_J
-    weaken(parameters, account, sample)
+    reduce_gain(parameters, account, sample)
     assert (sample.device_force_n[0], sample.limiters) == (4.0, 0)
     account.fast.balance_j = -ALLOWANCE_J - HALVING_J
-    weaken(parameters, account, sample)
+    reduce_gain(parameters, account, sample)
     assert sample.device_force_n[0] == pytest.approx(2.0)
     assert sample.limiters == LIMITER_ENERGY
 

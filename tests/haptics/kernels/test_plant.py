@@ -13,7 +13,7 @@ if numba.config.DISABLE_JIT:
 
 from study_app.errors import StudyError
 from study_app.haptics.kernels.plant import SUB_STEP_S, let_go, measure, move, new_handle, push
-from study_app.haptics.kernels.tick_schedule import new_pace, next_turn
+from study_app.haptics.kernels.tick_schedule import new_schedule, next_tick
 from study_app.haptics.model.layout import MOST_DELAY
 
 STILL = np.zeros(3)
@@ -237,13 +237,13 @@ def test_a_handle_let_go_knows_no_hand():
 
 
 def test_a_regular_pace_is_regular():
-    pace = new_pace(1e-3)
-    assert [next_turn(pace) for _ in range(5)] == [1e-3] * 5
+    pace = new_schedule(1e-3)
+    assert [next_tick(pace) for _ in range(5)] == [1e-3] * 5
 
 
 def test_a_turn_is_late_but_its_deadlines_stay():
-    pace = new_pace(2e-3, jitter_s=0.5e-3)
-    late_s = np.cumsum([next_turn(pace) for _ in range(5000)]) - 2e-3 * np.arange(1, 5001)
+    pace = new_schedule(2e-3, jitter_s=0.5e-3)
+    late_s = np.cumsum([next_tick(pace) for _ in range(5000)]) - 2e-3 * np.arange(1, 5001)
     assert late_s.min() >= -1e-12
     assert late_s.max() <= 0.5e-3
     assert late_s.mean() == pytest.approx(0.25e-3, rel=0.05)
@@ -251,8 +251,8 @@ def test_a_turn_is_late_but_its_deadlines_stay():
 
 
 def test_a_share_of_the_turns_does_not_come():
-    pace = new_pace(1e-3, missed=0.2)
-    turns = np.array([next_turn(pace) for _ in range(5000)]) / 1e-3
+    pace = new_schedule(1e-3, missed=0.2)
+    turns = np.array([next_tick(pace) for _ in range(5000)]) / 1e-3
     assert turns == pytest.approx(np.rint(turns))
     assert turns.mean() == pytest.approx(1 / 0.8, rel=0.03)
     assert turns.max() > 2
@@ -260,8 +260,8 @@ def test_a_share_of_the_turns_does_not_come():
 
 def test_another_seed_is_another_pace_and_the_same_seed_the_same():
     def row(seed):
-        pace = new_pace(1e-3, jitter_s=0.5e-3, seed=seed)
-        return [next_turn(pace) for _ in range(10)]
+        pace = new_schedule(1e-3, jitter_s=0.5e-3, seed=seed)
+        return [next_tick(pace) for _ in range(10)]
 
     assert row(1) == row(1)
     assert row(1) != row(2)

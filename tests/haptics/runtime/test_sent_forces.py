@@ -14,7 +14,7 @@ from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
 from study_app.haptics.model.layout import CONTRACT_VERSION, READING, STATUS_DEVICE_LOST, new_command, new_reading
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.pack import pack
-from study_app.haptics.runtime.recompute import new_trail, take_again
+from study_app.haptics.runtime.recompute import new_wake_places, recompute_sample
 from study_app.haptics.runtime.servo import Servo
 from tests.haptics.probe import Probe
 from tests.haptics.scenes import HONEY
@@ -61,14 +61,14 @@ def test_a_tick_is_recomputed_from_the_delivered_force_to_the_last_bit():
     model, safety = pack(HONEY), new_safety(8.0)
     begin_scene(safety[0])
     again = samples.copy()
-    trail, places = new_trail(10)
-    take_again(model, safety[0], again, trail[0], places, True)
+    trail, places = new_wake_places(10)
+    recompute_sample(model, safety[0], again, trail[0], places, True)
     for name in ("command_n", "device_force_n", "permitted_n", "withheld_n"):
         assert np.array_equal(again[name], samples[name]), name
     unaware = samples.copy()
     safety = new_safety(8.0)
     begin_scene(safety[0])
-    take_again(pack(HONEY), safety[0], unaware, trail[0], places, False)
+    recompute_sample(pack(HONEY), safety[0], unaware, trail[0], places, False)
     assert np.array_equal(unaware.command_n, unaware.device_force_n)
 
 
@@ -120,10 +120,10 @@ def test_the_tick_of_a_lost_device_is_recomputed(lost, reads):
     samples = felt(probe)
     assert samples.status[-1] == STATUS_DEVICE_LOST
     again = samples.copy()
-    trail, places = new_trail(10)
+    trail, places = new_wake_places(10)
     safety = new_safety(8.0)
     begin_scene(safety[0])
-    take_again(pack(HONEY), safety[0], again, trail[0], places, True)
+    recompute_sample(pack(HONEY), safety[0], again, trail[0], places, True)
     assert np.array_equal(again.device_force_n, samples.device_force_n)
     assert np.array_equal(again.command_n, samples.command_n)
     if lost == "lost_at_read":

@@ -12,7 +12,7 @@ NOTHING_MPS2 = 1e-30
 
 
 @part
-def push_aside(liquid: Record, local: Record, state: Record, interval_s: float) -> None:
+def added_mass_force(liquid: Record, local: Record, state: Record, interval_s: float) -> None:
     """Add F = −C_a ρ V_sub dw/dt to the force, (3,) [N]; C_a = ½ for a sphere in potential flow (Lamb 1932, §92).
 
     dw/dt is the difference of w over Δt, smoothed over τ: a ← a + (1 − e^(−Δt/τ))(Δw/Δt − a). Unsmoothed, one count of

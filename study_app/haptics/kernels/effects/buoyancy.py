@@ -9,7 +9,7 @@ from study_app.haptics.model.layout import EFFECT_BUOYANCY
 
 
 @part
-def carry(model: Any) -> None:
+def buoyancy_force(model: Any) -> None:
     """Add (Σ ρ V_sub − ρ_body V) g, upward [N], to the force (Archimedes); V_sub is the ball's volume in each liquid.
 
     The weight counts once, where any liquid that asks for buoyancy is, or is below: a ball that rises through the

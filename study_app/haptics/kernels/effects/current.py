@@ -8,7 +8,7 @@ from study_app.haptics.model.layout import Record
 
 
 @part
-def stream(liquid: Record, local: Record, state: Record) -> None:
+def current_velocity(liquid: Record, local: Record, state: Record) -> None:
     """Take v_current(p), (3,) [m/s], from the motion that the other effects see; no force of its own.
 
     Uniform: the same everywhere. Channel: u (1 − (s/h)²), s across from midway, 2h from wall to wall, at rest beyond

@@ -14,7 +14,7 @@ _brown_lawler = part(laws.brown_lawler)
 
 
 @part
-def resist(liquid: Record, local: Record, state: Record) -> None:
+def drag_force(liquid: Record, local: Record, state: Record) -> None:
     """Add F = −½ ρ C_d A |w| w φ to the force, (3,) [N], with w = v − v_wake − v_current (Rek 2024, §4.1).
 
     A is the frontal area of the ball, φ the share of it in the liquid. C_d is the body's own, or that of a sphere at

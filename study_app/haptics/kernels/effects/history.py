@@ -38,7 +38,7 @@ ROUNDING_S = 1e-9  # so that a window of whole ticks holds as many of them, howe
 
 
 @part
-def remember(
+def basset_force(
     liquid: Record, local: Record, state: Record, intervals: Any, exponentials: Any, interval_s: float
 ) -> None:
     """Add the history force, (3,) [N], to the force; φ is the share of the volume in the liquid.

@@ -28,7 +28,7 @@ FARTHEST = 40.0  # r²/2σ² beyond which a cell is not felt: e^-40
 
 
 @part
-def linger(liquid: Record, local: Record, state: Record, cells: Any, interval_s: float) -> None:
+def local_wake_velocity(liquid: Record, local: Record, state: Record, cells: Any, interval_s: float) -> None:
     """Set the liquid's velocity at the body, ``local.wake_mps`` (3,) [m/s], from the cells near it."""
     wake, tracks, out = liquid.local_wake, local.local_wake, local.wake_mps
     for axis in range(3):
@@ -62,7 +62,7 @@ def linger(liquid: Record, local: Record, state: Record, cells: Any, interval_s:
 
 
 @part
-def leave_behind(liquid: Record, local: Record, state: Record, cells: Any, interval_s: float) -> None:
+def deposit_local_wake(liquid: Record, local: Record, state: Record, cells: Any, interval_s: float) -> None:
     """Let the wake take in this tick, after the force: its time, and one element, zero below 1 mm/s."""
     wake, tracks, h = liquid.local_wake, local.local_wake, local.motion_mps
     tracks.time_s += interval_s
@@ -85,7 +85,7 @@ def leave_behind(liquid: Record, local: Record, state: Record, cells: Any, inter
 
 
 @part
-def forget_places(tracks: Record) -> None:
+def clear_local_wake(tracks: Record) -> None:
     """Forget everything, as if nothing had ever been stored."""
     tracks.first = 0
     tracks.cells = 0

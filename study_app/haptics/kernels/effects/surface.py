@@ -30,7 +30,7 @@ def submerge(liquid: Record, local: Record, place_m: Record, radius_m: float) ->
 
 
 @part
-def expose(local: Record) -> None:
+def wetted_fraction(local: Record) -> None:
     """Set the share φ of the frontal area that the motion w shows to the liquid: upright's and level's by w's squares.
 
     Exact for vertical and horizontal motion; in between a blend that never leaves the two. [choice]

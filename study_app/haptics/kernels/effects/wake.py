@@ -28,7 +28,7 @@ NOTHING_MPS = 1e-30
 
 
 @part
-def flow(liquid: Record, local: Record, segments: Any) -> None:
+def wake_velocity(liquid: Record, local: Record, segments: Any) -> None:
     """Set the liquid's velocity at the body, ``local.wake_mps`` (3,) [m/s], from the wake so far."""
     wake, out = local.wake, local.wake_mps
     tail(liquid.wake, wake, segments, out)
@@ -57,7 +57,7 @@ def response(fill: float, exponent: float) -> float:
 
 
 @part
-def follow(liquid: Record, local: Record, state: Record, elements: Any, segments: Any, interval_s: float) -> None:
+def update_wake(liquid: Record, local: Record, state: Record, elements: Any, segments: Any, interval_s: float) -> None:
     """Let the wake take in this tick, after the force: decay, arc, and an element where the rules ask for one.
 
     What enters is the motion through the current: a body that drifts with a river leaves no wake. Slower than 1 mm/s it

@@ -25,7 +25,7 @@ NOTHING_MPS = 1e-30
 
 
 @part
-def forget(parameters: Record, state: Record) -> None:
+def reset_estimator(parameters: Record, state: Record) -> None:
     """Begin anew: a position alone says nothing about velocity, so it is 0. A given velocity is already there."""
     if parameters.estimator != ESTIMATOR_GIVEN:
         clear(state.estimate_mps)
@@ -35,7 +35,7 @@ def forget(parameters: Record, state: Record) -> None:
 
 
 @part
-def estimate(parameters: Record, state: Record, window: Any, interval_s: float) -> None:
+def estimate_velocity(parameters: Record, state: Record, window: Any, interval_s: float) -> None:
     """Bring ``state.estimate_mps`` and ``state.velocity_mps`` to the newest position, Δt after the one before."""
     if parameters.estimator == ESTIMATOR_EWMA:
         _ewma(parameters, state, state.estimate_mps, interval_s)

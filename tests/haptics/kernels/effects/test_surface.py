@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from study_app.haptics.kernels.regions import share_out
+from study_app.haptics.kernels.regions import update_volume_fractions
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Box, Cylinder, Given
 from study_app.haptics.runtime.offline import simulate
@@ -26,7 +26,7 @@ def shares(depth, region=POOL):
     """Return the shares of volume, of the frontal areas upright and level, at h/D = ``depth``."""
     model = pack(pool("drag", region=region))
     model.state[0].position_m[1] = TOP_M + RADIUS_M - depth * 2 * RADIUS_M
-    share_out(model, 1e-3)
+    update_volume_fractions(model, 1e-3)
     surface = model.liquid_states[0].surface
     assert model.liquid_states[0].share == surface.volume
     return surface.volume, surface.upright, surface.level

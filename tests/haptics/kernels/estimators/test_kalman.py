@@ -14,7 +14,7 @@ from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Ewma, Kalman, Scene
 from study_app.haptics.runtime.offline import simulate
 from study_app.haptics.runtime.pack import built_alike, pack
-from study_app.haptics.runtime.recompute import new_trail, take_again
+from study_app.haptics.runtime.recompute import new_wake_places, recompute_sample
 from study_app.validation.stability.damping_boundary import boundary_nspm
 from study_app.validation.stability.trace_measures import fast_part
 from study_app.validation.stability.withheld_force import measure
@@ -279,5 +279,7 @@ def test_what_it_did_is_computed_again_to_the_last_bit():
     safety = new_safety()
     safety[0].fade = 1.0
     model = pack(WATER.model_copy(update={"velocity": Kalman()}), dynamics=device())
-    take_again(model, safety[0], again, *(it[0] if it.dtype.names[0] == "left" else it for it in new_trail(2000)), True)
+    recompute_sample(
+        model, safety[0], again, *(it[0] if it.dtype.names[0] == "left" else it for it in new_wake_places(2000)), True
+    )
     assert again.tobytes() == samples.tobytes()
