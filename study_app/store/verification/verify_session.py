@@ -7,21 +7,18 @@ and fingerprint follow its journal. A session that a program wrote while it was 
 from __future__ import annotations
 
 import contextlib
-import csv
-import io
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
 from study_app.errors import StoreError
 from study_app.store import receipt
-from study_app.store.atomic import is_there, paths_in, read_own, read_regular, study_root, temporaries
+from study_app.store.atomic import is_there, paths_in, read_own, study_root, temporaries
 from study_app.store.blinded.blinding import Key
-from study_app.store.blinded.sealing import opened, opened_key
+from study_app.store.blinded.sealing import opened
 from study_app.store.checksums import files, read_checksums, sha256
 from study_app.store.folders import FINGERPRINTS, SessionFolder
 from study_app.store.journals import journal
@@ -31,13 +28,12 @@ from study_app.store.journals.journal_events import shortened, unknown_events
 from study_app.store.progress import attempts, progress_of, wrong_responses
 from study_app.store.recorder import recording_files
 from study_app.store.sessions.folder_lock import is_open
-from study_app.store.sessions.open_session import Place, table_files
+from study_app.store.sessions.open_session import Place
 from study_app.store.sessions.unstarted_sessions import never_begun
 from study_app.store.tables import csv_files
-from study_app.store.tables.columns import MISSING, TABLES
 from study_app.store.tables.participants import opened_or_none, row_from
-from study_app.store.verification import table_checks
 from study_app.store.verification.fingerprints import fingerprint
+from study_app.store.verification.table_comparison import check_tables
 from study_app.store.verification.violations import Gathered
 
 LOOKS = 20
@@ -45,9 +41,6 @@ LOOKS = 20
 BETWEEN_S = 0.05
 
 _BEGUN = "though receipt, tables, recordings or checksums show that the session was begun: restore it from a copy"
-_COUNTED = frozenset(
-    {"status", "session_ended_at", "resumed", "language", "trials", "responses", "validity"}
-)  # columns of a session that later events change
 NOTHING = Contents([], 0)
 READERS = 4  # files whose checksums are computed at the same time
 
@@ -117,7 +110,7 @@ def _look(place: Place, key: Key | None, found: Gathered) -> Checked:
     hashes = _hashes(folder)
     ended = lines[-1]["event"] == "session_ended" and not running
     if not running:
-        _tables(place, lines, _more(place, lines, found), found)
+        check_tables(place, lines, _more(place, lines, found), found)
         _checksums(folder, lines, hashes, found)
     _recordings(folder, lines, hashes, found, running=running)
     _rebuilt(folder, found)
@@ -230,74 +223,6 @@ def _more(place: Place, lines: list[Line], found: Gathered) -> set[Path]:
             found.error(path, f"{what}: {RESTORE}")
             telling.add(path)
     return telling
-
-
-def _tables(place: Place, lines: list[Line], said: set[Path], found: Gathered) -> None:
-    """Compare the tables with the journal, but for those of which something was ``said``."""
-    try:
-        expected = table_files(place, lines, opened_key(place.study_folder))
-    except StoreError as error:
-        found.error(place.folder.journal, f"gives no tables: {error}")
-        return
-    ended = lines[-1]["event"] == "session_ended"
-    for (path, content), name in zip(expected, ("responses", "trials"), strict=True):
-        if path not in said:
-            check_table(path, content, name, found, may_be_behind=lambda _: not ended)
-
-
-def check_table(
-    path: Path, expected: bytes, name: str, found: Gathered, *, may_be_behind: Callable[[int], bool]
-) -> None:
-    """Compare a table with what the journals give, and its cells with the dictionary.
-
-    ``may_be_behind`` says of a line's number whether it is of a session that has not ended, whose tables follow its
-    journal with the next page or when it is rebuilt.
-    """
-    try:
-        content = read_regular(path)
-    except OSError:
-        found.error(path, "is missing or cannot be read; rebuild makes it again")
-        return
-    expected, columns = csv_files.in_columns_of(content, expected, TABLES[name])
-    if differing := _differing_lines(content, expected):
-        beginning = expected.startswith(content)
-        behind = all(map(may_be_behind, differing)) and (beginning or _is_behind(content, expected, name))
-        tell = found.warning if behind else found.error
-        tell(path, f"is not what the journal gives, from line {differing[0]} on; rebuild renews it")
-        if behind and beginning:  # a program killed while it wrote a row
-            return
-    for problem in table_checks.problems(content, columns):
-        found.error(path, problem)
-
-
-def _is_behind(held: bytes, expected: bytes, table: str) -> bool:
-    """Return whether a table ``held`` may be an earlier state of ``expected``: it tells nothing that this does not."""
-    try:
-        theirs, ours = (
-            list(csv.reader(io.StringIO(content.decode("utf-8", "replace"), newline=""), strict=True))
-            for content in (held, expected)
-        )
-    except csv.Error:
-        return False
-    if len(theirs) > len(ours) or theirs[:1] != ours[:1]:
-        return False
-    return all(
-        here == there or _may_lag(table, name, here, there)
-        for early, late in zip(theirs, ours, strict=False)
-        for name, here, there in zip_longest(ours[0], early, late, fillvalue="")
-    )
-
-
-def _may_lag(table: str, name: str, here: str, there: str) -> bool:
-    """Return whether a cell ``here`` may become ``there`` with later events of its session."""
-    if table == "participants":
-        return name in _COUNTED
-    return here == MISSING or (name, here) == ("marked", "false") or (name == "notes" and there.startswith(here))
-
-
-def _differing_lines(content: bytes, expected: bytes) -> list[int]:
-    pairs = zip_longest(content.split(b"\n"), expected.split(b"\n"))
-    return [number for number, (ours, theirs) in enumerate(pairs, start=1) if ours != theirs]
 
 
 def _hashes(folder: SessionFolder) -> dict[str, str]:

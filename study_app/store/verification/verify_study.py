@@ -30,7 +30,8 @@ from study_app.store.tables.study_description import described_study, describes_
 from study_app.store.verification import psychds, table_checks
 from study_app.store.verification.fingerprints import listed, place_of, read_copy, unreadable
 from study_app.store.verification.leaks import certain_telltales, find_leaks
-from study_app.store.verification.verify_session import BETWEEN_S, LOOKS, Checked, check_session, check_table
+from study_app.store.verification.table_comparison import check_table
+from study_app.store.verification.verify_session import BETWEEN_S, LOOKS, Checked, check_session
 from study_app.store.verification.violations import Finding, Gathered
 
 Sessions: TypeAlias = list[Checked]
