@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any, Final
 
-from study_app.devices.falcon.failure_modes import BY_ID
+from study_app.devices.falcon.diagnosis import BY_ID
 from study_app.errors import DeviceError
 
 READY: Final = "ready"

@@ -12,7 +12,8 @@ from typing import Final
 
 import numpy as np
 
-from study_app.devices.falcon.failure_modes import BY_ID, OPEN, Facts
+from study_app.devices.falcon.diagnosis import BY_ID
+from study_app.devices.falcon.failure_modes import OPEN, Facts
 from study_app.devices.falcon.failures import FalconFailure, UsbFailure
 from study_app.devices.falcon.firmware import Firmware, check
 from study_app.devices.falcon.transport.transport import Transport

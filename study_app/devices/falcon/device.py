@@ -12,8 +12,9 @@ import numpy as np
 
 from study_app.devices.base import Device
 from study_app.devices.falcon import boot
+from study_app.devices.falcon.diagnosis import sentence
 from study_app.devices.falcon.exchange import COUNTERS, LEAST_MASS_KG, exchange_functions, new_exchange
-from study_app.devices.falcon.failure_modes import OPEN, Facts, sentence
+from study_app.devices.falcon.failure_modes import OPEN, Facts
 from study_app.devices.falcon.failures import ProgramMissing, usb_failure
 from study_app.devices.falcon.firmware import check
 from study_app.devices.falcon.guard import Guard, quiet

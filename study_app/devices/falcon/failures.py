@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Final
 
-from study_app.devices.falcon.failure_modes import Facts, sentence
+from study_app.devices.falcon.diagnosis import sentence
+from study_app.devices.falcon.failure_modes import Facts
 from study_app.devices.falcon.wire import constants
 from study_app.errors import DeviceError, DeviceLost, DeviceNotFound
 

@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Final
 
-from study_app.devices.falcon.failure_modes import OPEN, Facts, sentence
+from study_app.devices.falcon.diagnosis import sentence
+from study_app.devices.falcon.failure_modes import OPEN, Facts
 from study_app.devices.falcon.failures import FalconFailure
 from study_app.devices.falcon.wire.replies import ALL_HOMED
 

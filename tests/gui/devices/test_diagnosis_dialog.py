@@ -10,9 +10,10 @@ from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QFileDialog, QLabel
 
 from study_app.devices.doctor_report import Report
+from study_app.devices.falcon.diagnosis import MODES, UDEV_RULE
 from study_app.devices.falcon.doctor.failure_report import findings_of
 from study_app.devices.falcon.doctor.worker import Examination
-from study_app.devices.falcon.failure_modes import MODES, OPEN, UDEV_RULE, Facts
+from study_app.devices.falcon.failure_modes import OPEN, Facts
 from study_app.errors import StudyError
 from study_app.gui.devices.diagnosis_dialog import DiagnosisDialog
 from study_app.gui.devices.failure_rows import Paste, capital

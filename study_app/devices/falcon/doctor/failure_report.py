@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from study_app.devices.falcon.failure_modes import MODES, Mode
+from study_app.devices.falcon.diagnosis import MODES
+from study_app.devices.falcon.failure_modes import Mode
 
 if TYPE_CHECKING:
     from study_app.devices.falcon.doctor.examine import Examined

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import pytest
 
 from study_app.devices.doctor_report import NOTHING_WRONG, lines
+from study_app.devices.falcon.diagnosis import MODES
 from study_app.devices.falcon.doctor.failure_report import report
-from study_app.devices.falcon.failure_modes import MODES, OPEN, Facts
+from study_app.devices.falcon.failure_modes import OPEN, Facts
 
 
 @dataclass(frozen=True)

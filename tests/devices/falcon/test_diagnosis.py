@@ -8,11 +8,12 @@ import pytest
 if numba.config.DISABLE_JIT:
     pytest.skip("devices are C functions", allow_module_level=True)
 
+from study_app.devices.falcon.diagnosis import BY_ID, MODES, UDEV_RULE, diagnose, sentence
 from study_app.devices.falcon.doctor.examine import examine, ftdi_sees
 from study_app.devices.falcon.emulated import EmulatedFalcon
 from study_app.devices.falcon.emulator.emulator import Emulator
 from study_app.devices.falcon.emulator.faults import CHANCES, SWITCHES
-from study_app.devices.falcon.failure_modes import BY_ID, MODES, OPEN, UDEV_RULE, Facts, diagnose, sentence
+from study_app.devices.falcon.failure_modes import OPEN, Facts
 from study_app.devices.falcon.failures import FalconFailure, UsbFailure
 from study_app.devices.falcon.homing import PULL_OUT, NotHomed
 from study_app.errors import DeviceError, DeviceLost, ServoFault
