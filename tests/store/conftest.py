@@ -22,6 +22,8 @@ SEVEN = ("Completely disagree", "Mostly", "Somewhat", "Neutral", "Somewhat agree
 
 SOURCE = b"[study]\nname = 'brackish'\n"
 
+FullDisk = Callable[[int], AbstractContextManager[None]]
+
 
 def study_tables(**changes: Any) -> dict[str, Any]:
     """A protocol file's tables; ids and numbers of the conditions occur nowhere else by chance."""
@@ -120,7 +122,7 @@ def start(tmp_path: Path, protocol: Protocol, clock: SessionClock) -> Callable[.
 
 
 @pytest.fixture
-def files_up_to() -> Callable[[int], AbstractContextManager[None]]:
+def files_up_to() -> FullDisk:
     """Let the system refuse to write any file beyond so many bytes, as a full disk does."""
     resource = pytest.importorskip("resource", reason="sizes of files are limited through the resource module")
 

@@ -1,14 +1,11 @@
+"""A session goes on: times, receipt, tables, torn lines and recordings without a line."""
+
 from __future__ import annotations
 
 import csv
 import io
 import itertools
-import json
-import re
-import subprocess
-import sys
 from collections.abc import Callable
-from contextlib import AbstractContextManager
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
@@ -18,7 +15,6 @@ import pytest
 
 from study_app import __version__
 from study_app.errors import StoreError
-from study_app.protocol.load import load, source_bytes
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Trial, build_schedule
 from study_app.store import receipt
@@ -27,38 +23,9 @@ from study_app.store.recorder import event_of, recording_files
 from study_app.store.recording_files import read_samples, write_frames
 from study_app.store.sessions.begin import SessionStore
 from study_app.store.sessions.folder_lock import is_open
-from study_app.store.sessions.rebuild import rebuild
-from study_app.store.sessions.reopen import check_can_go_on, reopen
 from study_app.store.verification.verify_study import verify
-from tests.store.conftest import choose
-
-SOURCE = b"[study]\nname = 'brackish'\n"
-FullDisk = Callable[[int], AbstractContextManager[None]]
-Again = Callable[..., SessionStore]
-
-
-@pytest.fixture
-def again(tmp_path: Path, protocol: Protocol) -> Again:
-    """Reopen P007's session; any argument of ``reopen`` can be given."""
-
-    def reopened(**given: Any) -> SessionStore:
-        ticks = itertools.count(900_000_000, 1_000_000)
-        arguments: dict[str, Any] = {
-            "session_folder": tmp_path / "study" / "data" / "sub-P007" / "ses-01",
-            "protocol": protocol,
-            "source": SOURCE,
-            "operator": "CD",
-            "device": {"name": "mouse"},
-            "screens": {},
-            "now_ns": lambda: next(ticks),
-        }
-        return reopen(**(arguments | given))
-
-    return reopened
-
-
-def every_byte(folder: Path) -> dict[str, bytes]:
-    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+from tests.store.conftest import FullDisk, choose
+from tests.store.sessions.conftest import Again
 
 
 def present(store: SessionStore, trial: Trial, summary: dict[str, Any]) -> None:
@@ -227,167 +194,6 @@ def test_what_was_cut_off_is_never_written_over(start: Callable[..., SessionStor
     assert [path.read_bytes() for path in kept] == [b"first", b"second"]
 
 
-def test_damaged_lines_at_the_end_are_no_torn_tail(
-    tmp_path: Path, start: Callable[..., SessionStore], again: Again
-) -> None:
-    with start() as store:
-        for text in ("one", "two"):
-            store.append("note", kind="note", text=text)
-    lines = store.folder.journal.read_bytes().split(b"\n")
-    store.folder.journal.write_bytes(b"\n".join([lines[0], *(b"#" + line[1:] for line in lines[1:3]), b""]))
-    before = every_byte(tmp_path)
-    with pytest.raises(StoreError, match="line 2: damaged"):
-        again()
-    assert every_byte(tmp_path) == before
-
-
-def test_a_finished_session_is_refused_untouched(
-    tmp_path: Path, start: Callable[..., SessionStore], again: Again
-) -> None:
-    start().finish("withdrawn")
-    before = every_byte(tmp_path)
-    with pytest.raises(StoreError, match=r"is finished \(withdrawn\): it cannot go on; use a new session number"):
-        again()
-    assert every_byte(tmp_path) == before
-
-
-def test_a_session_open_elsewhere_is_refused_untouched(
-    tmp_path: Path, start: Callable[..., SessionStore], again: Again
-) -> None:
-    with start():
-        before = every_byte(tmp_path)
-        with pytest.raises(StoreError, match="is open in another program"):
-            again()
-        assert every_byte(tmp_path) == before
-
-
-def changed(tables: dict[str, Any], path: str, value: Any) -> Protocol:
-    *above, last = path.split(".")
-    place = tables
-    for name in above:
-        place = place[name]
-    place[last] = value
-    return Protocol.model_validate(tables)
-
-
-@pytest.mark.parametrize(
-    ("path", "value", "told"),
-    [
-        (
-            "pages.consent.body",
-            "You must stay.",
-            'pages.consent.body: "You may stop at any time." before, "You must stay." now',
-        ),
-        ("tasks.feel.max_s", 10, "tasks.feel.max_s: 9 before, 10 now"),
-        ("sequence", ["consent", "liquids", "delays"], "sequence: "),
-    ],
-)
-def test_another_protocol_is_refused_and_the_difference_shown(
-    tmp_path: Path,
-    start: Callable[..., SessionStore],
-    again: Again,
-    tables_of_study: Callable[..., dict[str, Any]],
-    path: str,
-    value: Any,
-    told: str,
-) -> None:
-    start().close()
-    before = every_byte(tmp_path)
-    with pytest.raises(StoreError) as refusal:
-        again(protocol=changed(tables_of_study(), path, value), source=SOURCE + b"# changed")
-    assert told in str(refusal.value)
-    assert "conditions differ" not in str(refusal.value)
-    assert "\n" not in str(refusal.value)
-    assert every_byte(tmp_path) == before
-
-
-@pytest.mark.parametrize(
-    ("path", "value"),
-    [
-        ("liquids.quagmire.density_kg_m3", 2929.2),
-        ("conditions.see_tardy.delay_ms", 292.9),
-        ("blocks.liquids.conditions", ["feel_mildew", "feel_quagmire"]),
-    ],
-)
-def test_of_other_conditions_nothing_but_that_is_told(
-    start: Callable[..., SessionStore],
-    again: Again,
-    tables_of_study: Callable[..., dict[str, Any]],
-    path: str,
-    value: Any,
-) -> None:
-    start().close()
-    with pytest.raises(StoreError) as refusal:
-        again(protocol=changed(tables_of_study(), path, value), source=SOURCE + b"# changed")
-    assert str(refusal.value).endswith("What differs: conditions differ")
-
-
-def test_a_file_that_differs_in_its_comments_alone_is_refused_and_said_to(
-    start: Callable[..., SessionStore], again: Again
-) -> None:
-    start().close()
-    with pytest.raises(StoreError, match="What differs: comments, order or notation, nothing that is run"):
-        again(source=SOURCE + b"# changed")
-
-
-@pytest.mark.parametrize("lost", ["receipt.json", "../../../blinding/key.sealed", "journal.jsonl"])
-def test_what_is_missing_is_named_and_nothing_is_written(
-    tmp_path: Path, start: Callable[..., SessionStore], again: Again, lost: str
-) -> None:
-    with start() as store:
-        pass
-    (store.folder.path / lost).unlink()
-    before = every_byte(tmp_path)
-    with pytest.raises(StoreError, match=Path(lost).name.replace(".", r"\.")):
-        again()
-    assert every_byte(tmp_path) == before
-    assert not is_open(store.folder.path)
-
-
-def finish(store: SessionStore) -> None:
-    store.finish("withdrawn")
-
-
-def lose_the_receipt(store: SessionStore) -> None:
-    store.close()
-    store.folder.receipt.unlink()
-
-
-def lose_the_key(store: SessionStore) -> None:
-    store.close()
-    store.place.study_folder.key.unlink()
-
-
-@pytest.mark.parametrize("done", [finish, lose_the_receipt, lose_the_key, SessionStore.close, None])
-def test_looking_alone_refuses_what_could_not_be_opened_again(
-    tmp_path: Path,
-    start: Callable[..., SessionStore],
-    again: Again,
-    protocol: Protocol,
-    done: Callable[[SessionStore], None] | None,
-) -> None:
-    """Of another protocol where the session was only closed; open where nothing was done."""
-    with start() as store:
-        if done is not None:
-            done(store)
-        source = SOURCE + b"# changed" if done is SessionStore.close else SOURCE
-        before = every_byte(tmp_path)
-        with pytest.raises(StoreError) as told:
-            check_can_go_on(store.folder.path, protocol, source)
-        assert every_byte(tmp_path) == before
-        with pytest.raises(StoreError, match=re.escape(str(told.value))):
-            again(source=source)
-
-
-def test_looking_at_a_session_that_can_go_on_changes_nothing(
-    tmp_path: Path, start: Callable[..., SessionStore], protocol: Protocol
-) -> None:
-    start().close()
-    before = every_byte(tmp_path)
-    check_can_go_on(tmp_path / "study" / "data" / "sub-P007" / "ses-01", protocol, SOURCE)
-    assert every_byte(tmp_path) == before
-
-
 def test_a_study_killed_before_it_was_described_is_described(
     tmp_path: Path, start: Callable[..., SessionStore], again: Again
 ) -> None:
@@ -397,33 +203,6 @@ def test_a_study_killed_before_it_was_described_is_described(
     description.unlink()
     again().close()
     assert description.read_bytes() == told
-
-
-def test_a_session_that_had_not_begun_cannot_go_on(
-    tmp_path: Path, start: Callable[..., SessionStore], again: Again
-) -> None:
-    """The program was killed while it wrote the first line."""
-    with start() as store:
-        pass
-    store.folder.journal.write_bytes(store.folder.journal.read_bytes()[:40])
-    before = every_byte(tmp_path)
-    with pytest.raises(StoreError, match=r"journal\.jsonl holds no line: .* use a new session number"):
-        again()
-    assert every_byte(tmp_path) == before
-
-
-def test_a_damaged_journal_is_refused_untouched(
-    tmp_path: Path, start: Callable[..., SessionStore], again: Again
-) -> None:
-    with start() as store:
-        for text in ("one", "two"):
-            store.append("note", kind="note", text=text)
-    lines = store.folder.journal.read_bytes().split(b"\n")
-    store.folder.journal.write_bytes(b"\n".join([lines[0], lines[1][:20], *lines[2:]]))
-    before = every_byte(tmp_path)
-    with pytest.raises(StoreError, match="line 2: damaged; restore it from a copy"):
-        again()
-    assert every_byte(tmp_path) == before
 
 
 def test_a_disk_without_space_for_the_line_changes_nothing_and_it_can_be_tried_again(
@@ -489,105 +268,3 @@ def event_fields(store: SessionStore) -> dict[str, Any]:
     """What the journal would be told of the first recording; the others are not told of."""
     assert store.recorder is not None
     return event_of(store.recorder.kept()[0])[1]
-
-
-RACER = """
-import json, sys
-from pathlib import Path
-from study_app.errors import StoreError
-from study_app.protocol.model import Protocol
-from study_app.store.sessions.reopen import reopen
-protocol = Protocol.model_validate(json.loads(sys.argv[1]))
-print("ready", flush=True)
-held = None
-for line in sys.stdin:
-    if held:
-        held.close()
-        held = None
-    try:
-        held = reopen(Path(line.strip()), protocol, sys.argv[2].encode(), operator="", device={}, screens={})
-    except StoreError as error:
-        print("refused", error, flush=True)
-    else:
-        print("open", flush=True)
-"""
-
-
-def test_of_two_programs_that_resume_at_once_never_both_do(
-    tmp_path: Path, start: Callable[..., SessionStore], tables_of_study: Callable[..., dict[str, Any]]
-) -> None:
-    folders = []
-    for number in range(20):
-        with start(f"P{number:03d}") as store:
-            folders.append(store.folder)
-    command = [sys.executable, "-c", RACER, json.dumps(tables_of_study()), SOURCE.decode()]
-    racers = [subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) for _ in range(2)]
-    try:
-        assert [racer.stdout.readline() for racer in racers if racer.stdout] == ["ready\n"] * 2
-        for folder in folders:
-            for racer in racers:
-                assert racer.stdin
-                racer.stdin.write(f"{folder.path}\n")
-                racer.stdin.flush()
-            answers = sorted(racer.stdout.readline() for racer in racers if racer.stdout)
-            resumed = [line for line in journal.read(folder.journal) if line["event"] == "session_resumed"]
-            assert len(resumed) == answers.count("open\n") <= 1
-            assert all("is open in another program" in told for told in answers if told.startswith("refused"))
-    finally:
-        for racer in racers:
-            racer.communicate()
-
-
-KILLED = """
-import sys
-from pathlib import Path
-import numpy as np
-from study_app.haptics.model.layout import SAMPLE
-from study_app.protocol.load import load, source_bytes
-from study_app.store.sessions.begin import begin
-store = begin(
-    Path(sys.argv[1]), load("demo"), source_bytes("demo"), "P001", seed=1, operator="", language="en",
-    device={"name": "mouse"}, screens={}, simulated=True, recordings=True,
-)
-samples = np.zeros(35_000, SAMPLE)
-samples["position_m"] = np.random.default_rng(1).random((35_000, 3))
-for trial in range(1, 1000):
-    told = {"block": "b", "phase": "main", "part": 1, "index": trial, "of": 1000, "code": "L1"}
-    store.append("trial_started", trial=trial, attempt=1, **told)
-    store.recorder.start(trial, 1, 1000.0)
-    for _ in range(3):
-        store.recorder.append(samples)
-    store.recorder.stop()
-    store.append("trial_ended", trial=trial, attempt=1, outcome="complete")
-    item = {"item": "wet", "number": 1, "value": 4, "onset_s": 1.0, "first_s": 2.0, "last_s": 2.0, "changes": 0}
-    store.append("item_shown", t_s=1.0, trial=trial, item="wet")
-    store.append("choice", t_s=2.0, trial=trial, item="wet", value=4)
-    store.append("responses", trial=trial, attempt=1, items=[item])
-    print(trial, flush=True)
-    store.write_tables()
-"""
-
-
-@pytest.mark.parametrize("moment", range(6))
-def test_a_killed_program_leaves_all_acknowledged_answers_and_a_session_that_goes_on(
-    tmp_path: Path, moment: int
-) -> None:
-    """Killed at some moment after so many answers: in the middle of journal, tables and recordings."""
-    study = tmp_path / "study"
-    with subprocess.Popen([sys.executable, "-c", KILLED, str(study)], stdout=subprocess.PIPE, text=True) as program:
-        assert program.stdout
-        acknowledged = [int(program.stdout.readline()) for _ in range(1 + 2 * moment)]
-        program.kill()
-        acknowledged += [int(line) for line in program.stdout if line.endswith("\n")]
-    folder = study / "data" / "sub-P001" / "ses-01"
-    rebuild(folder)
-    with reopen(folder, load("demo"), source_bytes("demo"), operator="", device={}, screens={}) as store:
-        answered = [line["trial"] for line in store.lines if line["event"] == "responses"]
-        store.finish("aborted")
-    assert answered[: len(acknowledged)] == acknowledged
-    assert not list(study.rglob("*.tmp"))
-    findings = verify(study)
-    assert [str(error) for error in findings.errors] == []
-    assert [str(warning) for warning in findings.warnings if "ended before it was whole" not in str(warning)] == []
-    for path in (folder / "recordings").glob("trial-???.parquet"):
-        assert len(read_samples(path)) == 105_000
