@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 
 from study_app.haptics.model.layout import LIMITER_FADE, LIMITER_STOP
 from study_app.lab.limiters import WORDS
+from study_app.protocol.model import Protocol
+from study_app.viewmodels.number_words import THIN_SPACE, grouped
 from study_app.viewmodels.servo_health import TRACE_STEP_S, TRACE_WINDOW_S
 
 Floats = NDArray[np.float64]
@@ -35,6 +37,22 @@ class ForceFigures:
     most: float
     limiters: tuple[tuple[str, int], ...]
     withheld: float = 0.0
+
+
+def force_rows(protocol: Protocol, forces: ForceFigures | None) -> tuple[tuple[str, str], ...]:
+    """Return share of the limit, limiters and force withheld, or that they are hidden; as many rows in either case."""
+    share, limiters = f"Force, share of {protocol.device.force_limit_n:g} N", "Limiters acted"
+    withheld = f"Force withheld, limit {protocol.limits.withheld_percent:g}{THIN_SPACE}%"
+    if protocol.study.blinding == "double":
+        return (share, "hidden"), (limiters, "hidden"), (withheld, "hidden")
+    if forces is None:
+        return (share, "–"), (limiters, "–"), (withheld, "–")
+    most_first = sorted(forces.limiters, key=lambda counted: -counted[1])
+    return (
+        (share, f"{forces.share:.0%}, most {forces.most:.0%}".replace("%", f"{THIN_SPACE}%")),
+        (limiters, ", ".join(f"{name} {grouped(ticks)}" for name, ticks in most_first) or "none"),
+        (withheld, f"{forces.withheld:.1%}".replace("%", f"{THIN_SPACE}%")),
+    )
 
 
 class Forces:

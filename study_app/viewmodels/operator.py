@@ -11,8 +11,8 @@ from typing import Literal
 
 from study_app.protocol.model import Explore, Protocol, Reach
 from study_app.protocol.orders.schedule import Trial
-from study_app.viewmodels.force_traces import ForceFigures
-from study_app.viewmodels.number_words import THIN_SPACE, duration_words, grouped, minutes
+from study_app.viewmodels.force_traces import ForceFigures, force_rows
+from study_app.viewmodels.number_words import duration_words, grouped, minutes
 from study_app.viewmodels.servo_health import Vitals
 from study_app.viewmodels.session_stages import NoteLine, SessionProgress, Stage, operator_language
 
@@ -198,7 +198,7 @@ def operator_view(
             session.device_name,
             session.device_kind,
             device_ready,
-            (*_force_rows(session, forces), ("Safety faults", str(faults)), *session.device_rows),
+            (*force_rows(session.protocol, forces), ("Safety faults", str(faults)), *session.device_rows),
         ),
         notes=progress.notes[-NOTES_SHOWN:][::-1],
         force_on=force_on,
@@ -357,22 +357,6 @@ def _beyond(session: Session, progress: SessionProgress) -> tuple[str, ...]:
 
 def _unit(measure: str) -> str:
     return "%" if measure in {"withheld_share", "targets_reached"} else "ms"
-
-
-def _force_rows(session: Session, forces: ForceFigures | None) -> tuple[tuple[str, str], ...]:
-    """Return share of the limit, limiters and force withheld, or that they are hidden; as many rows in either case."""
-    share, limiters = f"Force, share of {session.protocol.device.force_limit_n:g} N", "Limiters acted"
-    withheld = f"Force withheld, limit {session.protocol.limits.withheld_percent:g}{THIN_SPACE}%"
-    if session.protocol.study.blinding == "double":
-        return (share, "hidden"), (limiters, "hidden"), (withheld, "hidden")
-    if forces is None:
-        return (share, "–"), (limiters, "–"), (withheld, "–")
-    most_first = sorted(forces.limiters, key=lambda counted: -counted[1])
-    return (
-        (share, f"{forces.share:.0%}, most {forces.most:.0%}".replace("%", f"{THIN_SPACE}%")),
-        (limiters, ", ".join(f"{name} {grouped(ticks)}" for name, ticks in most_first) or "none"),
-        (withheld, f"{forces.withheld:.1%}".replace("%", f"{THIN_SPACE}%")),
-    )
 
 
 def _tiles(vitals: Vitals, rate_hz: float, limit_s: float) -> tuple[Tile, ...]:
