@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import os
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -19,29 +16,12 @@ from study_app.store.tables import session_tables
 from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
 from tests.faults.support import short
+from tests.faults.support.killer_runs import needs_fork, outcomes_of
 
 TIMES = {"answered_at", "onset_s", "first_choice_s", "last_change_s", "attempt"}
 WHAT_RAN = ("trial", "block", "phase", "part", "index", "of", "code", "outcome")
 
-pytestmark = [
-    needs_servo,
-    pytest.mark.skipif(not hasattr(os, "fork"), reason="needs processes that fork"),
-]
-
-
-def kill(folder: Path, resume: str, count: int) -> list[dict[str, Any]]:
-    """Kill ``count`` sessions; return what became of each."""
-    protocol = short.write(folder, resume=resume)
-    done = subprocess.run(
-        [sys.executable, "-m", "tests.faults.support.killer", str(protocol), str(folder), str(count), "1"],
-        cwd=Path(__file__).parents[2],
-        capture_output=True,
-        text=True,
-        timeout=150,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    return [json.loads(line) for line in done.stdout.splitlines()]
+pytestmark = [needs_servo, needs_fork]
 
 
 def session(study: Path) -> SessionFolder:
@@ -77,7 +57,7 @@ def last_attempts(study: Path) -> list[tuple[str, ...]]:
 def test_killed_at_random_moments_a_session_is_completed_as_if_nothing_had_been(
     tmp_path: Path, resume: str, count: int
 ) -> None:
-    outcomes = kill(tmp_path, resume, count)
+    outcomes = outcomes_of("killer", short.write(tmp_path, resume=resume), tmp_path, count, 1)
     assert len(outcomes) == count
     whole = tmp_path / "whole"
     interrupted = 0

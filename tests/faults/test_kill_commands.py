@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import json
-import os
 import signal
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -16,26 +12,15 @@ from study_app.store.verification.verify_study import verify
 from tests.compiled import needs_servo
 from tests.faults.support import short
 from tests.faults.support.command_killer import COMMANDS
+from tests.faults.support.killer_runs import needs_fork, outcomes_of
 
-pytestmark = [
-    needs_servo,
-    pytest.mark.skipif(not hasattr(os, "fork"), reason="needs processes that fork"),
-]
+pytestmark = [needs_servo, needs_fork]
 
 
 @pytest.fixture(scope="module")
 def outcomes(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, Any]]:
     folder = tmp_path_factory.mktemp("commands")
-    done = subprocess.run(
-        [sys.executable, "-m", "tests.faults.support.command_killer", str(short.write(folder)), str(folder), "1"],
-        cwd=Path(__file__).parents[2],
-        capture_output=True,
-        text=True,
-        timeout=150,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    return [json.loads(line) for line in done.stdout.splitlines()]
+    return outcomes_of("command_killer", short.write(folder), folder, 1)
 
 
 def seen(files: dict[str, str]) -> dict[str, str]:
