@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from study_app.devices.registry import list_devices
 from study_app.evaluation.appraisal import Costs, Errors
-from study_app.gui.home.new_session_dialog import DEVICE_WORDS
+from study_app.gui.home.device_options import DEVICE_LABELS
 from study_app.lab.parameters import EFFECT_WORDS
 from study_app.viewmodels.device_list import TITLES
 from study_app.viewmodels.lab import CostRow, ErrorRow
@@ -33,7 +33,7 @@ def error_rows(errors: Errors) -> tuple[ErrorRow, ...]:
 
 def device_choices() -> tuple[tuple[str, str], ...]:
     """Return every device's name, and the words to choose it by."""
-    return tuple((name, DEVICE_WORDS.get(name, name)) for name in list_devices())
+    return tuple((name, DEVICE_LABELS.get(name, name)) for name in list_devices())
 
 
 def title_of(device: str) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -13,16 +12,17 @@ from PySide6.QtWidgets import (
     QFileDialog,
     QGridLayout,
     QHBoxLayout,
-    QLabel,
-    QLineEdit,
     QScrollArea,
     QVBoxLayout,
     QWidget,
 )
 
 from study_app.devices.registry import kind_of, list_devices
-from study_app.errors import DeviceError, StoreError
+from study_app.errors import StoreError
 from study_app.gui.display.screens import screens_shown
+from study_app.gui.home.device_options import DEVICE_LABELS, device_or_default
+from study_app.gui.home.form_fields import add_field, field_with_button, text_field
+from study_app.gui.home.study_folder_state import StudyFolderState, read_study_folder_state
 from study_app.gui.theme.theme import LIGHT, Theme, font
 from study_app.gui.theme.themed import wear
 from study_app.gui.widgets.background import Background
@@ -30,43 +30,13 @@ from study_app.gui.widgets.cards import Icon, Rule
 from study_app.gui.widgets.controls import ActionButton, Check, Choice, Number
 from study_app.gui.widgets.labels import label, set_ink
 from study_app.session.request import NewSession, draw_seed, study_results
-from study_app.store.folders import StudyFolder
-from study_app.store.sessions.participant_ids import MAX_SESSION, UsedIds, check_participant, used_ids
-from study_app.store.tables.study_description import check_study
+from study_app.store.sessions.participant_ids import MAX_SESSION, check_participant
 from study_app.store.workstation import DEFAULTS, MachineSettings
-from study_app.viewmodels.device_list import TITLES
 from study_app.viewmodels.home import LANGUAGES, StudyFacts
 from study_app.workspace import workspace
 
-_NOTES = {
-    "mouse": " (seen, not felt)",
-    "spacemouse": " (seen, not felt)",
-    "scripted": " (moves by itself)",
-    "falcon-emulated": " (moves by itself)",
-}
-DEVICE_WORDS = {name: f"{title}{_NOTES.get(name, '')}" for name, title in TITLES.items()}
 NEEDS_FIRMWARE = "falcon"
 FRAME = 60  # of a window, at most
-
-
-@dataclass(frozen=True, slots=True)
-class _FolderState:
-    """A study's folder when it was read: which ids are used, and why no session of the study can be put there."""
-
-    path: Path
-    used: UsedIds
-    fault: str
-
-
-def _state_of(path: Path, study: str) -> _FolderState:
-    folder, fault = StudyFolder(path), ""
-    used = UsedIds(path, frozenset(), ())
-    try:
-        check_study(folder, study)
-        used = used_ids(folder)
-    except StoreError as error:
-        fault = str(error)
-    return _FolderState(path, used, fault)
 
 
 class NewSessionDialog(QDialog):
@@ -94,24 +64,24 @@ class NewSessionDialog(QDialog):
         super().__init__(parent)
         self.facts = facts
         self._machine = machine
-        self._state: _FolderState | None = None
+        self._state: StudyFolderState | None = None
         self._reader = Background(self)
         self._reader.done.connect(self._take_state)
         self.setWindowTitle("New session")
         self.setModal(True)
         self.setMinimumWidth(720)
         self._all_results = results
-        self._suggested = str(study_results(results, facts.protocol.study.name, _known(machine.device)))
-        self.results = _field("Results folder of this study")
+        self._suggested = str(study_results(results, facts.protocol.study.name, device_or_default(machine.device)))
+        self.results = text_field("Results folder of this study")
         self.results.setText(self._suggested)
         self.where = label("", "small", "text3")
-        self.participant = _field("Participant")
+        self.participant = text_field("Participant")
         self.session = Number(1, MAX_SESSION, 1)
-        self.seed = _field("Seed")
-        self.operator = _field("Operator")
+        self.seed = text_field("Seed")
+        self.operator = text_field("Operator")
         self.language = Choice()
         self.device = Choice()
-        self.firmware = _field("Falcon's firmware")
+        self.firmware = text_field("Falcon's firmware")
         self.screen_choice = Choice()
         self.windowed = Check("In a window instead of full-screen")
         self.pilot = Check("Pilot: framed, kept apart from the data")
@@ -139,9 +109,9 @@ class NewSessionDialog(QDialog):
         self.operator.setText(self._machine.operator)
         for code in study.languages:
             self.language.addItem(LANGUAGES.get(code, code), code)
-        preferred = _known(self._machine.device)
+        preferred = device_or_default(self._machine.device)
         for name in dict.fromkeys((*list_devices(), preferred)):
-            self.device.addItem(DEVICE_WORDS.get(name, name), name)
+            self.device.addItem(DEVICE_LABELS.get(name, name), name)
         self.device.setCurrentIndex(self.device.findData(preferred))
         self.firmware.setText(self._machine.firmware or "")
         self.firmware.setPlaceholderText("Where it is switched on already: none")
@@ -197,20 +167,21 @@ class NewSessionDialog(QDialog):
         change = ActionButton("", "Change …", height=40)
         change.setAutoDefault(False)
         change.clicked.connect(self._choose_folder)
-        _put(grid, 0, 0, "Participant", self.participant, hint="letters and digits, no name")
-        _put(grid, 0, 1, "Session", self.session)
+        add_field(grid, 0, 0, "Participant", self.participant, hint="letters and digits, no name")
+        add_field(grid, 0, 1, "Session", self.session)
         grid.addLayout(self._judge(), 2, 0, 1, 2)
-        _put(grid, 4, 0, "Seed", _beside(self.seed, another), hint="decides every order; recorded")
-        _put(grid, 4, 1, "Operator", self.operator)
-        _put(grid, 6, 0, "Language of the participant's pages", self.language)
-        _put(grid, 6, 1, "Device", self.device)
-        _put(grid, 8, 0, "Participant's screen", self.screen_choice)
+        add_field(grid, 4, 0, "Seed", field_with_button(self.seed, another), hint="decides every order; recorded")
+        add_field(grid, 4, 1, "Operator", self.operator)
+        add_field(grid, 6, 0, "Language of the participant's pages", self.language)
+        add_field(grid, 6, 1, "Device", self.device)
+        add_field(grid, 8, 0, "Participant's screen", self.screen_choice)
         both = QVBoxLayout()
         both.setSpacing(2)
         both.addWidget(self.windowed)
         both.addWidget(self.pilot)
         grid.addLayout(both, 8, 1, 2, 1, Qt.AlignmentFlag.AlignBottom)
-        _put(grid, 10, 0, "Results folder of this study", _beside(self.results, change), hint=self.where, across=2)
+        folder = field_with_button(self.results, change)
+        add_field(grid, 10, 0, "Results folder of this study", folder, hint=self.where, across=2)
         self._firmware_row = self._ask_firmware()
         grid.addWidget(self._firmware_row, 12, 0, 1, 2)
         self._firmware_row.setVisible(self._takes_firmware)
@@ -272,7 +243,7 @@ class NewSessionDialog(QDialog):
         inside.setContentsMargins(0, 0, 0, 0)
         inside.setVerticalSpacing(6)
         hint = "loaded only where it needs it"
-        _put(inside, 1, 0, "Falcon's firmware", _beside(self.firmware, find), hint=hint)
+        add_field(inside, 1, 0, "Falcon's firmware", field_with_button(self.firmware, find), hint=hint)
         return row
 
     def _choose_folder(self) -> None:
@@ -332,18 +303,18 @@ class NewSessionDialog(QDialog):
     def _look(self) -> None:
         """Read the study's folder again, beside the window's thread: another program may use it, too."""
         if text := self.results.text().strip():
-            self._reader.run(partial(_state_of, Path(text), self.facts.protocol.study.name))
+            self._reader.run(partial(read_study_folder_state, Path(text), self.facts.protocol.study.name))
 
-    def _take_state(self, state: _FolderState) -> None:
+    def _take_state(self, state: StudyFolderState) -> None:
         if state.path == Path(self.results.text().strip()) and state != self._state:
             self._state = state
             self._show_verdict()
 
-    def _state_now(self) -> _FolderState:
+    def _state_now(self) -> StudyFolderState:
         """Return the study's folder as it was last read; one that was just chosen is read at once."""
         path = Path(self.results.text().strip() or ".")
         if self._state is None or self._state.path != path:
-            self._state = _state_of(path, self.facts.protocol.study.name)
+            self._state = read_study_folder_state(path, self.facts.protocol.study.name)
         return self._state
 
     def _fault(self) -> str:
@@ -397,46 +368,3 @@ class NewSessionDialog(QDialog):
             pilot=self.pilot.isChecked(),
             firmware=Path(firmware) if self._takes_firmware and (firmware := self.firmware.text().strip()) else None,
         )
-
-
-def _known(device: str) -> str:
-    """Return the device to begin with: the preferred one, or the default where nobody knows it."""
-    try:
-        kind_of(device)
-    except DeviceError:
-        return list_devices()[0]
-    return device
-
-
-def _field(name: str) -> QLineEdit:
-    field = QLineEdit()
-    field.setFont(font("body", tabular=True))
-    field.setAccessibleName(name)
-    return field
-
-
-def _beside(field: QWidget, button: QWidget) -> QWidget:
-    both = QWidget()
-    row = QHBoxLayout(both)
-    row.setContentsMargins(0, 0, 0, 0)
-    row.setSpacing(8)
-    row.addWidget(field, 1)
-    row.addWidget(button)
-    return both
-
-
-def _put(
-    grid: QGridLayout, row: int, place: int, name: str, field: QWidget, *, hint: str | QLabel = "", across: int = 1
-) -> QLabel:
-    """Put a field under its name, with a hint behind the name."""
-    named = label(name, "label", "text2")
-    head = QHBoxLayout()
-    head.setContentsMargins(0, 6 if row else 0, 0, 0)
-    head.addWidget(named)
-    head.addStretch()
-    if hint:
-        head.addWidget(label(hint, "small", "text3") if isinstance(hint, str) else hint)
-    named.setBuddy(field)
-    grid.addLayout(head, row, place, 1, across)
-    grid.addWidget(field, row + 1, place, 1, across)
-    return named

@@ -39,13 +39,13 @@ def use(results: Path, participant: str, session: int = 1) -> None:
 
 
 def test_a_key_in_a_field_reads_no_folder_in_the_windows_thread(dialog, qtbot, monkeypatch):
-    threads, read = [], new_session_dialog._state_of
+    threads, read = [], new_session_dialog.read_study_folder_state
 
     def noted(*arguments):
         threads.append(threading.current_thread())
         return read(*arguments)
 
-    monkeypatch.setattr(new_session_dialog, "_state_of", noted)
+    monkeypatch.setattr(new_session_dialog, "read_study_folder_state", noted)
     dialog.participant.clear()
     qtbot.keyClicks(dialog.participant, "P0042")
     dialog.session.setValue(3)
