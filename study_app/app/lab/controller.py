@@ -9,19 +9,18 @@ from __future__ import annotations
 import logging
 import math
 import random
-import sys
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import TYPE_CHECKING, Any, Final
 
 from PySide6.QtCore import QObject, Qt, QTimer
 
+from study_app.app.exception_hooks import UncaughtExceptions
+from study_app.app.guarded_slots import guarded
 from study_app.app.lab.costs import AsksPrice, Prices
 from study_app.app.lab.device_opening import LabOpening
-from study_app.app.lab.guarded_slots import guarded
 from study_app.app.lab.preset_saving import LabSaving
 from study_app.app.lab_rows import cost_rows, device_choices, error_rows, title_of
 from study_app.errors import StudyError
@@ -104,7 +103,7 @@ class LabVisit(QObject):
         self._saving = LabSaving(first.liquids)
         self._chance = chance if chance is not None else random.SystemRandom()
         self._said = ""
-        self._hook_before = sys.excepthook
+        self.uncaught = UncaughtExceptions(self._handle_uncaught)
         self._frames = self._timer(FRAME_MS, self._frame)
         self._due = self._timer(0, self._frame, once=True)
         self._price_due = self._timer(APPRAISE_AFTER_MS, self._ask_price, once=True)
@@ -167,7 +166,7 @@ class LabVisit(QObject):
             self.place.told.emit("The device was not let go of as it should be", f"{error}.")
         finally:
             self._prices.close()
-            sys.excepthook = self._hook_before
+            self.uncaught.remove()
 
     def end(self) -> None:
         """Leave, and wait for a preset that is being written, and for a device, so that it is let go of, too."""
@@ -235,7 +234,7 @@ class LabVisit(QObject):
         if self._entered:
             return
         self._entered = True
-        self._hook_before, sys.excepthook = sys.excepthook, self._uncaught
+        self.uncaught.install()
         self._frames.start()
         self._open(self.device)
 
@@ -415,7 +414,6 @@ class LabVisit(QObject):
             return "stopped"
         return "opening" if self._opening.busy_with is not None else "ready" if self.live is not None else "closed"
 
-    def _uncaught(self, kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
-        """Hear of exceptions that Qt met outside our slots, such as in painting."""
+    def _handle_uncaught(self, error: BaseException) -> bool:
         self.fail(error)
-        self._hook_before(kind, error, trace)
+        return False

@@ -9,24 +9,22 @@ operator. Nothing of it reaches the participant but a calm page.
 from __future__ import annotations
 
 import logging
-import sys
-import threading
 import traceback
-from collections.abc import Callable
 from dataclasses import replace
-from functools import wraps
-from types import TracebackType
-from typing import Any, Concatenate, ParamSpec
+from typing import Any
 
-from PySide6.QtCore import QObject, Qt, QTimer, Signal
+from PySide6.QtCore import QObject, QTimer, Signal
 
+from study_app.app.exception_hooks import ThreadExceptions, UncaughtExceptions
+from study_app.app.guarded_slots import guarded_session_slot
 from study_app.app.session.frame_budget import Slack
 from study_app.app.session.garbage_collection import settle, unsettle
 from study_app.app.session.operator_monitor import Lookout
+from study_app.app.session.operator_requests import OperatorRequests
 from study_app.app.session.parts import Hand, Parts
 from study_app.app.session.reconnection import Reconnection
 from study_app.app.session.thread_priority import Urgency
-from study_app.errors import DeviceError, ServoFault, SessionError, StudyError
+from study_app.errors import DeviceError, ServoFault, StudyError
 from study_app.gui.display.frame_clock import Frames
 from study_app.gui.operator.strip import Strip
 from study_app.gui.operator.window import OperatorWindow
@@ -37,14 +35,10 @@ from study_app.session.runner import Runner
 from study_app.session.transitions.events import (
     Begin,
     Continue,
-    EndAsked,
     Event,
     ForceStopped,
-    Note,
     PauseAsked,
     Reconnected,
-    RepeatAsked,
-    ResumeAsked,
     broken,
 )
 from study_app.store.program_log import DEVICE_FAILED
@@ -54,24 +48,6 @@ TRACES_S = 0.030  # every second frame of 60 a second, every fifth of 144
 TILES_S = 0.5
 END_SHOWN_MS = 5000
 log = logging.getLogger(__name__)
-P = ParamSpec("P")
-
-
-def _guarded(
-    slot: Callable[Concatenate[SessionBridge, P], None],
-) -> Callable[Concatenate[SessionBridge, P], None]:
-    """Let no exception leave a slot: an event that came too late is dropped, everything else ends in zero force."""
-
-    @wraps(slot)
-    def run(self: SessionBridge, /, *arguments: P.args, **named: P.kwargs) -> None:
-        try:
-            slot(self, *arguments, **named)
-        except SessionError as error:
-            log.info("dropped: %s", error)
-        except Exception as error:  # noqa: BLE001 - whatever it is, the hand comes first
-            self.fail(error)
-
-    return run
 
 
 class SessionBridge(QObject):
@@ -94,7 +70,6 @@ class SessionBridge(QObject):
 
     done = Signal()
     diagnose_asked = Signal()
-    _thread_broke = Signal(str)
 
     def __init__(
         self,
@@ -119,14 +94,17 @@ class SessionBridge(QObject):
             ports = replace(ports, settled=parts.recorder.settled)
         self._leaves = False
         self.runner = Runner(parts.session.protocol, parts.schedule, parts.key, ports, parts.language, parts.start)
+        self.requests = OperatorRequests(
+            parts, self.runner, participant, operator, strip=strip, fail=self.fail, parent=self
+        )
         self.reconnection = None if parts.reconnect is None else Reconnection(parts.reconnect)
         self._hand: Hand | None = None
         self._gone = False
         self._stalled: str | None = None
         self._lost = False
-        self._hook_before = sys.excepthook
-        self._thread_hook_before = threading.excepthook
-        self._thread_broke.connect(self._tell_of_thread, Qt.ConnectionType.QueuedConnection)
+        self.uncaught = UncaughtExceptions(self._handle_uncaught)
+        self._thread_exceptions = ThreadExceptions(self)
+        self._thread_exceptions.ended.connect(self._tell_of_thread)
         self._frames = Frames(refresh_hz, parent=self)
         self._frames.due.connect(self._frame)
         self._urgency = Urgency()
@@ -136,15 +114,6 @@ class SessionBridge(QObject):
 
     def _connect(self) -> None:
         operator, participant = self.operator, self.participant
-        operator.stop_asked.connect(self._stop_force)
-        operator.fade_in_asked.connect(self._resume)
-        operator.resume_asked.connect(self._resume)
-        operator.pause_asked.connect(self._pause)
-        operator.repeat_asked.connect(self._repeat)
-        operator.end_asked.connect(self._end)
-        operator.note_written.connect(self._note)
-        operator.mark_set.connect(self._mark)
-        operator.exclude_asked.connect(self._exclude)
         operator.close_asked.connect(self._close)
         operator.diagnose_asked.connect(self._diagnose)
         operator.reconnect_asked.connect(self._reconnect)
@@ -156,7 +125,6 @@ class SessionBridge(QObject):
         participant.event.connect(self._event)
         participant.left.connect(operator.come_forward)
         if self.strip is not None:
-            self.strip.stop_asked.connect(self._stop_force)
             self.strip.operator_asked.connect(operator.come_forward)
             operator.header.page.show()
             operator.page_asked.connect(participant.come_forward)
@@ -180,14 +148,14 @@ class SessionBridge(QObject):
 
     def start(self) -> None:
         """Begin the session."""
-        sys.excepthook = self._uncaught
-        threading.excepthook = self._uncaught_in_thread
+        self.uncaught.install()
+        self._thread_exceptions.install()
         settle()
         self._urgency.hurry()
         self._frames.start()
         self._begin()
 
-    @_guarded
+    @guarded_session_slot
     def _begin(self) -> None:
         self._post(Begin(self._now()))
         self._tiles()
@@ -199,7 +167,7 @@ class SessionBridge(QObject):
             self._break_off()
         self._leave()
 
-    @_guarded
+    @guarded_session_slot
     def _break_off(self) -> None:
         """Pause, so that a trial under way is journalled as interrupted."""
         self._post(PauseAsked(self._now(), "program"))
@@ -226,30 +194,24 @@ class SessionBridge(QObject):
         except Exception as second:  # noqa: BLE001 - the force is off; the first failure is the one that counts
             log.error("and could not be written down: %s", second)  # noqa: TRY400 - one line, the first has the trace
 
-    def _uncaught(self, kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
-        """Hear of exceptions that Qt met outside our slots, such as in painting."""
+    def _handle_uncaught(self, error: BaseException) -> bool:
+        """Handle an exception that no slot caught; return whether it was only a panel's, which is switched off."""
         if self.operator.panels.take(error):
-            return
+            return True
         self.fail(error)
-        self._hook_before(kind, error, trace)
+        return False
 
-    @_guarded
+    @guarded_session_slot
     def _panel_failed(self, name: str, error: Exception) -> None:
         """Log it and note it; the panel itself says so to the operator."""
         log.error("the panel %r failed and is switched off: %s", name, error, exc_info=error)
-        self._remember(f"the cockpit's panel {name!r} failed: {type(error).__name__}: {error}")
+        self.requests.record_note(f"the cockpit's panel {name!r} failed: {type(error).__name__}: {error}")
 
-    def _uncaught_in_thread(self, told: threading.ExceptHookArgs) -> None:
-        """Hear of an exception that ended a thread, in that thread."""
-        name = told.thread.name if told.thread is not None else "unknown"
-        log.error("the thread %r ended: %s", name, told.exc_value, exc_info=told.exc_value)
-        self._thread_broke.emit(f"{name}: {told.exc_type.__name__}: {told.exc_value}")
-
-    @_guarded
+    @guarded_session_slot
     def _tell_of_thread(self, what: str) -> None:
         """Tell the operator, and note it: what that thread did is missing from here on."""
         self.operator.tell("A part of the program ended", f"{what}. What was answered is kept.")
-        self._remember(f"a thread of the program ended: {what}")
+        self.requests.record_note(f"a thread of the program ended: {what}")
 
     def _now(self) -> float:
         return self.parts.clock()
@@ -262,7 +224,7 @@ class SessionBridge(QObject):
         self._draw()
         self._slack.use(self._frames.next_ns)
 
-    @_guarded
+    @guarded_session_slot
     def _draw(self) -> None:
         """Look at the device, and draw the tank as late as the trial asks."""
         self.runner.poll()
@@ -274,22 +236,22 @@ class SessionBridge(QObject):
         if view is not None and self._hand is not None and self._hand.act(now_s, view):
             self._post(Continue(now_s))
 
-    @_guarded
+    @guarded_session_slot
     def _painted(self, sample_ns: int) -> None:
         """Keep when a frame was painted; on the servo's clock, which is not every system's monotonic one."""
         painted_ns = self.parts.servo.now_ns()
         self.runner.frame_shown(painted_ns, sample_ns)
         self.lookout.health.frame(painted_ns)
 
-    @_guarded
+    @guarded_session_slot
     def _traces(self) -> None:
         self.lookout.show_traces(self.operator)
 
-    @_guarded
+    @guarded_session_slot
     def _forces(self) -> None:
         self.lookout.show_forces(self.operator)
 
-    @_guarded
+    @guarded_session_slot
     def _tiles(self) -> None:
         self.lookout.show_lateness(self.operator)
         self._show()
@@ -325,24 +287,13 @@ class SessionBridge(QObject):
             return view
         return replace(view, may_reconnect=True, reconnects=again.under_way, reconnection=again.line)
 
-    @_guarded
-    def _stop_force(self) -> None:
-        self.parts.servo.stop_force()  # before anything that could fail or wait for the disk
-        self._post(ForceStopped(self._now(), "operator"))
-
-    @_guarded
+    @guarded_session_slot
     def _event(self, event: Event) -> None:
         if isinstance(event, ForceStopped):
             self.parts.servo.stop_force()
         self._post(event)
 
-    @_guarded
-    def _resume(self) -> None:
-        self._post(ResumeAsked(self._now(), "operator"))
-        if self.strip is not None:
-            self.participant.come_forward()
-
-    @_guarded
+    @guarded_session_slot
     def _diagnose(self) -> None:
         """Zero force and a pause first: a device that is looked at must not push."""
         self.parts.servo.stop_force()
@@ -352,7 +303,7 @@ class SessionBridge(QObject):
         finally:
             self.diagnose_asked.emit()
 
-    @_guarded
+    @guarded_session_slot
     def _reconnect(self) -> None:
         """Connect the device again, beside the windows; the force stays off until the operator resumes."""
         if self.reconnection is not None and self.runner.state.lost_device:
@@ -365,67 +316,29 @@ class SessionBridge(QObject):
             self.reconnection.line = line
             self._show()
 
-    @_guarded
+    @guarded_session_slot
     def _reconnected(self, described: dict[str, Any]) -> None:
         if isinstance(self.failure, DeviceError | ServoFault):
             self.trouble, self.failure = "", None
         log.info("the device was connected again")
         self._post(Reconnected(self._now(), described))
 
-    @_guarded
+    @guarded_session_slot
     def _not_reconnected(self, error: Exception) -> None:
         log.warning("the device was not connected again: %s", error, exc_info=_trace_of(error))
         self._show()
 
-    @_guarded
-    def _pause(self) -> None:
-        self._post(PauseAsked(self._now(), "operator"))
-
-    @_guarded
-    def _repeat(self, reason: str) -> None:
-        self._post(RepeatAsked(self._now(), reason))
-
-    @_guarded
-    def _note(self, text: str) -> None:
-        self._post(Note(self._now(), "note", text))
-
-    @_guarded
-    def _mark(self) -> None:
-        self._post(Note(self._now(), "mark", ""))
-
-    @_guarded
-    def _exclude(self, trial: object, reason: str) -> None:
-        """Leave a trial or the session out; where that fails the session is none the worse, and the operator knows."""
-        if self.parts.exclude is None:
-            return
-        try:
-            self.parts.exclude(trial if isinstance(trial, int) else None, reason)
-        except StudyError as error:
-            self.operator.tell("It was not left out", f"{error}.")
-        else:
-            what = f"trial {trial}" if isinstance(trial, int) else "the session"
-            self._remember(f"left out of the analysis: {what}: {reason}")
-
-    def _remember(self, text: str) -> None:
-        """Note what was decided, while the journal is open."""
-        if not self.runner.finished:
-            self._post(Note(self._now(), "note", text))
-
-    @_guarded
-    def _end(self, status: str, reason: str) -> None:
-        self._post(EndAsked(self._now(), "withdrawn" if status == "withdrawn" else "aborted", reason))
-
-    @_guarded
+    @guarded_session_slot
     def _point(self, x_m: float, y_m: float, z_m: float) -> None:
         if self.parts.point_to is not None:
             self.parts.point_to(x_m, y_m, z_m)
 
-    @_guarded
+    @guarded_session_slot
     def _press(self, buttons: int) -> None:
         if self.parts.press is not None:
             self.parts.press(buttons)
 
-    @_guarded
+    @guarded_session_slot
     def _close(self) -> None:
         """Close the operator's window when all is over; else zero force and a question; asked again, leave."""
         if self.runner.finished:
@@ -450,8 +363,8 @@ class SessionBridge(QObject):
         self._frames.stop()
         self._urgency.rest()
         unsettle()
-        sys.excepthook = self._hook_before
-        threading.excepthook = self._thread_hook_before
+        self.uncaught.remove()
+        self._thread_exceptions.remove()
         self.participant.may_close = True
         self.participant.close()
         self.operator.may_close = True

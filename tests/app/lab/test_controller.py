@@ -109,7 +109,7 @@ def is_let_go(live: Any) -> bool:
 def test_entering_opens_and_feels_and_leaving_lets_go_of_everything(felt: LabVisit, prices: Prices, qtbot: Any) -> None:
     live = felt.live
     assert live is not None
-    assert sys.excepthook == felt._uncaught
+    assert sys.excepthook == felt.uncaught.hook
     qtbot.waitUntil(lambda: bool(prices.asked), timeout=SOON_MS)
     view = felt.view()
     assert (view.busy, view.trouble, view.force_on, view.path) == ("", "", True, "circle")
@@ -120,7 +120,7 @@ def test_entering_opens_and_feels_and_leaving_lets_go_of_everything(felt: LabVis
     assert is_let_go(live)
     assert felt.live is None
     assert prices.closed
-    assert sys.excepthook != felt._uncaught
+    assert sys.excepthook != felt.uncaught.hook
     assert not felt._frames.isActive()
 
 
@@ -227,12 +227,12 @@ def test_an_exception_in_a_slot_ends_in_zero_force_and_words(felt: LabVisit, qtb
 
 def test_an_exception_in_painting_ends_in_zero_force(felt: LabVisit, caplog: Any) -> None:
     live, seen = felt.live, []
-    felt._hook_before = lambda *told: seen.append(told)
+    felt.uncaught.previous = lambda *told: seen.append(told)
     sys.excepthook(RuntimeError, RuntimeError("in a paint event"), None)
     assert is_let_go(live)
     assert len(seen) == 1
     caplog.clear()
-    felt._hook_before = sys.__excepthook__
+    felt.uncaught.previous = sys.__excepthook__
 
 
 def test_a_painter_that_an_exception_leaves_at_work_is_ended(felt: LabVisit, qtbot: Any, caplog: Any) -> None:
@@ -242,7 +242,7 @@ def test_a_painter_that_an_exception_leaves_at_work_is_ended(felt: LabVisit, qtb
     window.show()
     qtbot.waitUntil(lambda: felt.live is not None, timeout=OPENS_MS)
     live, left, told = felt.live, [], []
-    felt._hook_before = lambda kind, error, trace: told.append((kind, error, trace))
+    felt.uncaught.previous = lambda kind, error, trace: told.append((kind, error, trace))
 
     def broken(painter: Any, _places: Any) -> None:
         left.append(weakref.ref(painter))
@@ -255,7 +255,7 @@ def test_a_painter_that_an_exception_leaves_at_work_is_ended(felt: LabVisit, qtb
     assert told[0][0] is RuntimeError
     assert [painter() for painter in left] == [None] * len(left)
     caplog.clear()
-    felt._hook_before = sys.__excepthook__
+    felt.uncaught.previous = sys.__excepthook__
     felt.place.setParent(None)
     window.close()
 

@@ -49,7 +49,7 @@ def test_what_breaks_again_and_again_is_written_once(bridge, world, caplog):
 def test_an_exception_in_painting_ends_in_zero_force_too(bridge, world, caplog, monkeypatch):
     begin_trial(bridge, world)
     heard = []
-    monkeypatch.setattr(bridge, "_hook_before", lambda *error: heard.append(error))
+    monkeypatch.setattr(bridge.uncaught, "previous", lambda *error: heard.append(error))
     error = ValueError("no such colour")
     sys.excepthook(ValueError, error, None)
     assert not world.force_is_on
@@ -165,7 +165,7 @@ def test_whatever_window_it_happens_in_a_failure_is_zero_force_and_told(
     whole = getattr(kind, method)
     monkeypatch.setattr(kind, method, broken, raising=False)
     bridge = make()
-    before, bridge._hook_before = bridge._hook_before, lambda *_error: None
+    before, bridge.uncaught.previous = bridge.uncaught.previous, lambda *_error: None
     begin_trial(bridge, world)
     QApplication.processEvents()
     assert world.force_is_on
@@ -177,7 +177,7 @@ def test_whatever_window_it_happens_in_a_failure_is_zero_force_and_told(
     assert BROKEN in bridge.operator.banner.what.text()
     assert BROKEN in caplog.text
     breaks_here.clear()
-    bridge._hook_before = before
+    bridge.uncaught.previous = before
     caplog.clear()
 
 
@@ -242,7 +242,7 @@ def test_a_painter_that_a_failure_leaves_at_work_is_ended(make, world, qtbot, mo
         raise ValueError(BROKEN)
 
     bridge = make()
-    before, bridge._hook_before = bridge._hook_before, lambda *_error: None
+    before, bridge.uncaught.previous = bridge.uncaught.previous, lambda *_error: None
     begin_trial(bridge, world)
     QApplication.processEvents()
     with monkeypatch.context() as patched:
@@ -251,7 +251,7 @@ def test_a_painter_that_a_failure_leaves_at_work_is_ended(make, world, qtbot, mo
         qtbot.waitUntil(lambda: not world.force_is_on)
     assert [painter() for painter in left] == [None] * len(left)
     assert left
-    bridge._hook_before = before
+    bridge.uncaught.previous = before
     caplog.clear()
 
 

@@ -81,7 +81,7 @@ def test_windows_answer_while_recordings_are_written_and_close_after_it(make, wo
     recorder = Slow()
     bridge = make(recorder=recorder)
     begin_trial(bridge, world)
-    bridge._end("withdrawn", "tired")
+    bridge.operator.end_asked.emit("withdrawn", "tired")
     bridge.runner.poll()
     assert isinstance(bridge.participant.page, EndPage)
     assert bridge.runner.ending

@@ -1,14 +1,19 @@
-"""Slots that let no exception out."""
+"""Decorators for slots: no exception leaves a slot."""
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 from functools import wraps
 from typing import Concatenate, ParamSpec, Protocol, TypeVar
 
+from study_app.errors import SessionError
+
+log = logging.getLogger(__name__)
+
 
 class Failing(Protocol):
-    """Whoever can end in zero force."""
+    """An object that handles a failure and ends in zero force."""
 
     def fail(self, error: BaseException) -> None: ...  # noqa: D102
 
@@ -28,3 +33,16 @@ def guarded(slot: Callable[Concatenate[F, P], None]) -> Callable[Concatenate[F, 
             self.fail(error)
 
     return run
+
+
+def guarded_session_slot(slot: Callable[Concatenate[F, P], None]) -> Callable[Concatenate[F, P], None]:
+    """As `guarded`, but drop an event that came too late (`SessionError`): it is no failure."""
+
+    @wraps(slot)
+    def run(self: F, /, *arguments: P.args, **named: P.kwargs) -> None:
+        try:
+            slot(self, *arguments, **named)
+        except SessionError as error:
+            log.info("dropped: %s", error)
+
+    return guarded(run)
