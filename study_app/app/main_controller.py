@@ -26,7 +26,8 @@ from study_app.workspace import Workspace, chosen_workspace, offered_workspace, 
 LOOK_AFTER_MS = 300  # the window stands by then
 
 if TYPE_CHECKING:
-    from study_app.app.lab.controller import First, LabVisit
+    from study_app.app.lab.controller import LabVisit
+    from study_app.app.lab.initial_settings import InitialSettings
     from study_app.app.results import ResultsDesk
     from study_app.gui.lab.view import LabPlace
     from study_app.gui.results.view import ResultsPlace
@@ -52,11 +53,12 @@ def home(results: Path | None = None) -> int:
     return visit.code
 
 
-def _first_of_lab() -> First:
-    """Load the lab's modules and what it begins with."""
-    from study_app.app.lab.controller import prepare  # noqa: PLC0415
+def _prepare_lab() -> InitialSettings:
+    """Load the lab's modules and its initial settings."""
+    import study_app.app.lab.controller  # noqa: F401, PLC0415 - loads pyqtgraph here, not in the window's thread
+    from study_app.app.lab.initial_settings import prepare_initial_settings  # noqa: PLC0415
 
-    return prepare()
+    return prepare_initial_settings()
 
 
 class Visit(QObject):
@@ -81,7 +83,7 @@ class Visit(QObject):
             theme=theme_named(self.machine.settings.theme),
             prepares={"lab": self._prepare_lab},
         )
-        self._lab_first: First | None = None
+        self._lab_first: InitialSettings | None = None
         self._preparing = Background(self)
         self._preparing.done.connect(self._lab_prepared)
         self.loop = QEventLoop()
@@ -170,10 +172,10 @@ class Visit(QObject):
     def _prepare_lab(self) -> bool:
         """Load the lab beside the windows, from when home stands; return whether that is done."""
         if self._lab_first is None and not self._preparing.busy:
-            self._preparing.run(_first_of_lab)
+            self._preparing.run(_prepare_lab)
         return self._lab_first is not None
 
-    def _lab_prepared(self, first: First) -> None:
+    def _lab_prepared(self, first: InitialSettings) -> None:
         self._lab_first = first
         self.window.prepared("lab")
 

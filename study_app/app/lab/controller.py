@@ -11,9 +11,8 @@ import math
 import random
 import traceback
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from PySide6.QtCore import QObject, Qt, QTimer
 
@@ -21,43 +20,26 @@ from study_app.app.exception_hooks import UncaughtExceptions
 from study_app.app.guarded_slots import guarded
 from study_app.app.lab.costs import AsksPrice, Prices
 from study_app.app.lab.device_opening import LabOpening
+from study_app.app.lab.initial_settings import InitialSettings, prepare_initial_settings
 from study_app.app.lab.preset_saving import LabSaving
-from study_app.app.lab_rows import cost_rows, device_choices, error_rows, title_of
+from study_app.app.lab.view_values import lab_view
 from study_app.errors import StudyError
 from study_app.evaluation.appraisal_worker import Appraiser
 from study_app.gui.lab.view import LabPlace
-from study_app.gui.participant.tank import caustics
 from study_app.lab.ab_comparison import Chance, Setting, Side, Workbench
-from study_app.lab.presets import Choice, liquids_at_hand, spoken
-from study_app.lab.programmed_paths import TITLES
-from study_app.viewmodels.lab import DeviceShown, LabView, Now
+from study_app.lab.presets import Choice, spoken
+from study_app.viewmodels.lab import LabView
 
 if TYPE_CHECKING:
     from study_app.lab.live import Live
 
 FRAME_MS: Final = 33
 APPRAISE_AFTER_MS: Final = 300
-FIRST_A: Final = Choice("rek2024", "water", "Water")
-FIRST_B: Final = Choice("rek2024", "light_oil", "Light oil")
 log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, slots=True)
-class First:
-    """What the lab begins with: both settings, and the liquids at hand."""
-
-    bench: Workbench
-    liquids: tuple[Choice, ...]
-
-
-def prepare() -> First:
-    """Read what the lab begins with and compute the tank's light, in whatever thread."""
-    caustics.brightness()
-    return First(Workbench(FIRST_A.setting(), FIRST_B.setting()), liquids_at_hand())
-
-
 def compose_lab(
-    place: LabPlace, *, device: str = "mouse", firmware: Path | None = None, first: First | None = None
+    place: LabPlace, *, device: str = "mouse", firmware: Path | None = None, first: InitialSettings | None = None
 ) -> LabVisit:
     """Give a lab's place its device, servo and prices: they come as it is entered and go as it is left.
 
@@ -87,10 +69,10 @@ class LabVisit(QObject):
         open_live: Callable[..., Live] | None = None,
         make_appraiser: Callable[[], AsksPrice] = Appraiser,
         chance: Chance | None = None,
-        first: First | None = None,
+        first: InitialSettings | None = None,
     ) -> None:
         super().__init__(place)
-        first = first if first is not None else prepare()
+        first = first if first is not None else prepare_initial_settings()
         self.place = place
         self.live: Live | None = None
         self.device = device
@@ -195,38 +177,18 @@ class LabVisit(QObject):
 
     def view(self) -> LabView:
         """Return what is to be seen now."""
-        live, bench, price = self.live, self.bench, self._prices
-        reading = None if live is None else live.reading()
-        fault = "" if reading is None else reading.fault
-        busy = self._opening.busy_with
-        scene = bench.in_hand.scene
-        shown: dict[str, Any] = {}
-        if live is not None:
-            half_x, half_y, half_z = live.device.workspace_m
-            shown["workspace_m"] = (2 * half_x, 2 * half_y, 2 * half_z)
-        if not bench.blind:  # the ball's size would tell one from the other
-            shown["body_radius_m"] = scene.body.diameter_m / 2 / scene.scale
-        return LabView(
-            workbench=bench,
+        return lab_view(
+            self.bench,
+            self.live,
+            self._prices,
             liquids=self.liquids,
-            device=DeviceShown(device_choices(), self.device, self._state(fault), live is not None and not fault),
-            paths=tuple(TITLES.items()),
-            path=None if live is None else live.path,
-            trace=None if live is None else live.trace(),
-            tail_a=None if live is None else live.tail("A"),
-            tail_b=None if live is None else live.tail("B"),
-            now=None if reading is None else Now(reading.position_m, reading.force_n, reading.wake_mps),
-            limiters=() if live is None else live.limiters(),
-            cost=() if price.costs is None else cost_rows(price.costs),
-            tick_ns=None if price.costs is None else price.costs.tick_ns,
-            errors=() if price.errors is None else error_rows(price.errors),
-            measuring=price.waits or self._price_due.isActive(),
-            force_on=reading is not None and reading.force_on,
-            busy="" if busy is None else self._said or f"Opening {title_of(busy)}",
-            trouble=self.trouble or fault,
+            device=self.device,
+            opening=self._opening.busy_with,
+            progress=self._said,
+            price_due=self._price_due.isActive(),
+            trouble=self.trouble,
             refused=self._refused,
             said=self._saving.said,
-            **shown,
         )
 
     @guarded
@@ -408,11 +370,6 @@ class LabVisit(QObject):
         live, self.live = self.live, None
         if live is not None:
             live.close()
-
-    def _state(self, fault: str) -> str:
-        if fault or self.trouble:
-            return "stopped"
-        return "opening" if self._opening.busy_with is not None else "ready" if self.live is not None else "closed"
 
     def _handle_uncaught(self, error: BaseException) -> bool:
         self.fail(error)
