@@ -15,7 +15,7 @@ pytest.importorskip("PySide6.QtWidgets", reason="Qt's system libraries are missi
 from PySide6.QtCore import QPoint
 from PySide6.QtWidgets import QApplication, QWidget
 
-from study_app.app.main_controller import Visit
+from study_app.app.main_controller import MainController
 from study_app.gui.home.study_cards import StudyCard
 from study_app.gui.operator.strip import Strip
 from study_app.gui.participant.pages.questionnaire import QuestionnaireWidget
@@ -80,7 +80,7 @@ def test_a_session_by_keys_and_clicks_from_the_home_window_into_the_csv(display,
 def begin_session(program: Program, qtbot) -> None:
     """Click "New session" of the first study and fill in the dialog by keys."""
     home = program.window("^Liquid Study$")
-    plan = Visit(Path("results")).window
+    plan = MainController(Path("results")).window
     qtbot.addWidget(plan)
     plan.resize(*program.size(home))
     plan.show()

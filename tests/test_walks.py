@@ -16,7 +16,7 @@ pytest.importorskip("PySide6.QtWidgets", reason="Qt's system libraries are missi
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QWidget
 
-from study_app.app.main_controller import Visit
+from study_app.app.main_controller import MainController
 from study_app.gui.home.main_window import FULL as HOME
 from study_app.gui.home.new_session_dialog import NewSessionDialog
 from study_app.gui.home.study_cards import StudyCard
@@ -54,10 +54,10 @@ def program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Visitor
 
 
 @pytest.fixture
-def plan(program: Visitor, qtbot: Any) -> Visit:
+def plan(program: Visitor, qtbot: Any) -> MainController:
     """The same visit off screen, to look up where its parts lie."""
     home_window(program)
-    made = Visit()
+    made = MainController()
     qtbot.addWidget(made.window)
     laid_out(made.window, (HOME.width(), HOME.height()))
     return made
@@ -71,19 +71,19 @@ def preflight_window(program: Visitor) -> str:
     return program.window_of("^Liquid Study$", PREFLIGHT)
 
 
-def thesis(plan: Visit) -> StudyCard:
+def thesis(plan: MainController) -> StudyCard:
     cards = plan.window.findChildren(StudyCard)
     return next(card for card in cards if card.facts.protocol.study.name == "rek2024")
 
 
-def rail_places(plan: Visit) -> dict[str, QPoint]:
+def rail_places(plan: MainController) -> dict[str, QPoint]:
     """Return where the rail's buttons lie, and as "theme" its switch."""
     laid_out(plan.window, (HOME.width(), HOME.height()))
     rail = plan.window.rail
     return {name: place_in(plan.window, button) for name, button in (*rail.buttons.items(), ("theme", rail.switch))}
 
 
-def dialog_of(plan: Visit, size: tuple[int, int]) -> NewSessionDialog:
+def dialog_of(plan: MainController, size: tuple[int, int]) -> NewSessionDialog:
     place = plan.window.place("home")
     assert isinstance(place, HomePlace)
     thesis(plan).new.click()
@@ -273,7 +273,7 @@ def check_left(program: Visitor) -> None:
     assert json.loads(settings_file().read_text(encoding="utf-8"))["theme"] == "dark"
 
 
-def test_the_whole_study_by_keys_alone_from_home_to_home(program: Visitor, plan: Visit, qtbot: Any) -> None:
+def test_the_whole_study_by_keys_alone_from_home_to_home(program: Visitor, plan: MainController, qtbot: Any) -> None:
     person = ByKeyboard(program)
     pointer = program.xdotool("getmouselocation")
     home, main = home_window(program), plan.window
@@ -304,7 +304,7 @@ def test_the_whole_study_by_keys_alone_from_home_to_home(program: Visitor, plan:
     check_left(program)
 
 
-def see_results_and_dark_theme_by_keys(program: Visitor, person: ByKeyboard, plan: Visit) -> None:
+def see_results_and_dark_theme_by_keys(program: Visitor, person: ByKeyboard, plan: MainController) -> None:
     main, rail = plan.window, plan.window.rail
     laid_out(main, (HOME.width(), HOME.height()))
     thesis(plan).new.setFocus()  # where the dialog was opened
@@ -320,7 +320,9 @@ def see_results_and_dark_theme_by_keys(program: Visitor, person: ByKeyboard, pla
     wait_for(lambda: changed(program, home), "the dark theme")
 
 
-def test_the_whole_study_by_the_mouse_alone_from_home_to_home(program: Visitor, plan: Visit, qtbot: Any) -> None:
+def test_the_whole_study_by_the_mouse_alone_from_home_to_home(
+    program: Visitor, plan: MainController, qtbot: Any
+) -> None:
     person = ByMouse(program, qtbot)
     home, wide = home_window(program), rail_places(plan)
     plan.window.rail.narrow(True)

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from study_app import workspace as workspaces
-from study_app.app.main_controller import Visit
+from study_app.app.main_controller import MainController
 from study_app.app.session.entry import run
 from study_app.cli.options import keep_offered_workspace
 from study_app.errors import StoreError
@@ -69,7 +69,7 @@ def test_windows_show_the_same_sessions_and_suggest_the_same_id_from_two_start_f
         if name == "first":
             for participant in ("P001", "P002"):
                 begin_session(kept.results / "demo", participant)
-        visit = Visit()
+        visit = MainController()
         qtbot.addWidget(visit.window)
         home = visit.window.place("home")
         home.show_sessions()
@@ -98,7 +98,7 @@ def begin_session(folder: Path, participant: str) -> None:
 
 def test_the_first_start_asks_once_and_creates_nothing_before_the_answer(documents, tmp_path, monkeypatch, qtbot):
     start_folder(tmp_path / "start", monkeypatch)
-    visit = Visit()
+    visit = MainController()
     qtbot.addWidget(visit.window)
     visit.open()
     assert visit.question.path.text() == str(documents / "Liquid Study")
@@ -112,7 +112,7 @@ def test_the_first_start_asks_once_and_creates_nothing_before_the_answer(documen
     assert visit.results == tmp_path / "mine" / "results"
     visit.window.close()
     visit.end()
-    again = Visit()
+    again = MainController()
     qtbot.addWidget(again.window)
     again.open()
     assert again.question is None
@@ -181,7 +181,7 @@ def test_a_protocol_file_of_a_command_is_among_the_recent_ones_and_its_results_i
     start_folder(tmp_path / "start", monkeypatch)
     keep_workspace(Workspace(tmp_path / "kept"))
     held = []
-    monkeypatch.setattr("study_app.app.session.entry.hold", lambda chosen, _tell: held.append(chosen) or 0)
+    monkeypatch.setattr("study_app.app.session.entry.run_session", lambda chosen, _tell: held.append(chosen) or 0)
     Path("mine.toml").write_bytes(source_bytes("demo"))
     assert run("mine.toml", participant="P001") == 0
     assert held[0].results == tmp_path / "kept" / "results" / "demo"

@@ -20,7 +20,7 @@ from study_app.errors import StudyError
 PATIENCE_S: Final = 2.0
 
 
-class Analyst:
+class AnalysisClient:
     """Gives orders to a process of its own; never waits for it.
 
     A new order stops the one before at its next step, unless that one writes.

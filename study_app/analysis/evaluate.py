@@ -11,7 +11,7 @@ from study_app.analysis.designs.delays import delays_found
 from study_app.analysis.designs.liquids import liquids_found
 from study_app.analysis.findings.block_results import BlockFound, Results
 from study_app.analysis.findings.conduct import delivered, orders
-from study_app.analysis.findings.not_tested import Waiting
+from study_app.analysis.findings.not_tested import NotTested
 from study_app.analysis.findings.section_failures import Ended, Failure, Failures
 from study_app.analysis.tables.compared_blocks import Block
 from study_app.analysis.tables.performance import Performance, performance
@@ -103,7 +103,7 @@ def _without_tests(block: Block, failure: Failure) -> BlockFound:
         items=block.items,
         labels=block.labels,
         measures=(),
-        absent=(Waiting(failure.what, failure.why),),
+        absent=(NotTested(failure.what, failure.why),),
     )
 
 

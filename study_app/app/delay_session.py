@@ -20,7 +20,7 @@ from study_app.app.session.bridge import SessionBridge
 from study_app.app.session.garbage_collection import collecting_here
 from study_app.app.session.termination import ended_from_outside
 from study_app.app.session.windows import open_windows
-from study_app.devices.rig import open_machine
+from study_app.devices.rig import open_rig
 from study_app.errors import SessionError, StudyError
 from study_app.gui.application import application_here
 from study_app.gui.display.opengl import WITHOUT_OPENGL
@@ -160,7 +160,7 @@ class _Showing:
 
     def hold(self) -> tuple[Shown, ...]:
         """Hold the session and return what was shown in it."""
-        machine = open_machine(self._chosen.device, self._protocol, random=self._chosen.tremor())
+        machine = open_rig(self._chosen.device, self._protocol, random=self._chosen.tremor())
         schedule = build_schedule(self._protocol, self._chosen.participant, self._chosen.seed)
         try:
             with open_store(self._chosen, self._protocol, self._source, machine, {}) as store:

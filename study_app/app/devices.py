@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtWidgets import QApplication, QWidget
 
-from study_app.app.workstation import MachineDesk
+from study_app.app.workstation import WorkstationController
 from study_app.devices.backends import Backend, backends
 from study_app.devices.registry import kind_of
 from study_app.gui.devices.diagnosis_dialog import DiagnosisDialog
@@ -24,7 +24,7 @@ HELD = (
 )
 
 
-class DevicesDesk(QObject):
+class DevicesController(QObject):
     """Looks at the machine when it is asked, one look at a time, and shows what was found.
 
     ``looked`` comes with what was found of every device; ``troubled(title, sentence)`` where one could not look.
@@ -41,7 +41,7 @@ class DevicesDesk(QObject):
     troubled = Signal(str, str)
     _done = Signal(object)
 
-    def __init__(self, desk: MachineDesk, look: Callable[[], Sequence[Backend]] = backends) -> None:
+    def __init__(self, desk: WorkstationController, look: Callable[[], Sequence[Backend]] = backends) -> None:
         super().__init__()
         self._desk, self._look = desk, look
         self._thread: threading.Thread | None = None

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QEventLoop, QObject, QTimer
 
-from study_app.app.devices import DevicesDesk
+from study_app.app.devices import DevicesController
 from study_app.app.session.garbage_collection import collecting_here
 from study_app.app.session.live_session import BUG, LiveSession
 from study_app.app.session.termination import ended_from_outside
-from study_app.app.workstation import MachineDesk, theme_named
+from study_app.app.workstation import WorkstationController, theme_named
 from study_app.errors import StoreError
 from study_app.gui.application import application_here
 from study_app.gui.display.screens import place
@@ -26,9 +26,9 @@ from study_app.workspace import Workspace, chosen_workspace, offered_workspace, 
 LOOK_AFTER_MS = 300  # the window stands by then
 
 if TYPE_CHECKING:
-    from study_app.app.lab.controller import LabVisit
+    from study_app.app.lab.controller import LabController
     from study_app.app.lab.initial_settings import InitialSettings
-    from study_app.app.results import ResultsDesk
+    from study_app.app.results import ResultsController
     from study_app.gui.lab.view import LabPlace
     from study_app.gui.results.view import ResultsPlace
 
@@ -44,7 +44,7 @@ def home(results: Path | None = None) -> int:
         A window cannot be opened here.
     """
     application = application_here()
-    visit = Visit(results)
+    visit = MainController(results)
     with collecting_here(), ended_from_outside(visit.end_by_signal):
         visit.open()
         visit.loop.exec()
@@ -61,13 +61,13 @@ def _prepare_lab() -> InitialSettings:
     return prepare_initial_settings()
 
 
-class Visit(QObject):
+class MainController(QObject):
     """The home window's stay: one session at a time, and home again after it."""
 
     def __init__(self, results: Path | None = None) -> None:
         super().__init__()
-        self.machine = MachineDesk()
-        self.devices = DevicesDesk(self.machine)
+        self.machine = WorkstationController()
+        self.devices = DevicesController(self.machine)
         self._home_place: HomePlace | None = None
         self._follows_machine = results is None
         self.results = results if results is not None else workspace().results
@@ -90,8 +90,8 @@ class Visit(QObject):
         self.code = 0
         self.live: LiveSession | None = None
         self._called_off: list[LiveSession] = []
-        self.desk: ResultsDesk | None = None
-        self.lab: LabVisit | None = None
+        self.desk: ResultsController | None = None
+        self.lab: LabController | None = None
         self.window.closed.connect(self._leave)
         self.window.theme_changed.connect(lambda theme: self.machine.change({"theme": theme.name}))
         self.machine.changed.connect(self._machine_changed)
@@ -164,9 +164,9 @@ class Visit(QObject):
         self.window.go("results")
 
     def _results(self) -> ResultsPlace:
-        from study_app.app.results import ResultsDesk  # noqa: PLC0415 - only once it is needed
+        from study_app.app.results import ResultsController  # noqa: PLC0415 - only once it is needed
 
-        self.desk = ResultsDesk(self.results)
+        self.desk = ResultsController(self.results)
         return self.desk.place
 
     def _prepare_lab(self) -> bool:

@@ -15,7 +15,7 @@ from typing import Any, Final, TypeAlias
 
 from PySide6.QtCore import QObject, QTimer
 
-from study_app.analysis.analyst import Analyst
+from study_app.analysis.analyst import AnalysisClient
 from study_app.analysis.worker_messages import (
     Answer,
     Done,
@@ -57,7 +57,7 @@ REFUSALS: Final = {
 }
 
 
-class ResultsDesk(QObject):
+class ResultsController(QObject):
     """Gives the place of results what it shows, and carries out what is asked for there.
 
     Parameters
@@ -75,7 +75,7 @@ class ResultsDesk(QObject):
         results: Path,
         *,
         opener: Callable[[Path], object] = open_here,
-        analyst: Callable[[], Analyst] = Analyst,
+        analyst: Callable[[], AnalysisClient] = AnalysisClient,
     ) -> None:
         super().__init__()
         self._analyst = analyst
@@ -84,8 +84,8 @@ class ResultsDesk(QObject):
         self.place = ResultsPlace(handed_to=results.resolve().parent, no_sav=no_sav)
         self.view = ResultsView()
         self._opener = opener
-        self._reader: Analyst | None = None
-        self._writer: Analyst | None = None
+        self._reader: AnalysisClient | None = None
+        self._writer: AnalysisClient | None = None
         self._orders: dict[int, Order] = {}
         self._since_s = 0.0
         self._going: Going | None = None

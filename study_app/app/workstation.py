@@ -74,7 +74,7 @@ def described(settings: MachineSettings, participant: QScreen, operator: QScreen
     }
 
 
-class MachineDesk(QObject):
+class WorkstationController(QObject):
     """Holds the settings, keeps them at once, and takes the last change back.
 
     ``changed`` comes when something else is set; ``troubled(title, sentence)`` where they cannot be read or kept.

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Machine:
+class Rig:
     """Device and servo, running at rest."""
 
     device: Device
@@ -54,7 +54,7 @@ class Machine:
             self.device.close()
 
 
-def open_machine(
+def open_rig(
     name: str,
     study: Protocol,
     *,
@@ -62,7 +62,7 @@ def open_machine(
     firmware: Path | None = None,
     tell: Callable[[str], object] | None = None,
     cancelled: Callable[[], bool] | None = None,
-) -> Machine:
+) -> Rig:
     """Open the device and start the servo at rest; compiling takes a minute the first time.
 
     ``random`` draws the tremor of a device that moves by itself; ``firmware`` is the file of a Falcon's program.
@@ -85,4 +85,4 @@ def open_machine(
     except BaseException:
         device.close()
         raise
-    return Machine(device, servo)
+    return Rig(device, servo)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from study_app.devices.registry import is_falcon, is_simulated, kind_of
-from study_app.devices.rig import Machine
+from study_app.devices.rig import Rig
 from study_app.errors import DeviceError, SessionError
 from study_app.protocol.model import Protocol
 from study_app.session.preflight import Facts, Screen
@@ -28,7 +28,7 @@ MEASURED_S = 2.0  # so long the servo is looked at before a session
 class Ready:
     """Device and servo at rest, and what was measured of them."""
 
-    machine: Machine
+    machine: Rig
     facts: Facts
 
     def facts_with(self, refresh_hz: float, scaling: float) -> Facts:
@@ -54,7 +54,7 @@ def check(chosen: NewSession, study: Protocol) -> None:
     check_unused(folder, chosen.participant, chosen.session)
 
 
-def measured(machine: Machine, chosen: NewSession, *, sleep: Callable[[float], object] = time.sleep) -> Facts:
+def measured(machine: Rig, chosen: NewSession, *, sleep: Callable[[float], object] = time.sleep) -> Facts:
     """Return what the pre-flight judges, but for the screen; a ``sleep`` that does not wait cuts it short."""
     from study_app.session.preflight_measurements import measure  # noqa: PLC0415 - the compiler: only once it is needed
 
@@ -71,7 +71,7 @@ def measured(machine: Machine, chosen: NewSession, *, sleep: Callable[[float], o
 
 
 def open_store(
-    chosen: NewSession, protocol: Protocol, source: bytes, machine: Machine, screens: dict[str, Any]
+    chosen: NewSession, protocol: Protocol, source: bytes, machine: Rig, screens: dict[str, Any]
 ) -> SessionStore:
     """Claim a new session on the disk, or open the one that goes on."""
     if chosen.resumes is not None:

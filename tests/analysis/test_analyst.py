@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from study_app.analysis import style
-from study_app.analysis.analyst import Analyst
+from study_app.analysis.analyst import AnalysisClient
 from study_app.analysis.export.export import export
 from study_app.analysis.figures import captions
 from study_app.analysis.tables.study import load_study
@@ -178,7 +178,7 @@ def test_what_is_stopped_writes_nothing(study: Path, tmp_path: Path, kind: type,
     assert not (tmp_path / "to").exists()
 
 
-def last_of(analyst: Analyst, number: int) -> Answer:
+def last_of(analyst: AnalysisClient, number: int) -> Answer:
     end_s = time.monotonic() + SOON_S
     while time.monotonic() < end_s:
         for of_number, answer in analyst.answers():
@@ -189,7 +189,7 @@ def last_of(analyst: Analyst, number: int) -> Answer:
 
 
 def test_the_process_answers_stops_and_is_gone_when_closed(study: Path, tmp_path: Path) -> None:
-    analyst = Analyst()
+    analyst = AnalysisClient()
     try:
         assert last_of(analyst, analyst.order(FindStudies(study.parent))) == Done()
         refused = last_of(analyst, analyst.order(ReadStudy(tmp_path / "none")))
@@ -210,7 +210,7 @@ def test_the_process_answers_stops_and_is_gone_when_closed(study: Path, tmp_path
 
 
 def test_orders_to_a_process_that_is_gone_are_lost_without_a_fault(tmp_path: Path) -> None:
-    analyst = Analyst()
+    analyst = AnalysisClient()
     analyst._process.kill()
     analyst._process.join()
     analyst.order(FindStudies(tmp_path))

@@ -10,7 +10,7 @@ import pytest
 from PySide6.QtCore import QEvent
 from PySide6.QtWidgets import QApplication
 
-from study_app.app.main_controller import Visit
+from study_app.app.main_controller import MainController
 from study_app.app.session import live_session
 from study_app.errors import DeviceLost, DeviceNotFound
 from study_app.gui.home.main_window import FULL, LEAST
@@ -35,7 +35,7 @@ class Machine:
 
 @pytest.fixture
 def visit(qapp: Any, tmp_path: Path) -> Any:
-    made = Visit(tmp_path / "results")
+    made = MainController(tmp_path / "results")
     made.window.show()
     yield made
     made.window.close()
@@ -45,7 +45,9 @@ def visit(qapp: Any, tmp_path: Path) -> Any:
 
 
 @pytest.mark.parametrize("how", ["back", "signal"])
-def test_a_device_that_opens_after_all_is_let_go_of_before_the_end(visit: Visit, monkeypatch: Any, how: str) -> None:
+def test_a_device_that_opens_after_all_is_let_go_of_before_the_end(
+    visit: MainController, monkeypatch: Any, how: str
+) -> None:
     machine, opening, may_open = Machine(), threading.Event(), threading.Event()
 
     def open_slowly(*_words: Any, **_named: Any) -> Machine:
@@ -53,7 +55,7 @@ def test_a_device_that_opens_after_all_is_let_go_of_before_the_end(visit: Visit,
         may_open.wait(10)
         return machine
 
-    monkeypatch.setattr(live_session, "open_machine", open_slowly)
+    monkeypatch.setattr(live_session, "open_rig", open_slowly)
     monkeypatch.setattr(live_session, "measured", lambda *_words, **_named: None)
     visit._start(CHOSEN)
     assert opening.wait(10)
@@ -70,7 +72,7 @@ def test_a_device_that_opens_after_all_is_let_go_of_before_the_end(visit: Visit,
     assert machine.stopped
 
 
-def test_one_session_at_a_time(visit: Visit, monkeypatch: Any) -> None:
+def test_one_session_at_a_time(visit: MainController, monkeypatch: Any) -> None:
     monkeypatch.setattr(live_session.LiveSession, "open", lambda _self: None)
     visit._start(CHOSEN)
     first = visit.live
@@ -79,18 +81,20 @@ def test_one_session_at_a_time(visit: Visit, monkeypatch: Any) -> None:
     visit.live = None
 
 
-def test_a_session_that_was_not_begun_is_told_so(visit: Visit, monkeypatch: Any, qtbot: Any) -> None:
+def test_a_session_that_was_not_begun_is_told_so(visit: MainController, monkeypatch: Any, qtbot: Any) -> None:
     def refuse(*_words: Any, **_named: Any) -> Machine:
         raise DeviceNotFound("no Falcon is connected: plug it in")
 
-    monkeypatch.setattr(live_session, "open_machine", refuse)
+    monkeypatch.setattr(live_session, "open_rig", refuse)
     visit._start(CHOSEN)
     qtbot.waitUntil(lambda: visit.window.notice is not None)
     assert visit.window.notice is not None
     assert visit.window.notice.windowTitle() == "The session was not begun"
 
 
-def test_a_mistake_before_the_first_window_leads_home_again(visit: Visit, monkeypatch: Any, capsys: Any) -> None:
+def test_a_mistake_before_the_first_window_leads_home_again(
+    visit: MainController, monkeypatch: Any, capsys: Any
+) -> None:
     def broken(*_given: Any, **_named: Any) -> None:
         raise TypeError("nobody is there")
 
@@ -103,7 +107,9 @@ def test_a_mistake_before_the_first_window_leads_home_again(visit: Visit, monkey
     assert "nobody is there" in capsys.readouterr().err
 
 
-def test_a_device_that_is_gone_at_the_end_does_not_keep_the_window_away(visit: Visit, monkeypatch: Any) -> None:
+def test_a_device_that_is_gone_at_the_end_does_not_keep_the_window_away(
+    visit: MainController, monkeypatch: Any
+) -> None:
     machine = Machine(lost=True)
     monkeypatch.setattr(live_session.LiveSession, "open", lambda _self: None)
     visit._start(CHOSEN)
@@ -116,7 +122,7 @@ def test_a_device_that_is_gone_at_the_end_does_not_keep_the_window_away(visit: V
     assert visit.window.notice is not None
 
 
-def test_a_theme_that_was_changed_in_the_cockpit_stays(visit: Visit, monkeypatch: Any) -> None:
+def test_a_theme_that_was_changed_in_the_cockpit_stays(visit: MainController, monkeypatch: Any) -> None:
     monkeypatch.setattr(live_session.LiveSession, "open", lambda _self: None)
     visit._start(CHOSEN)
     assert visit.live is not None
@@ -126,7 +132,7 @@ def test_a_theme_that_was_changed_in_the_cockpit_stays(visit: Visit, monkeypatch
     assert visit.machine.settings.theme == "dark"
 
 
-def test_the_window_is_no_larger_than_its_screen(visit: Visit) -> None:
+def test_the_window_is_no_larger_than_its_screen(visit: MainController) -> None:
     room = visit.window.screen().availableGeometry().size()
     assert FULL.height() > room.height()  # else this shows nothing
     visit.open()

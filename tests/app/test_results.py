@@ -12,10 +12,10 @@ import pytest
 from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
-from study_app.analysis.analyst import Analyst
+from study_app.analysis.analyst import AnalysisClient
 from study_app.analysis.worker import carry_out
 from study_app.analysis.worker_messages import Answer, Order, Refused
-from study_app.app.results import ResultsDesk
+from study_app.app.results import ResultsController
 from study_app.errors import StudyError
 from study_app.gui.home.main_window import MainWindow
 from study_app.gui.widgets.controls import ActionButton
@@ -66,7 +66,7 @@ class Opened:
     def __init__(self, qtbot: QtBot, results: Path, analyst: Callable[[], Any] = Here) -> None:
         self.qtbot = qtbot
         self.files: list[Path] = []
-        self.desk = ResultsDesk(results, opener=self.files.append, analyst=analyst)
+        self.desk = ResultsController(results, opener=self.files.append, analyst=analyst)
         self.place = self.desk.place
         self.window = MainWindow({"home": Place, "results": lambda: self.place})
         qtbot.addWidget(self.window)
@@ -315,7 +315,7 @@ def nobody_left() -> bool:
 def test_a_report_by_processes_of_its_own_is_cancelled_then_written_and_none_is_left(
     qtbot: QtBot, results: Path, tmp_path: Path
 ) -> None:
-    opened = Opened(qtbot, results, Analyst)
+    opened = Opened(qtbot, results, AnalysisClient)
     assert opened.titles == ["Agreement for each setting", "Answers by delay setting"]
     assert not nobody_left()
     opened.click(opened.place.report)
@@ -339,7 +339,7 @@ def test_a_report_by_processes_of_its_own_is_cancelled_then_written_and_none_is_
 
 
 def test_a_process_that_ends_by_itself_is_told_and_begun_again(qtbot: QtBot, results: Path) -> None:
-    opened = Opened(qtbot, results, Analyst)
+    opened = Opened(qtbot, results, AnalysisClient)
     reader: Any = opened.desk._reader
     opened.desk.look()
     reader._process.kill()

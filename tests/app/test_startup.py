@@ -13,7 +13,7 @@ HOME = """
 import sys
 from pathlib import Path
 from PySide6.QtWidgets import QApplication
-from study_app.app.main_controller import Visit
+from study_app.app.main_controller import MainController
 from study_app.gui.application import application_here
 
 application = application_here()

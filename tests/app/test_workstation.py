@@ -13,10 +13,10 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QApplication, QMainWindow
 
-from study_app.app.devices import DevicesDesk
-from study_app.app.main_controller import Visit
+from study_app.app.devices import DevicesController
+from study_app.app.main_controller import MainController
 from study_app.app.session.live_session import LiveSession
-from study_app.app.workstation import MachineDesk, described, settings_here, text_scale_on
+from study_app.app.workstation import WorkstationController, described, settings_here, text_scale_on
 from study_app.devices.backends import NONE, READY, Backend
 from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.gui.widgets.dialogs import Notice
@@ -31,7 +31,7 @@ FALCON = Backend("falcon", "libusb 1.0", NONE, "felt, up to 8 N", "plug its cabl
 
 @pytest.fixture
 def desk(qapp):
-    return MachineDesk()
+    return WorkstationController()
 
 
 def test_what_is_set_is_kept_at_once_and_taken_back(desk, qtbot):
@@ -115,7 +115,7 @@ def test_devices_are_looked_for_beside_the_windows_one_look_at_a_time(desk, qtbo
         looks.append(1)
         return [MOUSE, FALCON]
 
-    devices = DevicesDesk(desk, look)
+    devices = DevicesController(desk, look)
     place = devices.make_place()
     qtbot.addWidget(place)
     place.enter()
@@ -137,7 +137,7 @@ def test_a_look_that_fails_is_told(desk, qtbot):
     def look():
         raise OSError("no bus")
 
-    devices = DevicesDesk(desk, look)
+    devices = DevicesController(desk, look)
     with qtbot.waitSignal(devices.troubled) as told:
         devices.look()
     assert "no bus" in told.args[1]
@@ -147,7 +147,7 @@ def test_a_look_that_fails_is_told(desk, qtbot):
 @pytest.fixture
 def visit(qtbot, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    made = Visit()
+    made = MainController()
     qtbot.addWidget(made.window)
     yield made
     made.end()
@@ -172,12 +172,12 @@ def test_the_main_window_follows_what_is_set(visit, qtbot, tmp_path, monkeypatch
 def test_a_folder_asked_for_by_command_counts_for_this_stay(qtbot, tmp_path, monkeypatch):
     monkeypatch.delenv("LIQUID_STUDY_WORKSPACE")
     save(MachineSettings(workspace=str(tmp_path / "set")))
-    asked = Visit(tmp_path / "asked")
+    asked = MainController(tmp_path / "asked")
     qtbot.addWidget(asked.window)
     assert asked.results == tmp_path / "asked"
     asked.machine.change({"workspace": str(tmp_path / "other")})
     assert asked.results == tmp_path / "asked"
-    following = Visit()
+    following = MainController()
     qtbot.addWidget(following.window)
     assert following.results == tmp_path / "other" / "results"
 
@@ -194,7 +194,7 @@ def test_the_display_test_is_one_click_from_home(visit, qtbot):
 
 def test_a_damaged_file_is_told_when_the_window_opens(qtbot, tmp_path, monkeypatch):
     monkeypatch.setattr(workstation, "load_or_default", lambda: (DEFAULTS, "the file is no JSON"))
-    made = Visit(tmp_path)
+    made = MainController(tmp_path)
     qtbot.addWidget(made.window)
     made.devices._look = lambda: [MOUSE]
     with qtbot.waitSignal(made.devices.looked):
@@ -283,7 +283,7 @@ def test_what_is_found_after_the_end_is_not_shown(qtbot, desk):
         looked.wait(10)
         return ()
 
-    devices = DevicesDesk(desk, look)
+    devices = DevicesController(desk, look)
     found = []
     devices.looked.connect(found.append)
     devices.look()
@@ -296,7 +296,7 @@ def test_what_is_found_after_the_end_is_not_shown(qtbot, desk):
 
 
 def test_initials_are_remembered_and_survive_a_change_taken_back(qapp):
-    desk = MachineDesk()
+    desk = WorkstationController()
     desk.change({"sound": True})
     desk.remember_operator("AK")
     desk.remember_operator("")

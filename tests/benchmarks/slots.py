@@ -14,7 +14,7 @@ from pathlib import Path
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
-from study_app.app.main_controller import Visit
+from study_app.app.main_controller import MainController
 from study_app.gui.application import application_here
 from study_app.gui.home.new_session_dialog import NewSessionDialog
 from study_app.protocol.load import load, source_bytes
@@ -54,7 +54,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as kept:
         results = Path(kept) / "results"
         hold(results / "demo", SESSIONS)
-        visit = Visit(results)
+        visit = MainController(results)
         rows = {"first seconds of the window": worst(visit.open, STANDS_S)}
         home = visit.window.place("home")
         rows[f"home, {SESSIONS} sessions read again"] = worst(home.enter, 3.0)

@@ -13,7 +13,7 @@ from PySide6.QtTest import QTest
 
 from study_app import app
 from study_app.app.session import live_session
-from study_app.devices.rig import Machine
+from study_app.devices.rig import Rig
 from study_app.errors import StudyError
 from study_app.gui.operator import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow
@@ -31,14 +31,12 @@ pytestmark = [needs_servo, pytest.mark.usefixtures("qapp")]
 
 
 @pytest.fixture(autouse=True)
-def machines(monkeypatch: pytest.MonkeyPatch) -> list[Machine]:
+def machines(monkeypatch: pytest.MonkeyPatch) -> list[Rig]:
     """Return the machines that are opened; the pre-flight takes a tenth of a second."""
     monkeypatch.setattr(start, "MEASURED_S", 0.1)
-    opened: list[Machine] = []
-    open_machine = live_session.open_machine
-    monkeypatch.setattr(
-        live_session, "open_machine", lambda *a, **k: opened.append(open_machine(*a, **k)) or opened[-1]
-    )
+    opened: list[Rig] = []
+    open_rig = live_session.open_rig
+    monkeypatch.setattr(live_session, "open_rig", lambda *a, **k: opened.append(open_rig(*a, **k)) or opened[-1])
     return opened
 
 
@@ -62,7 +60,7 @@ def in_tank(participant: ParticipantWindow) -> bool:
     return isinstance(participant.page, TaskPage)
 
 
-def test_the_participants_window_that_is_closed_is_a_pause(tmp_path: Path, machines: list[Machine]) -> None:
+def test_the_participants_window_that_is_closed_is_a_pause(tmp_path: Path, machines: list[Rig]) -> None:
     done: list[str] = []
 
     def watch(participant: ParticipantWindow, operator: OperatorWindow) -> bool:
@@ -103,7 +101,7 @@ def test_escape_again_and_again_loses_nothing(tmp_path: Path) -> None:
 
 
 def test_the_operators_window_that_is_closed_twice_leaves_the_session_unfinished(
-    tmp_path: Path, machines: list[Machine]
+    tmp_path: Path, machines: list[Rig]
 ) -> None:
     forces: list[bool] = []
 
@@ -120,7 +118,7 @@ def test_the_operators_window_that_is_closed_twice_leaves_the_session_unfinished
 
 
 def test_a_request_to_terminate_in_a_trial_interrupts_it_and_can_be_resumed(
-    tmp_path: Path, machines: list[Machine]
+    tmp_path: Path, machines: list[Rig]
 ) -> None:
     def watch(participant: ParticipantWindow, _operator: OperatorWindow) -> bool:
         if in_tank(participant):
@@ -138,7 +136,7 @@ def test_a_request_to_terminate_in_a_trial_interrupts_it_and_can_be_resumed(
 
 
 def test_a_device_that_vanishes_is_a_calm_page_a_reason_and_a_broken_session(
-    tmp_path: Path, machines: list[Machine]
+    tmp_path: Path, machines: list[Rig]
 ) -> None:
     seen: list[tuple[str, str]] = []
 

@@ -12,7 +12,7 @@ import pandas as pd
 from study_app.analysis.designs.verdicts import FDR, alone, in_family, judged
 from study_app.analysis.findings.block_results import BlockFound
 from study_app.analysis.findings.item_test import Tested
-from study_app.analysis.findings.not_tested import Waiting
+from study_app.analysis.findings.not_tested import NotTested
 from study_app.analysis.findings.section_failures import Failure, Failures
 from study_app.analysis.statistics.friedman import DRAWN_UP_TO, friedman
 from study_app.analysis.statistics.global_permutation import global_permutation
@@ -76,10 +76,10 @@ class Asked:
         """How many settings there are; conditions of one delay are one."""
         return len(set(self.block.columns.values()))
 
-    def attempt(self, what: str, compute: Callable[[], T], empty: U) -> tuple[T | U, tuple[Waiting, ...]]:
+    def attempt(self, what: str, compute: Callable[[], T], empty: U) -> tuple[T | U, tuple[NotTested, ...]]:
         """Return what ``compute`` finds; where it fails ``empty``, and that ``what`` is not there and why."""
         found = self.failures.attempt(what, compute, block=self.block.id)
-        return (empty, (Waiting(what, found.why),)) if isinstance(found, Failure) else (found, ())
+        return (empty, (NotTested(what, found.why),)) if isinstance(found, Failure) else (found, ())
 
     @property
     def intervals(self) -> int | None:
@@ -203,7 +203,7 @@ def _replicated(block: Block) -> tuple[float, ...]:
     return tuple(delay for place, delay in enumerate(block.delays_ms) if columns.count(place) > 1)
 
 
-def compared_sessions(answers: Asked, numbers: Sequence[int]) -> tuple[tuple[Tested, ...], tuple[Waiting, ...]]:
+def compared_sessions(answers: Asked, numbers: Sequence[int]) -> tuple[tuple[Tested, ...], tuple[NotTested, ...]]:
     """Test in every statement whether sessions are answered alike, by the participants who came to all of them.
 
     A participant's answers in a session are their median over the settings that he or she answered in all sessions.
@@ -231,7 +231,7 @@ def compared_sessions(answers: Asked, numbers: Sequence[int]) -> tuple[tuple[Tes
         outcomes, answers.decided.alpha, f"{answers.block.id}: sessions", false_discovery, FDR, primary=False
     )
     if all(one.outcome.n == 0 for one in ps):
-        return (), (Waiting(SESSIONS, f"nobody answered the same setting in all of sessions {numbers}"),)
+        return (), (NotTested(SESSIONS, f"nobody answered the same setting in all of sessions {numbers}"),)
     return ps, ()
 
 
@@ -242,14 +242,14 @@ def sealed(study: Study, answers: Asked) -> BlockFound:
         waiting = ["test of a trend (Page)", "lowest delay that shows", "test of equivalence", "detection threshold"]
     (omnibus, absent), failed = answers.attempt(OMNIBUS, lambda: compared(answers), ((), ()))
     told = head(study, answers)
-    absent = (*told.pop("absent"), *absent, *failed, *(Waiting(what, SEALED) for what in waiting))
+    absent = (*told.pop("absent"), *absent, *failed, *(NotTested(what, SEALED) for what in waiting))
     return BlockFound(**told, omnibus=omnibus, absent=absent)
 
 
-def compared(answers: Asked) -> tuple[tuple[Tested, ...], tuple[Waiting, ...]]:
+def compared(answers: Asked) -> tuple[tuple[Tested, ...], tuple[NotTested, ...]]:
     """Test in every statement whether the settings are answered alike."""
     if answers.k < 2:
-        return (), (Waiting("test of settings", "the block has one setting: there is nothing to compare it with"),)
+        return (), (NotTested("test of settings", "the block has one setting: there is nothing to compare it with"),)
     return judged(
         _each(answers, lambda values: _omnibus(values, answers)),
         answers.decided,
@@ -275,7 +275,7 @@ def over_all(answers: Asked, draws: int | None = None) -> Outcome | None:
 
 def asked_again(
     answers: Asked, columns: Array | None, what: str
-) -> tuple[tuple[Tested, ...], tuple[Tested, ...], tuple[Waiting, ...]]:
+) -> tuple[tuple[Tested, ...], tuple[Tested, ...], tuple[NotTested, ...]]:
     """Return the same questions under other assumptions: the mixed model, and with missing answers; and what is not.
 
     ``columns`` (settings, columns) are what the mixed model tests, ``what`` names it.
@@ -286,7 +286,7 @@ def asked_again(
     mixed: tuple[Tested, ...] = ()
     reason = _no_model(answers)
     if reason:
-        absent.append(Waiting(f"mixed model of {what}", reason))
+        absent.append(NotTested(f"mixed model of {what}", reason))
     else:
         models = {}
         for item in answers.block.items:
@@ -308,7 +308,7 @@ def asked_again(
             for item, values in gaps.items()
         )
     elif gaps:
-        absent.append(Waiting("test with incomplete participants", "it needs three settings"))
+        absent.append(NotTested("test with incomplete participants", "it needs three settings"))
     return mixed, incomplete, tuple(absent)
 
 

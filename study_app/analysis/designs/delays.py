@@ -10,10 +10,10 @@ import numpy as np
 from study_app.analysis.designs.block_tests import AGAIN, MANY, OVER_ALL, Asked, asked_again, head, over_all
 from study_app.analysis.designs.verdicts import judged
 from study_app.analysis.findings.block_results import BlockFound
-from study_app.analysis.findings.contrast_with_control import Against
+from study_app.analysis.findings.contrast_with_control import ContrastWithControl
 from study_app.analysis.findings.item_test import Tested
 from study_app.analysis.findings.lowest_delay import Lowest
-from study_app.analysis.findings.not_tested import Waiting
+from study_app.analysis.findings.not_tested import NotTested
 from study_app.analysis.statistics.equivalence.power import participants_needed
 from study_app.analysis.statistics.equivalence.tost import tost
 from study_app.analysis.statistics.multiple_comparisons import holm
@@ -61,9 +61,9 @@ def delays_found(study: Study | None, answers: Asked) -> BlockFound:
     )
 
 
-def _trends(answers: Asked) -> tuple[tuple[Tested, ...], tuple[Waiting, ...]]:
+def _trends(answers: Asked) -> tuple[tuple[Tested, ...], tuple[NotTested, ...]]:
     if answers.k < 2:
-        return (), (Waiting(TREND, ONE_DELAY),)
+        return (), (NotTested(TREND, ONE_DELAY),)
     outcomes = {}
     for item in answers.block.items:
         direction = answers.decided.direction(item.id)
@@ -73,12 +73,12 @@ def _trends(answers: Asked) -> tuple[tuple[Tested, ...], tuple[Waiting, ...]]:
     undirected = [item.short for item in answers.block.items if item.id not in outcomes]
     why = f"the protocol does not say whether answers should rise or fall with delay ({', '.join(undirected)})"
     found = judged(outcomes, answers.decided, f"{answers.block.id}: trend over delay")
-    return found, (Waiting(TREND, why),) if undirected else ()
+    return found, (NotTested(TREND, why),) if undirected else ()
 
 
 def _lowest(
     answers: Asked, trends: tuple[Tested, ...], delays_ms: list[float]
-) -> tuple[tuple[Lowest, ...], tuple[Waiting, ...]]:
+) -> tuple[tuple[Lowest, ...], tuple[NotTested, ...]]:
     """Step down in the statements whose trend is there at all."""
     showing = [one for one in trends if one.verdict in ("shown", "suggested")]
     found = []
@@ -88,18 +88,18 @@ def _lowest(
         found.append(Lowest(one.item, steps, one.members))
     if trends and not showing:
         why = "no statement shows a trend over all delays; that is not evidence that none is noticed"
-        return (), (Waiting(LOWEST, why),)
+        return (), (NotTested(LOWEST, why),)
     return tuple(found), ()
 
 
-def _against(answers: Asked, delays_ms: list[float]) -> tuple[tuple[Against, ...], tuple[Waiting, ...]]:
+def _against(answers: Asked, delays_ms: list[float]) -> tuple[tuple[ContrastWithControl, ...], tuple[NotTested, ...]]:
     """Compare every delay with the shortest one, by the bound that was decided."""
     bound = answers.decided.equivalence_bound
     if answers.k < 2:
-        return (), (Waiting(EQUIVALENCE, ONE_DELAY),)
+        return (), (NotTested(EQUIVALENCE, ONE_DELAY),)
     if bound is None:
         why = "the protocol decided no bound of equivalence, and one chosen now would be chosen by the answers"
-        return (), (Waiting(EQUIVALENCE, why),)
+        return (), (NotTested(EQUIVALENCE, why),)
     found = []
     for item in answers.block.items:
         answers.each(item.short)
@@ -119,14 +119,14 @@ def _against(answers: Asked, delays_ms: list[float]) -> tuple[tuple[Against, ...
             found.append((item.id, delay_ms, tested))
     adjusted = holm([tested.p_difference for _, _, tested in found])
     return tuple(
-        Against(
+        ContrastWithControl(
             item, delay_ms, delays_ms[0], tested.judged(p, len(found)), p, len(found), answers.decided.direction(item)
         )
         for (item, delay_ms, tested), p in zip(found, adjusted, strict=True)
     ), ()
 
 
-def _up_to(against: tuple[Against, ...]) -> dict[str, float | None]:
+def _up_to(against: tuple[ContrastWithControl, ...]) -> dict[str, float | None]:
     """Return the longest delay up to which all are equivalent, by statement: a fixed order, so nothing is corrected.
 
     Equivalent is only what every test shows.
@@ -142,9 +142,9 @@ def _up_to(against: tuple[Against, ...]) -> dict[str, float | None]:
     return found
 
 
-def _threshold(answers: Asked, delays_ms: list[float]) -> tuple[Threshold | None, tuple[Waiting, ...]]:
+def _threshold(answers: Asked, delays_ms: list[float]) -> tuple[Threshold | None, tuple[NotTested, ...]]:
     item = answers.decided.noticed
     if item is None or item not in answers.values:
-        return None, (Waiting(THRESHOLD, "the protocol names no statement that asks for it"),)
+        return None, (NotTested(THRESHOLD, "the protocol names no statement that asks for it"),)
     answers.each("detection threshold")
     return noticed(answers.single[item], delays_ms, alpha=answers.decided.alpha, seed=answers.seed), ()

@@ -22,8 +22,8 @@ from study_app.analysis.designs.block_tests import (
 from study_app.analysis.designs.verdicts import HOLM, in_family, verdict
 from study_app.analysis.findings.block_results import BlockFound
 from study_app.analysis.findings.item_test import Tested
-from study_app.analysis.findings.liquid_recognition import Named
-from study_app.analysis.findings.not_tested import Waiting
+from study_app.analysis.findings.liquid_recognition import RecognitionResult
+from study_app.analysis.findings.not_tested import NotTested
 from study_app.analysis.findings.pair_comparison import Pair
 from study_app.analysis.statistics.multiple_comparisons import holm
 from study_app.analysis.statistics.outcome import Outcome, told
@@ -61,7 +61,7 @@ def liquids_found(study: Study | None, answers: Asked) -> BlockFound:
     )
 
 
-def pairs_of(answers: Asked, omnibus: tuple[Tested, ...]) -> tuple[tuple[Pair, ...], tuple[Waiting, ...]]:
+def pairs_of(answers: Asked, omnibus: tuple[Tested, ...]) -> tuple[tuple[Pair, ...], tuple[NotTested, ...]]:
     """Return the comparisons of settings two by two, in the statements that differ at all, and why there are none."""
     count = math.comb(answers.k, 2)
     if answers.k < 3:
@@ -73,10 +73,10 @@ def pairs_of(answers: Asked, omnibus: tuple[Tested, ...]) -> tuple[tuple[Pair, .
             f"{smallest_of_pairs(2, answers.n):.4g}, after Holm's correction over {count} pairs {corrected:.4g}, which "
             f"is above {answers.decided.alpha:g}"
         )
-        return (), (Waiting(PAIRS, why),)
+        return (), (NotTested(PAIRS, why),)
     differing = [one.item for one in omnibus if one.verdict in ("shown", "suggested")]
     if not differing:
-        return (), (Waiting(PAIRS, "no statement shows a difference between the settings"),)
+        return (), (NotTested(PAIRS, "no statement shows a difference between the settings"),)
     return _over_all_pairs(answers, differing), ()
 
 
@@ -109,16 +109,16 @@ def _over_all_pairs(answers: Asked, items: list[str]) -> tuple[Pair, ...]:
     )
 
 
-def _recognised(answers: Asked) -> tuple[Named | None, tuple[Waiting, ...]]:
+def _recognised(answers: Asked) -> tuple[RecognitionResult | None, tuple[NotTested, ...]]:
     """Test whether settings were named for what they were."""
     labels = answers.decided.names
     right = tuple(setting.label for setting in answers.block.settings)
     if not answers.decided.named_in(answers.block) or not any(right):
-        return None, (Waiting(RECOGNITION, "the protocol does not say which statements name these liquids"),)
+        return None, (NotTested(RECOGNITION, "the protocol does not say which statements name these liquids"),)
     if not 2 <= answers.k <= MOST or len(labels) < 2:
-        return None, (Waiting(RECOGNITION, f"it needs 2 to {MOST} settings and two names"),)
+        return None, (NotTested(RECOGNITION, f"it needs 2 to {MOST} settings and two names"),)
     ratings = np.stack([answers.values[label] for label in labels], axis=2)
     truth = [None if label is None else labels.index(label) for label in right]
     found = recognition(named(ratings), truth, len(labels), seed=answers.intervals)
     said = verdict(found.p, found.smallest_p, answers.decided.alpha, primary=answers.decided.binding)
-    return Named(labels, answers.block.codes, right, found, said), ()
+    return RecognitionResult(labels, answers.block.codes, right, found, said), ()

@@ -10,12 +10,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from typing import Any
 
-from study_app.analysis.findings.contrast_with_control import Against
+from study_app.analysis.findings.contrast_with_control import ContrastWithControl
 from study_app.analysis.findings.delivered_delay import Delivered
 from study_app.analysis.findings.item_test import Tested
-from study_app.analysis.findings.liquid_recognition import Named
+from study_app.analysis.findings.liquid_recognition import RecognitionResult
 from study_app.analysis.findings.lowest_delay import Lowest
-from study_app.analysis.findings.not_tested import Waiting
+from study_app.analysis.findings.not_tested import NotTested
 from study_app.analysis.findings.pair_comparison import Pair
 from study_app.analysis.findings.section_failures import Failure
 from study_app.analysis.statistics.outcome import Outcome
@@ -52,15 +52,15 @@ class BlockFound:
     overall: Outcome | None = None
     omnibus: tuple[Tested, ...] = ()
     pairs: tuple[Pair, ...] = ()
-    named: Named | None = None
+    named: RecognitionResult | None = None
     trends: tuple[Tested, ...] = ()
     lowest: tuple[Lowest, ...] = ()
-    against: tuple[Against, ...] = ()
+    against: tuple[ContrastWithControl, ...] = ()
     equivalent_up_to: Mapping[str, float | None] | None = None
     threshold: Threshold | None = None
     mixed: tuple[Tested, ...] = ()
     incomplete: tuple[Tested, ...] = ()
-    absent: tuple[Waiting, ...] = ()
+    absent: tuple[NotTested, ...] = ()
     presentations: tuple[int, int] = (1, 1)
     replicated_ms: tuple[float, ...] = ()
     sessions: tuple[int, ...] = (1,)

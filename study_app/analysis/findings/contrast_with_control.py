@@ -10,7 +10,7 @@ from study_app.analysis.tables.planned_analysis import Direction
 
 
 @dataclass(frozen=True, slots=True)
-class Against:
+class ContrastWithControl:
     """One delay compared with the shortest in one statement.
 
     ``found`` holds the verdict; ``p_adjusted`` is p of a difference, corrected over the ``members`` comparisons of

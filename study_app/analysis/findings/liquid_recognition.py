@@ -9,7 +9,7 @@ from study_app.analysis.statistics.recognition import Recognition
 
 
 @dataclass(frozen=True, slots=True)
-class Named:
+class RecognitionResult:
     """The recognition of liquids: the items that name one, and which of them is right for each setting (code)."""
 
     labels: tuple[str, ...]

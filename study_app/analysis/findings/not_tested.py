@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
-class Waiting:
+class NotTested:
     """What is not there, and why: while the key is sealed, or for good."""
 
     what: str

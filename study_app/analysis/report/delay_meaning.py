@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Final
 
 from study_app.analysis.findings.block_results import BlockFound, Results
-from study_app.analysis.findings.contrast_with_control import Against
+from study_app.analysis.findings.contrast_with_control import ContrastWithControl
 from study_app.analysis.findings.delivered_delay import Delivered
 from study_app.analysis.findings.lowest_delay import Lowest
 from study_app.analysis.findings.words import beyond, counted, interval, listed, ms, number, p_equals, percent, short
@@ -44,13 +44,13 @@ def speaking_against(found: BlockFound, delay_ms: float) -> tuple[str, ...]:
     return (*trends.values(), *differences.values())
 
 
-def _differing(found: BlockFound, delay_ms: float) -> list[Against]:
+def _differing(found: BlockFound, delay_ms: float) -> list[ContrastWithControl]:
     """Return the comparisons up to a delay that show a difference, corrected over all of them, shortest delay first."""
     different = [one for one in found.against if one.verdict == "different" and one.delay_ms <= delay_ms]
     return sorted(different, key=lambda one: one.delay_ms)
 
 
-def _differs(found: BlockFound, one: Against) -> str:
+def _differs(found: BlockFound, one: ContrastWithControl) -> str:
     sign = "+" if (one.found.effect or 0.0) > 0 else ""
     p = "" if one.p_adjusted is None else f", adjusted {p_equals(one.p_adjusted)}"
     return f"“{short(found, one.item)}” differs at {ms(one.delay_ms)} ({sign}{number(one.found.effect)}{p})"
@@ -139,7 +139,7 @@ def _as_claim(found: BlockFound, delay_ms: float) -> Iterator[str]:
     )
 
 
-def _by_verdict(found: BlockFound, here: list[Against]) -> str:
+def _by_verdict(found: BlockFound, here: list[ContrastWithControl]) -> str:
     parts = []
     for verdict in VERDICTS:
         told = [f"“{short(found, one.item)}” ({_difference(one)})" for one in here if one.verdict == verdict]
@@ -148,7 +148,7 @@ def _by_verdict(found: BlockFound, here: list[Against]) -> str:
     return "; ".join(parts) + "."
 
 
-def _difference(one: Against) -> str:
+def _difference(one: ContrastWithControl) -> str:
     found = one.found
     people = "" if found.beyond is None else f", beyond the bound {beyond(found)}"
     if found.interval is None:
@@ -157,7 +157,7 @@ def _difference(one: Against) -> str:
     return f"{number(found.effect)}, {shown}{people}{_only(one)}"
 
 
-def _only(one: Against) -> str:
+def _only(one: ContrastWithControl) -> str:
     """Say which test alone would have decided otherwise."""
     found = one.found
     if one.verdict not in ("inconclusive", "out of reach"):
@@ -171,7 +171,7 @@ def _only(one: Against) -> str:
     return ""
 
 
-def _needed(here: list[Against]) -> str:
+def _needed(here: list[ContrastWithControl]) -> str:
     needed = [one.found.n_needed for one in here if one.verdict != "equivalent" and one.found.n_needed]
     if not needed:
         return ""
@@ -182,7 +182,7 @@ def _needed(here: list[Against]) -> str:
     )
 
 
-def _said(found: BlockFound, here: list[Against]) -> str:
+def _said(found: BlockFound, here: list[ContrastWithControl]) -> str:
     delay = ms(here[0].delay_ms)
     if all(one.verdict == "equivalent" for one in here):
         return (

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from study_app.analysis.findings.block_results import BlockFound, Results
-from study_app.analysis.findings.contrast_with_control import Against
+from study_app.analysis.findings.contrast_with_control import ContrastWithControl
 from study_app.analysis.findings.words import beyond, counted, enough, interval, ms, number, p_value, percent, short
 from study_app.analysis.report.delay_meaning import VERDICTS, by_delay, tempting_ms
 from study_app.analysis.report.delay_meaning import meaning as paragraphs_on_delay
@@ -87,20 +87,20 @@ def _without_normality(tested: Equivalence) -> float | None:
     return max((p for p in (tested.p_permutation, tested.p_ranks, tested.p_bootstrap) if p is not None), default=None)
 
 
-def _p_different(one: Against) -> str:
+def _p_different(one: ContrastWithControl) -> str:
     """Return the adjusted p of a difference, unless no answers of so many participants could have shown one."""
     out = min(1.0, 2 * 0.5**one.found.n) * one.members > one.found.alpha
     return "out of reach" if out and one.p_adjusted is not None else p_value(one.p_adjusted)
 
 
-def _needed(one: Against) -> str:
+def _needed(one: ContrastWithControl) -> str:
     """Return how many participants equivalence would take, and where nobody knows a dash."""
     if one.found.n_needed is not None:
         return str(one.found.n_needed)
     return f"> {MOST}" if one.found.sd is not None else "–"
 
 
-def _about_against(against: Sequence[Against]) -> Iterator[str]:
+def _about_against(against: Sequence[ContrastWithControl]) -> Iterator[str]:
     """Yield how the comparisons with the shortest delay were made, and what they could not show."""
     first = against[0].found
     yield (

@@ -14,7 +14,7 @@ from study_app import __version__
 from study_app.analysis.designs.verdicts import ALONE, HOLM
 from study_app.analysis.export.codebook import head
 from study_app.analysis.findings.block_results import BlockFound, Results, plain
-from study_app.analysis.findings.contrast_with_control import Against
+from study_app.analysis.findings.contrast_with_control import ContrastWithControl
 from study_app.analysis.findings.item_test import Tested
 from study_app.analysis.findings.section_failures import Failure, Failures
 from study_app.analysis.findings.words import name
@@ -133,7 +133,7 @@ def _tests(found: BlockFound) -> Iterator[dict[str, Any]]:
         yield _row(found, "a delay is noticed", found.threshold)
 
 
-def _differs(found: BlockFound, against: Against) -> dict[str, Any]:
+def _differs(found: BlockFound, against: ContrastWithControl) -> dict[str, Any]:
     """Return the row of the same comparison asked the other way: whether the delay differs at all."""
     outcome = against.found
     by = "the larger p of a t test and of exact signed ranks, two-sided"

@@ -40,15 +40,15 @@ log = logging.getLogger(__name__)
 
 def compose_lab(
     place: LabPlace, *, device: str = "mouse", firmware: Path | None = None, first: InitialSettings | None = None
-) -> LabVisit:
+) -> LabController:
     """Give a lab's place its device, servo and prices: they come as it is entered and go as it is left.
 
     ``device`` is the one it begins with, ``firmware`` the file of a Falcon's program, ``first`` what was prepared.
     """
-    return LabVisit(place, device=device, firmware=firmware, first=first)
+    return LabController(place, device=device, firmware=firmware, first=first)
 
 
-class LabVisit(QObject):
+class LabController(QObject):
     """The lab's stay at its place.
 
     Parameters

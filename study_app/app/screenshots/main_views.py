@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from PySide6.QtWidgets import QDialog
 
-from study_app.app.main_controller import Visit
+from study_app.app.main_controller import MainController
 from study_app.app.screenshots.capture import Camera, shown
 from study_app.app.screenshots.example_study import STUDY
 from study_app.gui.settings.display_test import DisplayTest
@@ -24,7 +24,7 @@ KEPT_IN: Final = "~/.config/liquid-study/machine.json"  # in place of a folder t
 
 def take_places(camera: Camera, results: Path, theme: Theme) -> None:
     """Take home with its questions, results, lab, devices with a diagnosis, and the machine with its display test."""
-    visit = Visit(results)
+    visit = MainController(results)
     window = visit.window
     window.show_theme(theme)
     visit.open()
@@ -53,7 +53,7 @@ def _take_questions(camera: Camera, home: Any, theme: Theme) -> None:
         home.dialog.reject()
 
 
-def _take_results(camera: Camera, visit: Visit, theme: Theme) -> None:
+def _take_results(camera: Camera, visit: MainController, theme: Theme) -> None:
     visit.window.go("results")
     place: Any = visit.window.place("results")
     visit.window.resize(*HOME)
@@ -65,7 +65,7 @@ def _take_results(camera: Camera, visit: Visit, theme: Theme) -> None:
     camera.take(visit.window, f"results-{theme.name}", HOME)
 
 
-def _take_lab(camera: Camera, visit: Visit, theme: Theme) -> None:
+def _take_lab(camera: Camera, visit: MainController, theme: Theme) -> None:
     visit.window.resize(*WIDE)
     visit.window.go("lab")
     assert visit.lab is not None  # noqa: S101 - one has gone there
@@ -77,7 +77,7 @@ def _take_lab(camera: Camera, visit: Visit, theme: Theme) -> None:
     camera.take(visit.window, f"lab-{theme.name}", WIDE)
 
 
-def _take_devices(camera: Camera, visit: Visit, theme: Theme) -> None:
+def _take_devices(camera: Camera, visit: MainController, theme: Theme) -> None:
     visit.window.go("devices")
     camera.take(visit.window, f"devices-{theme.name}", HOME)
     over: list[bool] = []
@@ -90,7 +90,7 @@ def _take_devices(camera: Camera, visit: Visit, theme: Theme) -> None:
     dialog.done(QDialog.DialogCode.Rejected)
 
 
-def _take_machine(camera: Camera, visit: Visit, theme: Theme) -> None:
+def _take_machine(camera: Camera, visit: MainController, theme: Theme) -> None:
     visit.window.go("machine")
     camera.take(visit.window, f"machine-{theme.name}", HOME)
     place: Any = visit.window.place("machine")

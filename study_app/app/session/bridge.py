@@ -17,13 +17,13 @@ from PySide6.QtCore import QObject, QTimer, Signal
 
 from study_app.app.exception_hooks import ThreadExceptions, UncaughtExceptions
 from study_app.app.guarded_slots import guarded_session_slot
-from study_app.app.session.frame_budget import Slack
-from study_app.app.session.garbage_collection import settle, unsettle
-from study_app.app.session.operator_monitor import Lookout
+from study_app.app.session.frame_budget import FrameBudget
+from study_app.app.session.garbage_collection import freeze_garbage, unfreeze_garbage
+from study_app.app.session.operator_monitor import OperatorMonitor
 from study_app.app.session.operator_requests import OperatorRequests
 from study_app.app.session.parts import Hand, Parts
 from study_app.app.session.reconnection import Reconnection
-from study_app.app.session.thread_priority import Urgency
+from study_app.app.session.thread_priority import ThreadPriority
 from study_app.errors import DeviceError, ServoFault, StudyError
 from study_app.gui.display.frame_clock import Frames
 from study_app.gui.operator.strip import Strip
@@ -86,7 +86,7 @@ class SessionBridge(QObject):
         self.operator = operator
         self.strip = strip
         self._called = False
-        self.lookout = Lookout(parts, refresh_hz)
+        self.lookout = OperatorMonitor(parts, refresh_hz)
         self.trouble = ""
         self.failure: BaseException | None = None
         ports = Ports(parts.servo, parts.journal, self.present, parts.clock, parts.recorder)
@@ -107,8 +107,8 @@ class SessionBridge(QObject):
         self._thread_exceptions.ended.connect(self._tell_of_thread)
         self._frames = Frames(refresh_hz, parent=self)
         self._frames.due.connect(self._frame)
-        self._urgency = Urgency()
-        self._slack = Slack(((self._tiles, TILES_S), (self._traces, TRACES_S), (self._forces, TRACES_S)))
+        self._urgency = ThreadPriority()
+        self._slack = FrameBudget(((self._tiles, TILES_S), (self._traces, TRACES_S), (self._forces, TRACES_S)))
         self.runner.on_change(lambda _state: self._changed())
         self._connect()
 
@@ -150,7 +150,7 @@ class SessionBridge(QObject):
         """Begin the session."""
         self.uncaught.install()
         self._thread_exceptions.install()
-        settle()
+        freeze_garbage()
         self._urgency.hurry()
         self._frames.start()
         self._begin()
@@ -362,7 +362,7 @@ class SessionBridge(QObject):
         self._gone = True
         self._frames.stop()
         self._urgency.rest()
-        unsettle()
+        unfreeze_garbage()
         self.uncaught.remove()
         self._thread_exceptions.remove()
         self.participant.may_close = True

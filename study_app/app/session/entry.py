@@ -6,7 +6,7 @@ import contextlib
 from collections.abc import Callable
 from pathlib import Path
 
-from study_app.app.session.live_session import hold
+from study_app.app.session.live_session import run_session
 from study_app.errors import StoreError
 from study_app.protocol.load import load
 from study_app.session.request import NewSession, draw_seed, resumed, study_results
@@ -80,7 +80,7 @@ def run(
     if Path(protocol).is_file():
         with contextlib.suppress(StoreError):  # a session does not depend on it
             remember_protocol(Path(protocol))
-    return hold(chosen, tell)
+    return run_session(chosen, tell)
 
 
 def resume(
@@ -127,4 +127,4 @@ def resume(
         firmware=firmware,
     )
     check(chosen, chosen.read_protocol())
-    return hold(chosen, tell)
+    return run_session(chosen, tell)

@@ -17,7 +17,7 @@ FORGETS: Final = 0.9  # what a work took at worst is forgotten by so much each t
 
 
 @dataclass(slots=True)
-class Work:
+class DeferredTask:
     """Something to be done every so often; ``took_ns`` is what it lately took at worst."""
 
     do: Callable[[], object]
@@ -32,7 +32,7 @@ class Work:
         return now_ns - self.done_ns - max(self.period_ns, round(self.took_ns / MOST_SHARE))
 
 
-class Slack:
+class FrameBudget:
     """Does works when they are due and there is room for them.
 
     Parameters
@@ -44,7 +44,7 @@ class Slack:
     def __init__(
         self, works: Sequence[tuple[Callable[[], object], float]], now_ns: Callable[[], int] = time.perf_counter_ns
     ) -> None:
-        self._works = [Work(do, round(period_s * 1e9)) for do, period_s in works]
+        self._works = [DeferredTask(do, round(period_s * 1e9)) for do, period_s in works]
         self._now_ns = now_ns
 
     def use(self, until_ns: int) -> None:
@@ -61,7 +61,7 @@ class Slack:
                 hurried = True
             self._do(work, now_ns)
 
-    def _do(self, work: Work, began_ns: int) -> None:
+    def _do(self, work: DeferredTask, began_ns: int) -> None:
         work.done_ns = began_ns
         work.do()
         work.took_ns = max(self._now_ns() - began_ns, round(FORGETS * work.took_ns))

@@ -26,8 +26,8 @@ def collect_if_due() -> int | None:
     return oldest
 
 
-def settle() -> None:
-    """Collect everything, and look at what is left no more until `unsettle`: before what must not wait for that.
+def freeze_garbage() -> None:
+    """Collect everything, then skip what is left until `unfreeze_garbage`: before what must not wait for that.
 
     A collection of all that a session is made of takes as long as several frames; of what comes later, next to nothing.
     """
@@ -36,7 +36,7 @@ def settle() -> None:
     gc.freeze()
 
 
-def unsettle() -> None:
+def unfreeze_garbage() -> None:
     """Look at everything again when a collection is due."""
     gc.unfreeze()
 

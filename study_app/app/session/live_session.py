@@ -24,7 +24,7 @@ from study_app.app.session.garbage_collection import collecting_here
 from study_app.app.session.termination import ended_from_outside
 from study_app.app.workstation import described, screen_number, settings_here, text_scale_on
 from study_app.devices.registry import is_falcon, kind_of
-from study_app.devices.rig import Machine, open_machine
+from study_app.devices.rig import Rig, open_rig
 from study_app.errors import SessionError, StudyError
 from study_app.gui.application import application_here
 from study_app.gui.display.screens import choose_screens, place
@@ -52,7 +52,7 @@ NOT_EXAMINED = (
 )
 
 
-def hold(chosen: NewSession, tell: Callable[[str], object] | None) -> int:
+def run_session(chosen: NewSession, tell: Callable[[str], object] | None) -> int:
     """Open a session's windows and return when they are closed."""
     application_here()
     live = LiveSession(chosen, LIGHT, tell)
@@ -96,7 +96,7 @@ class LiveSession(QObject):
         self.error: StudyError | None = None
         self.bridge: SessionBridge | None = None
         self.note: OpeningWindow | None = None
-        self._machine: Machine | None = None
+        self._machine: Rig | None = None
         self._store: SessionStore | None = None
         self._crash_trace: CrashTrace | None = None
         self._closed = False
@@ -149,11 +149,11 @@ class LiveSession(QObject):
 
     def _make_ready(self) -> None:
         """Compile, open, start and measure, in a thread of its own; whatever comes of it goes to ``_begin``."""
-        machine: Machine | None = None
+        machine: Rig | None = None
         try:
             load_windows()
             study = self.chosen.read_protocol()
-            machine = open_machine(
+            machine = open_rig(
                 self.chosen.device,
                 study,
                 random=self.chosen.tremor(),

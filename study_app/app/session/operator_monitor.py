@@ -10,7 +10,7 @@ from study_app.viewmodels.operator import OperatorView, operator_view
 from study_app.viewmodels.servo_health import ServoHealth
 
 
-class Lookout:
+class OperatorMonitor:
     """Looks at servo and hand once a frame; ``forces`` is None, and no force is looked at, in a double-blind study.
 
     Parameters

@@ -18,7 +18,7 @@ NICE: Final = -10
 ABOVE_NORMAL, NORMAL = 1, 0  # of Windows' threads
 
 
-class Urgency:
+class ThreadPriority:
     """Puts the thread that calls it before others, and back."""
 
     def __init__(self) -> None:

@@ -31,7 +31,7 @@ from study_app.viewmodels.session_stages import SessionProgress, progress_after,
 
 if TYPE_CHECKING:
     from study_app.devices.base import Device
-    from study_app.devices.rig import Machine
+    from study_app.devices.rig import Rig
     from study_app.gui.theme.theme import Theme
     from study_app.haptics.runtime.servo import Servo
     from study_app.session.request import NewSession
@@ -43,7 +43,7 @@ def open_windows(
     protocol: Protocol,
     schedule: Schedule,
     store: SessionStore,
-    machine: Machine,
+    machine: Rig,
     theme: Theme,
     start: Start = FIRST,
     *,
@@ -119,7 +119,7 @@ def _excluder(chosen: NewSession) -> Callable[[int | None, str], None]:
     return leave_out
 
 
-def _facts(chosen: NewSession, protocol: Protocol, schedule: Schedule, machine: Machine) -> Session:
+def _facts(chosen: NewSession, protocol: Protocol, schedule: Schedule, machine: Rig) -> Session:
     """Return what the operator's window says throughout."""
     seen_alone, nobody = chosen.device in {"mouse", "spacemouse"}, is_simulated(chosen.device)
     return Session(

@@ -12,7 +12,7 @@ from study_app.gui.theme.themed import dress
 from study_app.gui.widgets.cards import Card, Rule
 from study_app.gui.widgets.controls import ActionButton, Choice
 from study_app.gui.widgets.labels import Clamped, label
-from study_app.gui.widgets.masked_panel import Hidden
+from study_app.gui.widgets.masked_panel import MaskedPanel
 from study_app.lab.ab_comparison import Setting, other
 from study_app.viewmodels.lab import FormSection, LabView, form
 
@@ -137,7 +137,7 @@ class FormPanel(Card):
         column.addWidget(Rule())
         column.addLayout(foot)
         column.addWidget(self.said)
-        self.hidden = Hidden(HIDDEN, "Parameters tell settings apart.")
+        self.hidden = MaskedPanel(HIDDEN, "Parameters tell settings apart.")
         self._stack = QStackedLayout()
         self._stack.addWidget(whole)
         self._stack.addWidget(self.hidden)

@@ -13,7 +13,7 @@ from study_app.gui.theme.theme import RADIUS_CONTROL, font
 from study_app.gui.theme.themed import Themed, dress
 from study_app.gui.widgets.cards import Bar, Card, Icon, Rule
 from study_app.gui.widgets.labels import Elided, figures, label, set_ink
-from study_app.gui.widgets.masked_panel import Hidden
+from study_app.gui.widgets.masked_panel import MaskedPanel
 from study_app.viewmodels.lab import CostRow, ErrorRow, LabView, LimiterShown
 from study_app.viewmodels.number_words import grouped
 
@@ -37,7 +37,7 @@ class ReadingCard(Card):
         self.content.setSpacing(4)
         self.stack = QStackedLayout()
         self.stack.addWidget(self._shown)
-        self.stack.addWidget(Hidden(HIDDEN, why))
+        self.stack.addWidget(MaskedPanel(HIDDEN, why))
         self.column.addLayout(self.stack, 1)
 
     def show_blind(self, blind: bool) -> bool:

@@ -17,7 +17,7 @@ from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.accessible import describe_plot
 from study_app.gui.widgets.cards import Card
 from study_app.gui.widgets.labels import label
-from study_app.gui.widgets.masked_panel import Hidden
+from study_app.gui.widgets.masked_panel import MaskedPanel
 from study_app.gui.widgets.plots import MINUS, Plot, draw_quickly, number, pen
 from study_app.viewmodels.lab import SPAN_S, Floats, LabView
 
@@ -180,7 +180,7 @@ class PlotCard(Card):
         column.addWidget(plot, 1)
         self.stack = QStackedLayout()
         self.stack.addWidget(shown)
-        self.stack.addWidget(Hidden(HIDDEN, "A trace tells settings apart."))
+        self.stack.addWidget(MaskedPanel(HIDDEN, "A trace tells settings apart."))
         self.column.addLayout(self.stack, 1)
         self.setMinimumHeight(226)
 

@@ -8,7 +8,7 @@ from study_app.gui.operator.force_plots import FIELD
 from study_app.gui.widgets.accessible import describe_plot
 from study_app.gui.widgets.cards import Card, Chip
 from study_app.gui.widgets.labels import label
-from study_app.gui.widgets.masked_panel import Hidden
+from study_app.gui.widgets.masked_panel import MaskedPanel
 from study_app.gui.widgets.plots import LatenessPlot, TracePlot
 from study_app.viewmodels.servo_health import TRACE_WINDOW_S, ServoHealth
 
@@ -57,7 +57,7 @@ class HiddenForceCard(Card):
 
     def __init__(self) -> None:
         super().__init__("Force", Chip("neutral", "eye_off", "Hidden", small=True), padding=16, gap=8)
-        self.column.addWidget(Hidden(self.TITLE, self.WHY), 1)
+        self.column.addWidget(MaskedPanel(self.TITLE, self.WHY), 1)
 
     def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
         """Return what the plots of the force ask for where they are shown."""

@@ -13,7 +13,7 @@ from study_app.gui.theme.theme import RADIUS_CONTROL, font
 from study_app.gui.theme.themed import Themed
 
 
-class Hidden(Themed, QWidget):
+class MaskedPanel(Themed, QWidget):
     """A hatched field with a lock, what is hidden here, and one line why."""
 
     def __init__(self, title: str, why: str) -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from study_app.analysis.findings.block_results import BlockFound
 from study_app.analysis.findings.block_results import Results as Found
-from study_app.analysis.findings.contrast_with_control import Against
+from study_app.analysis.findings.contrast_with_control import ContrastWithControl
 from study_app.analysis.findings.lowest_delay import Lowest
 from study_app.analysis.report.delay_meaning import by_delay, meaning, tempting_ms
 from study_app.analysis.report.summary import findings, limits
@@ -27,11 +27,11 @@ DOUBTED = [5] + [0] * 14
 """By t equivalent (p = .033) within a point; by the bootstrap-t not."""
 
 
-def against(differences: Mapping[float, list[int]], expected: Direction | None) -> tuple[Against, ...]:
+def against(differences: Mapping[float, list[int]], expected: Direction | None) -> tuple[ContrastWithControl, ...]:
     each = [tost(values, 1.0) for values in differences.values()]
     adjusted = holm([one.p_difference for one in each])
     return tuple(
-        Against("different", ms, 0.0, one.judged(p, len(each)), p, len(each), expected)
+        ContrastWithControl("different", ms, 0.0, one.judged(p, len(each)), p, len(each), expected)
         for ms, one, p in zip(differences, each, adjusted, strict=True)
     )
 

@@ -10,7 +10,7 @@ import pytest
 
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.findings.block_results import Results
-from study_app.analysis.findings.liquid_recognition import Named
+from study_app.analysis.findings.liquid_recognition import RecognitionResult
 from study_app.analysis.findings.section_failures import Failures
 from study_app.analysis.report.first_page.answer import Answer
 from study_app.analysis.report.first_page.answers_of_delays import common_ms
@@ -248,7 +248,7 @@ def test_a_claim_needs_the_test_over_all_statements_corrected_over_the_blocks() 
 def test_a_liquid_is_recognised_where_its_interval_lies_above_the_share_of_its_name() -> None:
     # Water 10 of 12, but 19 of all 36 names are water; honey 3 of 12, more than its share of names, but not surely so.
     names = np.column_stack([[0] * 10 + [1] * 2, [1] * 3 + [0] * 9, [2] * 12])
-    named = Named(
+    named = RecognitionResult(
         ("water", "honey", "oil"),
         ("L1", "L2", "L3"),
         ("water", "honey", "oil"),

@@ -14,7 +14,7 @@ import pytest
 from PySide6.QtCore import QEvent
 from PySide6.QtWidgets import QApplication, QMainWindow
 
-from study_app.app.lab.controller import LabVisit, compose_lab
+from study_app.app.lab.controller import LabController, compose_lab
 from study_app.app.lab.device_opening import LabOpening
 from study_app.errors import DeviceNotFound, ServoFault
 from study_app.evaluation.appraisal import Costs, EffectCost, Errors
@@ -66,11 +66,11 @@ def prices() -> Prices:
 
 
 @pytest.fixture
-def visit(qtbot: Any, prices: Prices) -> Iterator[LabVisit]:
+def visit(qtbot: Any, prices: Prices) -> Iterator[LabController]:
     """A lab that was not entered yet, with a hand that moves by itself."""
     place = LabPlace()
     place.resize(1300, 800)
-    made = LabVisit(place, make_appraiser=lambda: prices)
+    made = LabController(place, make_appraiser=lambda: prices)
     made.device = "scripted"
     yield made
     made.end()
@@ -80,7 +80,7 @@ def visit(qtbot: Any, prices: Prices) -> Iterator[LabVisit]:
 
 
 @pytest.fixture
-def felt(visit: LabVisit, qtbot: Any) -> LabVisit:
+def felt(visit: LabController, qtbot: Any) -> LabController:
     """The lab entered, honey in the hand, going in circles: a force for as long as nobody stops it."""
     visit.bench = visit.bench.choose("A", "Honey", load_scene("rek2024", "honey"))
     visit.place.show()
@@ -90,7 +90,7 @@ def felt(visit: LabVisit, qtbot: Any) -> LabVisit:
     return visit
 
 
-def force_n(visit: LabVisit) -> float:
+def force_n(visit: LabController) -> float:
     """Return the size of the force that was sent last [N]."""
     assert visit.live is not None
     latest = visit.live.servo.telemetry.latest()
@@ -106,7 +106,9 @@ def is_let_go(live: Any) -> bool:
     return held_n(live) == 0.0 and not live.servo._loop.live
 
 
-def test_entering_opens_and_feels_and_leaving_lets_go_of_everything(felt: LabVisit, prices: Prices, qtbot: Any) -> None:
+def test_entering_opens_and_feels_and_leaving_lets_go_of_everything(
+    felt: LabController, prices: Prices, qtbot: Any
+) -> None:
     live = felt.live
     assert live is not None
     assert sys.excepthook == felt.uncaught.hook
@@ -125,7 +127,7 @@ def test_entering_opens_and_feels_and_leaving_lets_go_of_everything(felt: LabVis
 
 
 def test_a_servo_that_does_not_end_is_told_of_as_the_place_is_left(
-    felt: LabVisit, prices: Prices, qtbot: Any, monkeypatch: Any, caplog: Any
+    felt: LabController, prices: Prices, qtbot: Any, monkeypatch: Any, caplog: Any
 ) -> None:
     live = felt.live
     assert live is not None
@@ -146,20 +148,20 @@ def test_a_servo_that_does_not_end_is_told_of_as_the_place_is_left(
     caplog.clear()
 
 
-def test_coming_back_opens_it_again(felt: LabVisit, qtbot: Any) -> None:
+def test_coming_back_opens_it_again(felt: LabController, qtbot: Any) -> None:
     felt.place.hide()
     felt.place.show()
     qtbot.waitUntil(lambda: felt.live is not None and felt.live.trace() is not None, timeout=OPENS_MS)
     assert felt.view().workbench.a.name == "Honey"
 
 
-def test_closing_the_window_ends_in_zero_force(felt: LabVisit) -> None:
+def test_closing_the_window_ends_in_zero_force(felt: LabController) -> None:
     live = felt.live
     felt.place.close()
     assert is_let_go(live)
 
 
-def test_what_is_edited_is_presented_and_what_is_refused_is_said(felt: LabVisit, qtbot: Any) -> None:
+def test_what_is_edited_is_presented_and_what_is_refused_is_said(felt: LabController, qtbot: Any) -> None:
     assert felt.live is not None
     telemetry = felt.live.servo.telemetry
     before = telemetry.latest().scene
@@ -182,7 +184,7 @@ def test_what_is_edited_is_presented_and_what_is_refused_is_said(felt: LabVisit,
     assert felt.live is not None
 
 
-def test_switching_choosing_and_copying(felt: LabVisit, qtbot: Any) -> None:
+def test_switching_choosing_and_copying(felt: LabController, qtbot: Any) -> None:
     felt.place.switched.emit()
     assert felt.view().felt == "B"
     felt.place.liquid_chosen.emit("B", Choice("rek2024", "syrup", "Syrup"))
@@ -194,7 +196,7 @@ def test_switching_choosing_and_copying(felt: LabVisit, qtbot: Any) -> None:
     assert felt.live is not None  # nothing was changed
 
 
-def test_the_force_stops_at_once_and_fades_in_again(felt: LabVisit, qtbot: Any) -> None:
+def test_the_force_stops_at_once_and_fades_in_again(felt: LabController, qtbot: Any) -> None:
     felt.place.stop_asked.emit()
     qtbot.waitUntil(lambda: force_n(felt) == 0.0, timeout=SOON_MS)
     assert not felt.view().force_on
@@ -205,7 +207,7 @@ def test_the_force_stops_at_once_and_fades_in_again(felt: LabVisit, qtbot: Any) 
     qtbot.waitUntil(lambda: force_n(felt) > 0.3, timeout=SOON_MS)
 
 
-def test_an_exception_in_a_slot_ends_in_zero_force_and_words(felt: LabVisit, qtbot: Any, caplog: Any) -> None:
+def test_an_exception_in_a_slot_ends_in_zero_force_and_words(felt: LabController, qtbot: Any, caplog: Any) -> None:
     live = felt.live
     assert live is not None
 
@@ -225,7 +227,7 @@ def test_an_exception_in_a_slot_ends_in_zero_force_and_words(felt: LabVisit, qtb
     assert felt.view().trouble == ""
 
 
-def test_an_exception_in_painting_ends_in_zero_force(felt: LabVisit, caplog: Any) -> None:
+def test_an_exception_in_painting_ends_in_zero_force(felt: LabController, caplog: Any) -> None:
     live, seen = felt.live, []
     felt.uncaught.previous = lambda *told: seen.append(told)
     sys.excepthook(RuntimeError, RuntimeError("in a paint event"), None)
@@ -235,7 +237,7 @@ def test_an_exception_in_painting_ends_in_zero_force(felt: LabVisit, caplog: Any
     felt.uncaught.previous = sys.__excepthook__
 
 
-def test_a_painter_that_an_exception_leaves_at_work_is_ended(felt: LabVisit, qtbot: Any, caplog: Any) -> None:
+def test_a_painter_that_an_exception_leaves_at_work_is_ended(felt: LabController, qtbot: Any, caplog: Any) -> None:
     """Else Qt paints no window any more: what failed could not even be read."""
     window = QMainWindow()  # Qt paints it without a detour through Python, as it does the operator's
     window.setCentralWidget(felt.place)
@@ -260,7 +262,7 @@ def test_a_painter_that_an_exception_leaves_at_work_is_ended(felt: LabVisit, qtb
     window.close()
 
 
-def test_a_lost_device_is_told_and_can_be_opened_again(felt: LabVisit, qtbot: Any) -> None:
+def test_a_lost_device_is_told_and_can_be_opened_again(felt: LabController, qtbot: Any) -> None:
     live = felt.live
     assert live is not None
     live.device.unplug()  # type: ignore[attr-defined]
@@ -272,7 +274,7 @@ def test_a_lost_device_is_told_and_can_be_opened_again(felt: LabVisit, qtbot: An
     assert felt.view().trouble == ""
 
 
-def test_while_blind_nothing_tells_one_from_the_other(felt: LabVisit, qtbot: Any, tmp_path: Path) -> None:
+def test_while_blind_nothing_tells_one_from_the_other(felt: LabController, qtbot: Any, tmp_path: Path) -> None:
     """Though nothing is exchanged, what is felt begins anew: a hand that felt no fade would know."""
     felt._chance = Stays()
     small = felt.bench.change("body.diameter_m", 0.02)
@@ -296,7 +298,7 @@ def test_while_blind_nothing_tells_one_from_the_other(felt: LabVisit, qtbot: Any
 
 
 def test_a_setting_is_saved_as_a_preset_that_is_at_hand_from_then_on(
-    felt: LabVisit, qtbot: Any, tmp_path: Path
+    felt: LabController, qtbot: Any, tmp_path: Path
 ) -> None:
     felt.place.changed.emit("liquid.density_kg_m3", 1234.5, False)
     path = tmp_path / "mine.toml"
@@ -310,7 +312,7 @@ def test_a_setting_is_saved_as_a_preset_that_is_at_hand_from_then_on(
     assert felt.live is not None
 
 
-def test_a_preset_is_saved_opened_again_and_used_in_a_study(felt: LabVisit, qtbot: Any, tmp_path: Path) -> None:
+def test_a_preset_is_saved_opened_again_and_used_in_a_study(felt: LabController, qtbot: Any, tmp_path: Path) -> None:
     study = tmp_path / "study.toml"
     study.write_bytes(source_bytes("demo"))
     felt.place.changed.emit("liquid.density_kg_m3", 1234.5, False)
@@ -331,7 +333,9 @@ def test_a_preset_is_saved_opened_again_and_used_in_a_study(felt: LabVisit, qtbo
     assert felt.live is not None
 
 
-def test_a_preset_is_on_the_disk_before_the_program_ends(visit: LabVisit, monkeypatch: Any, tmp_path: Path) -> None:
+def test_a_preset_is_on_the_disk_before_the_program_ends(
+    visit: LabController, monkeypatch: Any, tmp_path: Path
+) -> None:
     ended = threading.Event()
 
     def slowly(path: Path, text: str) -> None:
@@ -348,7 +352,7 @@ def test_a_preset_is_on_the_disk_before_the_program_ends(visit: LabVisit, monkey
     assert str(tmp_path / "two.toml") in [it.source for it in visit.liquids]
 
 
-def test_an_appraiser_that_died_is_not_waited_for(felt: LabVisit, prices: Prices, qtbot: Any) -> None:
+def test_an_appraiser_that_died_is_not_waited_for(felt: LabController, prices: Prices, qtbot: Any) -> None:
     qtbot.waitUntil(lambda: bool(prices.asked), timeout=SOON_MS)
     assert felt.view().measuring
     prices.works = False
@@ -356,7 +360,7 @@ def test_an_appraiser_that_died_is_not_waited_for(felt: LabVisit, prices: Prices
 
 
 def test_prices_are_asked_for_once_the_hand_rests_and_old_answers_do_not_count(
-    felt: LabVisit, prices: Prices, qtbot: Any
+    felt: LabController, prices: Prices, qtbot: Any
 ) -> None:
     qtbot.waitUntil(lambda: len(prices.asked) == 1, timeout=SOON_MS)
     for k in range(10):
@@ -377,7 +381,7 @@ def test_prices_are_asked_for_once_the_hand_rests_and_old_answers_do_not_count(
     assert felt.view().cost == ()  # it was the price of something else
 
 
-def test_no_price_is_no_reason_to_stop(visit: LabVisit, qtbot: Any) -> None:
+def test_no_price_is_no_reason_to_stop(visit: LabController, qtbot: Any) -> None:
     def nobody() -> Prices:
         raise OSError("no more processes")
 
@@ -440,7 +444,7 @@ def test_two_devices_are_never_opened_at_a_time(qtbot: Any) -> None:
     assert (devices.most, devices.open, devices.closed) == (1, 1, 1)
 
 
-def test_leaving_while_a_device_is_being_opened_lets_go_of_it(visit: LabVisit, qtbot: Any) -> None:
+def test_leaving_while_a_device_is_being_opened_lets_go_of_it(visit: LabController, qtbot: Any) -> None:
     devices = SlowDevices()
     visit._opening._open_live = devices
     visit.place.show()
@@ -453,7 +457,9 @@ def test_leaving_while_a_device_is_being_opened_lets_go_of_it(visit: LabVisit, q
     assert visit.live is None
 
 
-def test_a_force_that_was_stopped_does_not_come_with_a_device_that_is_being_opened(visit: LabVisit, qtbot: Any) -> None:
+def test_a_force_that_was_stopped_does_not_come_with_a_device_that_is_being_opened(
+    visit: LabController, qtbot: Any
+) -> None:
     devices = SlowDevices()
     visit._opening._open_live = devices
     visit.place.show()
@@ -468,7 +474,7 @@ def test_a_force_that_was_stopped_does_not_come_with_a_device_that_is_being_open
     assert visit.view().trouble == "No device is open"  # an edit opens none
 
 
-def test_a_failure_gives_up_the_device_that_is_being_opened(visit: LabVisit, qtbot: Any, caplog: Any) -> None:
+def test_a_failure_gives_up_the_device_that_is_being_opened(visit: LabController, qtbot: Any, caplog: Any) -> None:
     devices = SlowDevices()
     visit._opening._open_live = devices
     visit.place.show()
@@ -500,7 +506,7 @@ def test_a_device_that_cannot_be_closed_is_told_of_and_holds_nobody_up(qtbot: An
     assert [str(error) for error in failed] == ["the servo is stuck: switch it off"]
 
 
-def test_a_device_that_is_not_there_is_told(visit: LabVisit, qtbot: Any) -> None:
+def test_a_device_that_is_not_there_is_told(visit: LabController, qtbot: Any) -> None:
     def nothing(name: str, **_: Any) -> Any:
         raise DeviceNotFound(f"no {name} is plugged in")
 
@@ -512,7 +518,7 @@ def test_a_device_that_is_not_there_is_told(visit: LabVisit, qtbot: Any) -> None
     assert not view.device.ready
 
 
-def test_the_pointer_moves_the_ball(visit: LabVisit, qtbot: Any) -> None:
+def test_the_pointer_moves_the_ball(visit: LabController, qtbot: Any) -> None:
     visit.device = "mouse"
     visit.place.show()
     qtbot.waitUntil(lambda: visit.live is not None, timeout=OPENS_MS)

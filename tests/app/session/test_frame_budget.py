@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 
-from study_app.app.session.frame_budget import MOST_PERIODS, MOST_SHARE, Slack
+from study_app.app.session.frame_budget import MOST_PERIODS, MOST_SHARE, FrameBudget
 
 MS = 1_000_000
 
@@ -18,7 +18,7 @@ class Frame:
         self.done = []
         self.takes_ms = {name: takes for name, (_, takes) in works_ms.items()}
         works = [(lambda name=name: self.do(name), every / 1000) for name, (every, _) in works_ms.items()]
-        self.slack = Slack(works, lambda: self.now_ns)
+        self.slack = FrameBudget(works, lambda: self.now_ns)
 
     def do(self, name):
         self.done.append((name, self.now_ns // MS))

@@ -6,7 +6,7 @@ from typing import Any
 
 from PySide6.QtCore import QObject
 
-from study_app.app.session.garbage_collection import collect_if_due, collecting_here, settle, unsettle
+from study_app.app.session.garbage_collection import collect_if_due, collecting_here, freeze_garbage, unfreeze_garbage
 
 
 class Cycle:
@@ -69,11 +69,11 @@ def test_nothing_is_collected_before_it_is_due() -> None:
 def test_what_has_settled_is_looked_at_no_more_until_it_is_again() -> None:
     freed_in: list[int] = []
     Cycle(freed_in)
-    settle()
+    freeze_garbage()
     try:
         assert freed_in, "what nobody holds goes first"
         held = Cycle(freed_in)
-        settle()
+        freeze_garbage()
         del held
         gc.collect()
         assert len(freed_in) == 1
@@ -81,6 +81,6 @@ def test_what_has_settled_is_looked_at_no_more_until_it_is_again() -> None:
         gc.collect()
         assert len(freed_in) == 2, "what came since is looked at"
     finally:
-        unsettle()
+        unfreeze_garbage()
     gc.collect()
     assert len(freed_in) == 3

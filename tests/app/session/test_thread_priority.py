@@ -9,7 +9,7 @@ import threading
 import pytest
 
 from study_app.app.session import thread_priority
-from study_app.app.session.thread_priority import Urgency
+from study_app.app.session.thread_priority import ThreadPriority
 
 if sys.platform != "linux":
     pytest.skip("levels of Linux", allow_module_level=True)
@@ -30,7 +30,7 @@ def kept():
 
 
 def test_it_hurries_and_rests(kept):
-    made = Urgency()
+    made = ThreadPriority()
     if not made.hurry():
         pytest.skip("this user may not")
     assert level() == thread_priority.NICE
@@ -48,7 +48,7 @@ def test_who_may_not_asks_the_desktops_service(kept, monkeypatch):
 
     monkeypatch.setattr(os, "setpriority", refuse)
     monkeypatch.setattr(thread_priority, "make_high_priority", lambda *given: asked.append(given))
-    assert Urgency().hurry()
+    assert ThreadPriority().hurry()
     assert asked == [(threading.get_native_id(), thread_priority.NICE)]
 
 
@@ -58,7 +58,7 @@ def test_where_nobody_grants_it_nothing_breaks(kept, monkeypatch):
 
     monkeypatch.setattr(os, "setpriority", refuse)
     monkeypatch.setattr(thread_priority, "make_high_priority", refuse)
-    made = Urgency()
+    made = ThreadPriority()
     assert not made.hurry()
     made.rest()
     assert level() == kept

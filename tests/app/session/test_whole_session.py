@@ -209,10 +209,8 @@ def test_a_signal_leaves_the_session_unfinished_and_resumable(short_demo, result
 
 def test_a_lost_device_ends_the_session_with_one_line(short_demo, results, monkeypatch):
     machines = []
-    open_machine = live_session.open_machine
-    monkeypatch.setattr(
-        live_session, "open_machine", lambda *a, **k: machines.append(open_machine(*a, **k)) or machines[-1]
-    )
+    open_rig = live_session.open_rig
+    monkeypatch.setattr(live_session, "open_rig", lambda *a, **k: machines.append(open_rig(*a, **k)) or machines[-1])
 
     def unplug(participant):
         QTest.keyClick(participant.widget, Qt.Key.Key_Return)
@@ -277,7 +275,7 @@ def test_a_mistake_in_the_program_is_an_exit_code_and_a_trace(short_demo, result
     def fails(*_chosen, **_asked):
         raise RuntimeError("not thought of")
 
-    monkeypatch.setattr(live_session, "open_machine", fails)
+    monkeypatch.setattr(live_session, "open_rig", fails)
     assert app.run(short_demo, participant="P001", windowed=True, results=results) == app.BUG
     assert "not thought of" in capsys.readouterr().err
     assert not results.exists()

@@ -17,7 +17,7 @@ from pathlib import Path
 
 from study_app import app
 from study_app.app.session import live_session
-from study_app.devices.rig import Machine
+from study_app.devices.rig import Rig
 from study_app.gui.application import application_here
 from study_app.gui.operator import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow
@@ -49,9 +49,9 @@ def stand_still_after_the_first_frame(how: str, stopped: list[int]) -> None:
 
 
 def main(folder: str, how: str) -> int:
-    machines: list[Machine] = []
-    open_machine = live_session.open_machine
-    live_session.open_machine = lambda *a, **k: machines.append(open_machine(*a, **k)) or machines[-1]
+    machines: list[Rig] = []
+    open_rig = live_session.open_rig
+    live_session.open_rig = lambda *a, **k: machines.append(open_rig(*a, **k)) or machines[-1]
     start.MEASURED_S = 0.1
     stopped: list[int] = []
     if how != "felt":

@@ -19,7 +19,7 @@ from PySide6.QtWidgets import QLabel
 
 from study_app import app
 from study_app.app.session import live_session
-from study_app.devices.rig import Machine
+from study_app.devices.rig import Rig
 from study_app.gui.application import application_here
 from study_app.gui.operator import OperatorWindow
 from study_app.gui.operator.steps_card import StepLine
@@ -38,7 +38,7 @@ LEFT = Qt.MouseButton.LeftButton
 class Scene:
     """What happens to the session, step by step; ``told`` is what was seen."""
 
-    def __init__(self, machines: list[Machine], pictures: Path | None) -> None:
+    def __init__(self, machines: list[Rig], pictures: Path | None) -> None:
         self.machines, self.pictures = machines, pictures
         self.told: dict[str, Any] = {"errors": []}
         self.step = self.unplug
@@ -64,7 +64,7 @@ class Scene:
         return isinstance(participant.page, TroublePage | PausePage)
 
     @property
-    def machine(self) -> Machine:
+    def machine(self) -> Rig:
         return self.machines[0]
 
     def picture(self, name: str) -> None:
@@ -204,9 +204,9 @@ def _ends(*_arguments: object) -> None:
 
 def main(folder: str, pictures: str = "") -> None:
     start.MEASURED_S = 0.7  # the force has faded in by the first trial, as in a real session
-    machines: list[Machine] = []
-    open_machine = live_session.open_machine
-    live_session.open_machine = lambda *a, **k: machines.append(open_machine(*a, **k)) or machines[-1]
+    machines: list[Rig] = []
+    open_rig = live_session.open_rig
+    live_session.open_rig = lambda *a, **k: machines.append(open_rig(*a, **k)) or machines[-1]
     scene = Scene(machines, Path(pictures) if pictures else None)
     application_here()
     person = Person(scene)

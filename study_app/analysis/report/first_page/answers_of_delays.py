@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from study_app.analysis.findings.block_results import BlockFound
-from study_app.analysis.findings.contrast_with_control import Against
+from study_app.analysis.findings.contrast_with_control import ContrastWithControl
 from study_app.analysis.findings.words import all_of, beyond, interval, listed, ms, number, percent, short
 from study_app.analysis.report.first_page.answer import NO_EVIDENCE, Answer
 from study_app.analysis.tables.planned_analysis import Decided
@@ -38,7 +38,9 @@ def noticed_from(found: BlockFound, decided: Decided) -> Answer:
     return Answer("noticed from", found.id, found.title, told, tuple(sizes), headline is not None, exploratory, at_ms)
 
 
-def _shortest(found: BlockFound, lowest: Mapping[str, float], different: Sequence[Against]) -> tuple[float, str] | None:
+def _shortest(
+    found: BlockFound, lowest: Mapping[str, float], different: Sequence[ContrastWithControl]
+) -> tuple[float, str] | None:
     """Return the shortest delay that changes a statement of those given and the sentence of it; None without any."""
     if lowest:
         at = min(lowest.values())
@@ -54,7 +56,12 @@ def _shortest(found: BlockFound, lowest: Mapping[str, float], different: Sequenc
 
 
 def _noticed_sizes(
-    found: BlockFound, decided: Decided, lowest: Mapping[str, float], different: Sequence[Against], *, mark: bool
+    found: BlockFound,
+    decided: Decided,
+    lowest: Mapping[str, float],
+    different: Sequence[ContrastWithControl],
+    *,
+    mark: bool,
 ) -> list[str]:
     """Return the changes of all statements and the threshold; ``mark``: say which of them are exploratory."""
 
@@ -85,7 +92,7 @@ def _noticed_sizes(
     return sizes
 
 
-def _first_of_each(different: Iterable[Against]) -> Iterator[Against]:
+def _first_of_each(different: Iterable[ContrastWithControl]) -> Iterator[ContrastWithControl]:
     """Yield of each statement the comparison at the shortest delay."""
     seen = set()
     for one in sorted(different, key=lambda one: one.delay_ms):
@@ -102,12 +109,12 @@ def _change(found: BlockFound, item: str, delay_ms: float) -> str:
     return ""
 
 
-def _difference(one: Against) -> str:
+def _difference(one: ContrastWithControl) -> str:
     effect, ends = one.found.effect or 0.0, one.found.interval
     return f"{'+' if effect > 0 else ''}{number(effect)} {'(no interval)' if ends is None else interval(ends)} points"
 
 
-def _level(against: Sequence[Against]) -> str:
+def _level(against: Sequence[ContrastWithControl]) -> str:
     """Return what the differences and their intervals are, said once."""
     first = against[0]
     return f"Points: mean difference to {ms(first.control_ms)}, {percent(1 - 2 * first.found.alpha)} interval"

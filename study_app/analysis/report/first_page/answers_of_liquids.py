@@ -8,7 +8,7 @@ from itertools import combinations
 from study_app.analysis.designs.liquids import smallest_of_pairs
 from study_app.analysis.findings.block_results import BlockFound
 from study_app.analysis.findings.item_test import Tested
-from study_app.analysis.findings.liquid_recognition import Named
+from study_app.analysis.findings.liquid_recognition import RecognitionResult
 from study_app.analysis.findings.words import counted, interval, listed, name, number, short
 from study_app.analysis.report.first_page.answer import FOUND, NO_EVIDENCE, Answer
 from study_app.analysis.statistics.outcome import Interval
@@ -16,7 +16,7 @@ from study_app.analysis.statistics.paired import Paired
 from study_app.analysis.tables.planned_analysis import Decided
 
 
-def recognised(named: Named) -> tuple[int, ...]:
+def recognised(named: RecognitionResult) -> tuple[int, ...]:
     """Return the places of the settings that were recognised.
 
     Only where names are right more often than by chance as a whole; then those whose share of right names, by the
@@ -32,7 +32,7 @@ def recognised(named: Named) -> tuple[int, ...]:
     return tuple(found)
 
 
-def given(named: Named, label: str) -> float:
+def given(named: RecognitionResult, label: str) -> float:
     """Return the share of all answers that gave a name: what is right by chance."""
     place = named.labels.index(label)
     asked = sum(sum(row[:-1]) for row in named.found.table)
@@ -64,7 +64,7 @@ def _suggested(tests: Sequence[Tested]) -> bool:
     return all(one.verdict == "suggested" for one in tests)
 
 
-def _of_names(found: BlockFound, named: Named, known: Sequence[int]) -> str:
+def _of_names(found: BlockFound, named: RecognitionResult, known: Sequence[int]) -> str:
     """Return which liquids were recognised and which were not, with the name that was given instead."""
     yes = [found.names[place].lower() for place in known]
     no = [rate.setting for rate in named.found.rates if rate.setting not in known]
@@ -78,7 +78,7 @@ def _of_names(found: BlockFound, named: Named, known: Sequence[int]) -> str:
     return f"{_first_upper('; '.join(told))}."
 
 
-def _instead(found: BlockFound, named: Named, place: int) -> str:
+def _instead(found: BlockFound, named: RecognitionResult, place: int) -> str:
     """Return the wrong name that a setting was given most, if it was given more often than the right one."""
     counts = named.found.table[place]
     right = named.right[place]
@@ -91,7 +91,7 @@ def _instead(found: BlockFound, named: Named, place: int) -> str:
     return f"{found.names[place].lower()} was called {called or short(found, label).lower()} by {most} of {sum(counts)}"
 
 
-def _hits(found: BlockFound, named: Named) -> str:
+def _hits(found: BlockFound, named: RecognitionResult) -> str:
     """Return how many gave each liquid its right name, with the interval of the share, and what chance would give."""
     told = []
     for rate in named.found.rates:

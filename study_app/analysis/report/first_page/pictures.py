@@ -11,7 +11,7 @@ from study_app.analysis import style
 from study_app.analysis.figures import psychometric_curve
 from study_app.analysis.figures.page_layout import Sheet
 from study_app.analysis.findings.block_results import BlockFound
-from study_app.analysis.findings.liquid_recognition import Named
+from study_app.analysis.findings.liquid_recognition import RecognitionResult
 from study_app.analysis.findings.words import ms, name, short
 from study_app.analysis.report.first_page.answer import Answer
 from study_app.analysis.report.first_page.answers_of_delays import common_ms
@@ -38,7 +38,7 @@ def draw(answer: Answer, found: BlockFound) -> tuple[bytes, str] | None:
     return None if words is None else (style.file_bytes(sheet.figure, "png", words), words)
 
 
-def _names(sheet: Sheet, named: Named, found: BlockFound) -> str:
+def _names(sheet: Sheet, named: RecognitionResult, found: BlockFound) -> str:
     """Draw a bar a liquid: how many gave it its right name, and which other names it was given."""
     left = 4 + max(sheet.text_width(words, 9) for words in found.names)
     height = (HEIGHT_PT - FOOT_PT) / len(found.names)
@@ -76,7 +76,7 @@ def _names(sheet: Sheet, named: Named, found: BlockFound) -> str:
     return "How many people gave each liquid which name; blue is the right one"
 
 
-def _called(named: Named, found: BlockFound, label: str) -> str:
+def _called(named: RecognitionResult, found: BlockFound, label: str) -> str:
     at = next((place for place, other in enumerate(named.right) if other == label), None)
     return found.names[at].lower() if at is not None else short(found, label).lower().removeprefix("like ")
 
