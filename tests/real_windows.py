@@ -71,12 +71,15 @@ class Program:
         return finished.stdout.strip()
 
     def window(self, title: str) -> str:
-        def number() -> str:
-            assert self.process.poll() is None, self.process.stderr.read()  # type: ignore[union-attr]
-            return self.xdotool("search", "--onlyvisible", "--name", title)
+        found: list[str] = []
 
-        wait_for(number, f"the window {title!r}")
-        return number().splitlines()[-1]
+        def look() -> list[str]:
+            assert self.process.poll() is None, self.process.stderr.read()  # type: ignore[union-attr]
+            found[:] = self.xdotool("search", "--onlyvisible", "--name", title).splitlines()
+            return found
+
+        wait_for(look, f"the window {title!r}")
+        return found[-1]
 
     def window_of(self, title: str, size: QSize) -> str:
         """Wait for a window of this title and size; return its number."""
