@@ -17,7 +17,7 @@ from study_app.app.main_controller import MainController
 from study_app.gui.application import application_here
 
 application = application_here()
-visit = Visit(Path(sys.argv[1]))
+visit = MainController(Path(sys.argv[1]))
 visit.window.show()
 application.processEvents()
 assert visit.window.isVisible()
